@@ -1,0 +1,8 @@
+"""python -m rotor_mbs"""
+
+import sys
+
+from rotor_mbs.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

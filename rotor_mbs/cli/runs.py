@@ -1,0 +1,73 @@
+"""`run`, `reproduce` and `reference`: batches, and what is told of them at the end."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rotor_mbs.cli.batch import Batch, Report, default_methods, execute
+from rotor_mbs.errors import InputError
+from rotor_mbs.models.registry import DEFAULT_METHODS, ERRATA_METHODS, check_names
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """A batch into one file. Methods named with -m must be able to represent every scene; the default ones may not."""
+    scenes = find_scenes(arguments.scenes)
+    asked = check_names(arguments.method or ())
+    methods, refused = _methods(scenes, asked or DEFAULT_METHODS)
+    if asked and refused:
+        raise InputError(refused)
+    for line in refused:
+        print(line, file=sys.stderr)
+    report = execute(Batch(scenes, methods, arguments.output, arguments.jobs, arguments.timeout))
+    return _tell(report, arguments.output)
+
+
+def reproduce(arguments: argparse.Namespace) -> int:
+    """Every scene of the paper, its default methods and each erratum alone, and the report."""
+    from rotor_mbs.cli.reports import render
+
+    start = time.monotonic()
+    scenes = find_scenes(["paper"])
+    methods, _ = _methods(scenes, (*DEFAULT_METHODS, *ERRATA_METHODS))
+    results = arguments.output / "results.h5"
+    report = execute(Batch(scenes, methods, results, arguments.jobs, arguments.timeout))
+    status = _tell(report, results)
+    index = render(results, arguments.output / "report", jobs=arguments.jobs)
+    print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
+    return status
+
+
+def freeze(arguments: argparse.Namespace) -> int:
+    """References computed anew, whatever is shipped, and stored without anything that can be computed from them."""
+    from rotor_mbs.store.freeze import freeze as thin
+
+    scenes = find_scenes(arguments.scenes)
+    nothing: dict[str, Sequence[str]] = {scene.name: () for scene in scenes}
+    full = arguments.output.with_name(arguments.output.name + ".full.h5")
+    report = execute(Batch(scenes, nothing, full, arguments.jobs, arguments.timeout, use_frozen=False))
+    thin(full, arguments.output, datetime.now(UTC).date().isoformat())
+    full.unlink()
+    return _tell(report, arguments.output)
+
+
+def _methods(scenes: Sequence[Scene], names: Sequence[str]) -> tuple[dict[str, Sequence[str]], list[str]]:
+    methods: dict[str, Sequence[str]] = {}
+    refused: list[str] = []
+    for scene in scenes:
+        methods[scene.name], lines = default_methods(scene, names)
+        refused += lines
+    return methods, refused
+
+
+def _tell(report: Report, output: Path) -> int:
+    """The batch in a few lines; 1 where a run that should succeed did not."""
+    ended = len(report.made) - len(report.failures)
+    print(f"{output}: {len(report.made)} runs made ({ended} ok), {report.kept} there already")
+    return 1 if report.failures else 0

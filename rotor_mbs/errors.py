@@ -1,0 +1,28 @@
+"""What can go wrong, as typed errors that carry what was being done. Knows nothing of the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class RotorError(Exception):
+    """Base of every error this package raises on purpose; its text is one readable line (or several)."""
+
+
+class InputError(RotorError):
+    """Bad input: one line per fault, each naming file (and line), key, what is wrong, what is allowed.
+
+    The command line prints the lines and ends with exit status 2.
+    """
+
+    def __init__(self, problems: str | Iterable[str]) -> None:
+        self.problems: tuple[str, ...] = (problems,) if isinstance(problems, str) else tuple(problems)
+        super().__init__("\n".join(self.problems))
+
+
+class MethodRefusal(RotorError):
+    """A method that cannot represent this scene, or is not installed here; says what is allowed or how to get it."""
+
+
+class StoreError(RotorError):
+    """A results file that cannot be read or written; names the file and the reason."""

@@ -1,0 +1,1 @@
+"""The right closed form of the rotor's Euler-Lagrange equations, for any rigid blades."""

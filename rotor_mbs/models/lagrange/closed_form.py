@@ -1,0 +1,115 @@
+"""The closed form: accelerations by an arrowhead solve, energies, tip. One text for NumPy, SciPy and heyoka.
+
+Every function takes numbers of any kind that knows + - * / (floats, arrays, quad precision, symbolic expressions)
+together with a sine and a cosine for that kind, and contains no branch on a value. Knows no integrator.
+
+Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ.
+T = ½ J_hub Ω² + ½ Σ ω·J ω with ω = (Ω s, Ω c, θ̇) and J the blade's inertia about the hub centre, so
+T = ½ (J_hub + Σ a) Ω² + Σ b Ω θ̇ + ½ Σ Jzz θ̇²,  a = Jxx s² + Jyy c² + 2 Jxy s c,  b = Jxz s + Jyz c,
+V = Σ m g (z cos φ - (x c - y s) sin φ) + ½ k θ².
+The mass matrix is an arrowhead; eliminating the pitches leaves the Schur complement S = J_hub + Σ (a - b²/Jzz).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rotor_mbs.models.lagrange.parameters import BladeForm, Number, RotorForm
+
+Function = Callable[[Any], Any]
+
+
+def accelerations(
+    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, torque: Number, sin: Function, cos: Function
+) -> list[Number]:
+    """Rotor, then pitch accelerations in rad/s².
+
+    angles, rates   1 + len(form.blades) numbers, rad and rad/s: rotor, then the pitches that move
+    torque          N m on the rotor
+
+    Source: Lagrange's equations of T - V above. Singular where S = 0: point-mass blades all at ±π/2 on a massless hub.
+    """
+    sin_q, cos_q = sin(angles[0]), cos(angles[0])
+    spin = rates[0]
+    schur = form.inertia
+    moment = torque - form.shaft_damping * spin
+    for weight, cos_phase, sin_phase in form.held:
+        moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
+    free, ratios = [], []
+    for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
+        s, c = sin(theta), cos(theta)
+        sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
+        cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
+        half_slope = blade.half_slope_sc * (s * c) + blade.half_slope_cs * (c * c - s * s)  # ½ ∂a/∂θ
+        coupling_slope = blade.coupling_s * c - blade.coupling_c * s  # ∂b/∂θ
+        ratio = blade.ratio_s * s + blade.ratio_c * c  # b / Jzz
+        lever = blade.lever_ss * (s * s) + blade.lever_cc * (c * c) + blade.lever_sc * (s * c)
+        pitch_moment = half_slope * (spin * spin) - blade.stiffness * theta - blade.damping * rate
+        schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
+        moment = (
+            moment
+            + cos_phi * (blade.weight_x * c - blade.weight_y * s)
+            + sin_phi * lever
+            - rate * (2.0 * half_slope * spin + coupling_slope * rate)
+            - ratio * pitch_moment
+        )
+        gravity = sin_phi * (blade.weight_x * s + blade.weight_y * c)
+        free.append((pitch_moment - gravity) / blade.pitch_inertia)
+        ratios.append(ratio)
+    rotor = moment / schur
+    return [rotor, *(alone - ratio * rotor for alone, ratio in zip(free, ratios, strict=True))]
+
+
+def power(rates: Sequence[Number], form: RotorForm, torque: Number) -> Number:
+    """W: of the torque, less what shaft and bearing dampers take."""
+    spin = rates[0]
+    total = torque * spin - form.shaft_damping * (spin * spin)
+    for blade, rate in zip(form.blades, rates[1:], strict=True):
+        total = total - blade.damping * (rate * rate)
+    return total
+
+
+def energies(
+    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, sin: Function, cos: Function
+) -> tuple[Number, Number]:
+    """Kinetic and potential energy in J (gravity about the shaft's height, and bearing springs)."""
+    sin_q, cos_q = sin(angles[0]), cos(angles[0])
+    spin = rates[0]
+    kinetic = 0.5 * form.inertia * (spin * spin)
+    potential = 0.0 * sin_q
+    for weight, cos_phase, sin_phase in form.held:
+        potential = potential + weight * (cos_q * cos_phase - sin_q * sin_phase)
+    for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
+        s, c = sin(theta), cos(theta)
+        kinetic = kinetic + _kinetic(blade, s, c, spin, rate)
+        sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
+        cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
+        height = cos_phi * blade.weight_z - sin_phi * (blade.weight_x * c - blade.weight_y * s)
+        potential = potential + height + 0.5 * blade.stiffness * (theta * theta)
+    return kinetic, potential
+
+
+def _kinetic(blade: BladeForm, s: Number, c: Number, spin: Number, rate: Number) -> Number:
+    inertia = blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
+    coupling = blade.coupling_s * s + blade.coupling_c * c
+    return 0.5 * inertia * (spin * spin) + coupling * spin * rate + 0.5 * blade.pitch_inertia * (rate * rate)
+
+
+def schur_complement(angles: Sequence[Number], form: RotorForm, sin: Function, cos: Function) -> Number:
+    """S in kg m²: the rotor's inertia with every pitch free; its zero is the singular configuration."""
+    total = form.inertia
+    for blade, theta in zip(form.blades, angles[1:], strict=True):
+        s, c = sin(theta), cos(theta)
+        total = total + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
+    return total
+
+
+def point_path(
+    azimuth: Number, pitch: Number, point: Sequence[float], sin: Function, cos: Function
+) -> tuple[Number, Number, Number]:
+    """(x, y, z) in m of a point of a blade in the base frame: Ry(φ)·Rz(θ)·point."""
+    x, y, z = point
+    s, c = sin(pitch), cos(pitch)
+    across, along = x * c - y * s, x * s + y * c
+    return cos(azimuth) * across + sin(azimuth) * z, along, cos(azimuth) * z - sin(azimuth) * across

@@ -1,0 +1,83 @@
+"""The only file that knows heyoka: symbols and parameters, Taylor integrators, quad precision numbers."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from fractions import Fraction
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.errors import MethodRefusal
+
+
+@functools.cache
+def heyoka() -> ModuleType:
+    """The engine, imported when first asked for. Raises MethodRefusal with the way to get it."""
+    try:
+        import heyoka as engine
+    except ImportError as exc:
+        raise MethodRefusal(
+            "heyoka is not installed: it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge "
+            "elsewhere; lagrange/dop853 needs SciPy only"
+        ) from exc
+    return engine  # type: ignore[no-any-return]
+
+
+def is_available() -> bool:
+    try:
+        heyoka()
+    except MethodRefusal:
+        return False
+    return True
+
+
+class Parameters:
+    """Turns numbers into runtime parameters: equal ones share a parameter, exact zeros vanish from the equations.
+
+    values      the numbers, by parameter index
+    structure   the index (-1: zero) of every number in the order asked for; equal structures give equal equations,
+                so that one compiled integrator serves every scene of that structure
+    """
+
+    def __init__(self) -> None:
+        self.values: list[Fraction] = []
+        self.structure: list[int] = []
+
+    def __call__(self, value: Fraction) -> Any:
+        if value == 0:
+            self.structure.append(-1)
+            return 0.0
+        if value not in self.values:
+            self.values.append(value)
+        return self._parameter(self.values.index(value))
+
+    def own(self, value: Fraction) -> Any:
+        """A parameter of its own, even when zero or equal to another: for what changes during a run."""
+        self.values.append(value)
+        return self._parameter(len(self.values) - 1)
+
+    def _parameter(self, index: int) -> Any:
+        self.structure.append(index)
+        return heyoka().par[index]
+
+
+def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
+    """(len(values),) float64, or real128 where `quad`: each number rounded once (quad: at most twice)."""
+    if not quad:
+        return np.array([float(value) for value in values])
+    real128 = heyoka().real128
+    numbers = [real128(str(value.numerator)) / real128(str(value.denominator)) for value in values]
+    return np.array(numbers, dtype=real128)
+
+
+def failure(outcome: Any) -> str:
+    """The engine's word on a propagation: "" where it says it reached the end, else its reason."""
+    outcomes = heyoka().taylor_outcome
+    if outcome == outcomes.time_limit:
+        return ""
+    if outcome == outcomes.err_nf_state:
+        return "the state stopped being finite (heyoka: err_nf_state)"
+    return f"heyoka: {str(outcome).rsplit('.', 1)[-1]}"

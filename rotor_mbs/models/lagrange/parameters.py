@@ -1,0 +1,160 @@
+"""A scene's numbers as the coefficients of the closed form, in exact rational arithmetic until the last step.
+
+Why exact: for a point mass the coefficients Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating
+point they leave a rounding remainder, and near a pitch of ±π/2 that remainder, not the physics, would be the inertia.
+Knows the scene only; no integrator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from rotor_mbs.scenario.scene import Blade, Scene
+
+# A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic parameter.
+Number = Any
+Convert = Callable[[Fraction], Number]
+
+PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803")
+
+
+@dataclass(frozen=True, slots=True)
+class BladeForm:
+    """Coefficients of one blade; s, c are sine and cosine of its pitch θ.
+
+    cos_phase, sin_phase         of its mounting angle about the shaft
+    schur_ss, _cc, _sc           kg m²: its share of the Schur complement, a quadratic form in (s, c)
+    half_slope_sc, _cs           kg m²: ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
+    coupling_s, _c               kg m²: b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
+    ratio_s, ratio_c             b / Jzz
+    pitch_inertia                kg m²: Jzz
+    weight_x, _y, _z             N m: m g (x, y, z) of the centre of mass
+    lever_ss, _cc, _sc           N m: gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
+    stiffness, damping           N m/rad, N m s/rad
+    inertia_ss, _cc, _sc         kg m²: a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
+    """
+
+    cos_phase: Number
+    sin_phase: Number
+    schur_ss: Number
+    schur_cc: Number
+    schur_sc: Number
+    half_slope_sc: Number
+    half_slope_cs: Number
+    coupling_s: Number
+    coupling_c: Number
+    ratio_s: Number
+    ratio_c: Number
+    pitch_inertia: Number
+    weight_x: Number
+    weight_y: Number
+    weight_z: Number
+    lever_ss: Number
+    lever_cc: Number
+    lever_sc: Number
+    stiffness: Number
+    damping: Number
+    inertia_ss: Number
+    inertia_cc: Number
+    inertia_sc: Number
+
+
+@dataclass(frozen=True, slots=True)
+class RotorForm:
+    """Coefficients of the whole rotor.
+
+    blades      the blades whose pitch moves, in order; `moving` holds their numbers (from 0)
+    held        (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
+    inertia     kg m²: hub, and the blades that are held
+    """
+
+    blades: tuple[BladeForm, ...]
+    moving: tuple[int, ...]
+    held: tuple[tuple[Number, Number, Number], ...]
+    inertia: Number
+    shaft_damping: Number
+
+
+def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
+    """The coefficients of `scene`, each correctly rounded from its exact value by `convert`.
+
+    The scene's doubles are taken as exact, so that every precision solves the same machine.
+    """
+    gravity = Fraction(scene.gravity)
+    count = len(scene.blades)
+    forms: list[BladeForm] = []
+    moving: list[int] = []
+    held: list[tuple[Number, Number, Number]] = []
+    inertia = Fraction(scene.hub_inertia)
+    for i, blade in enumerate(scene.blades):
+        phase = [_cosine_of_turn(Fraction(i, count)), _cosine_of_turn(Fraction(i, count) - Fraction(1, 4))]
+        if blade.has_pitch_inertia:
+            stiffness = Fraction(scene.bearing_stiffness[i]) if scene.bearing_stiffness else Fraction(0)
+            damping = Fraction(scene.bearing_damping[i]) if scene.bearing_damping else Fraction(0)
+            values = [*phase, *_coefficients(blade, gravity), stiffness, damping, *_rotor_inertia(blade)]
+            forms.append(BladeForm(*(convert(value) for value in values)))
+            moving.append(i)
+        else:
+            inertia += _rotor_inertia(blade)[1]
+            weight = Fraction(blade.mass) * gravity * Fraction(blade.centre_of_mass[2])
+            held.append((convert(weight), convert(phase[0]), convert(phase[1])))
+    return RotorForm(tuple(forms), tuple(moving), tuple(held), convert(inertia), convert(Fraction(scene.shaft_damping)))
+
+
+def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:
+    """xx yy zz xy xz yz about the hub centre: J = J_com + m (r·r I - r rᵀ)."""
+    m = Fraction(blade.mass)
+    x, y, z = (Fraction(value) for value in blade.centre_of_mass)
+    xx, yy, zz, xy, xz, yz = (Fraction(value) for value in blade.inertia)
+    return (
+        xx + m * (y * y + z * z),
+        yy + m * (x * x + z * z),
+        zz + m * (x * x + y * y),
+        xy - m * x * y,
+        xz - m * x * z,
+        yz - m * y * z,
+    )
+
+
+def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
+    """ss, cc, sc of a(θ) = Jxx s² + Jyy c² + 2 Jxy s c: the blade's inertia about the shaft."""
+    xx, yy, _, xy, _, _ = _inertia_about_hub(blade)
+    return xx, yy, 2 * xy
+
+
+def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
+    """schur_ss ... lever_sc of BladeForm, in its order."""
+    xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
+    x, y, z = (Fraction(value) for value in blade.centre_of_mass)
+    weight = Fraction(blade.mass) * gravity
+    schur = [xx - xz * xz / zz, yy - yz * yz / zz, 2 * (xy - xz * yz / zz)]
+    lever = [weight * (z + xz * x / zz), weight * (z + yz * y / zz), weight * (xz * y + yz * x) / zz]
+    return [
+        *schur,
+        xx - yy,
+        xy,
+        xz,
+        yz,
+        xz / zz,
+        yz / zz,
+        zz,
+        weight * x,
+        weight * y,
+        weight * z,
+        *lever,
+    ]
+
+
+def _cosine_of_turn(turn: Fraction) -> Fraction:
+    """cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
+    angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
+    square = (angle * angle).limit_denominator(10**60)
+    term, total, k = Fraction(1), Fraction(1), 0
+    while abs(term) > Fraction(1, 10**55):
+        k += 2
+        term = (-term * square / (k * (k - 1))).limit_denominator(10**60)
+        total += term
+    return total.limit_denominator(10**50)

@@ -1,0 +1,128 @@
+"""The closed form as a symbolic system of heyoka, and one propagation of it over the sample times."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
+from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.torque import Stretch, stretches
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.trajectory.record import Array, Integration
+
+
+@dataclass
+class System:
+    """First-order equations of a scene.
+
+    equations   [(symbol, right-hand side)]: angles, rates, and the work where it is not known in closed form
+    parameters  their numbers; the last two are the torque's offset and slope where the torque changes
+    moving      column in `angles` of each state angle: 0, then 1 + number of each blade whose pitch moves
+    """
+
+    equations: list[tuple[Any, Any]]
+    parameters: Parameters
+    moving: tuple[int, ...]
+    has_work: bool
+    stretches: list[Stretch]
+
+    @property
+    def structure(self) -> tuple[int, ...]:
+        return (*self.parameters.structure, len(self.equations), len(self.stretches) > 1)
+
+
+def build_system(scene: Scene) -> System:
+    engine = heyoka()
+    parameters = Parameters()
+    form = rotor_form(scene, parameters)
+    pieces = stretches(scene)
+    changing = len(pieces) > 1
+    has_work = scene.wants("energy") and (changing or scene.has_damping)
+    count = 1 + len(form.blades)
+    names = [f"q{i}" for i in range(count)] + [f"w{i}" for i in range(count)]
+    symbols = engine.make_vars(*names)
+    angles, rates = symbols[:count], symbols[count:]
+    if changing:
+        torque = parameters.own(pieces[0].offset) + parameters.own(pieces[0].slope) * engine.time
+    else:
+        torque = parameters(pieces[0].offset)
+    found = closed_form.accelerations(angles, rates, form, torque, engine.sin, engine.cos)
+    equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
+    if has_work:
+        equations.append((engine.make_vars("work"), closed_form.power(rates, form, torque)))
+    return System(equations, parameters, (0, *(1 + i for i in form.moving)), has_work, pieces)
+
+
+def initial_state(scene: Scene, system: System) -> list[Fraction]:
+    """The scene's doubles, exact, in the order of the equations."""
+    columns = system.moving
+    values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
+    return [Fraction(value) for value in values] + [Fraction(0)] * system.has_work
+
+
+_compiled: dict[tuple[object, ...], Any] = {}
+
+
+def compiled(key: tuple[object, ...], make: Callable[[], Any]) -> Any:
+    """An integrator of its own for the caller, compiled once per process and structure."""
+    if key not in _compiled:
+        _compiled[key] = make()
+    return copy.deepcopy(_compiled[key])
+
+
+def set_parameters(integrator: Any, values: Any) -> None:
+    """Those that the equations of motion use; the ones after them belong to energies alone."""
+    integrator.pars[:] = values[: len(integrator.pars)]
+
+
+class Propagation:
+    """One integrator, one initial state, one row of sample times (s); run as often as wanted.
+
+    The state at the samples is in `states` ((n, variables), cut before the first row that is not finite).
+    """
+
+    def __init__(self, integrator: Any, system: System, initial: Any, times: Array) -> None:
+        self._integrator = integrator
+        self._initial = initial
+        self._times = times
+        self._stretches = [_StretchGrid(piece, times, initial.dtype) for piece in system.stretches]
+        self._torque = len(system.parameters.values) - 2
+        self.states = initial[None, :]
+
+    def run(self) -> Integration:
+        integrator = self._integrator
+        integrator.time = self._initial.dtype.type(0)
+        integrator.state[:] = self._initial
+        rows = [self._initial[None, :]]
+        steps, message = 0, ""
+        for stretch in self._stretches:
+            if len(self._stretches) > 1:
+                integrator.pars[self._torque :] = stretch.torque
+            outcome, _, _, taken, _, states = integrator.propagate_grid(stretch.grid)
+            steps += taken
+            rows.append(states[1 : 1 + stretch.samples])
+            message = failure(outcome)
+            if message:
+                break
+        states = np.concatenate(rows)
+        finite = np.isfinite(states.astype(float)).all(axis=1)
+        self.states = states[: len(finite) if finite.all() else int(np.argmin(finite))]
+        return Integration(not message, message, float(self._times[max(len(self.states) - 1, 0)]), steps)
+
+
+class _StretchGrid:
+    """The times at which a stretch is stopped at: its start, the samples inside, and its end."""
+
+    def __init__(self, piece: Stretch, times: Array, dtype: Any) -> None:
+        inside = times[(times > piece.start) & (times <= piece.end)]
+        self.samples = len(inside)
+        end = [] if len(inside) and inside[-1] == piece.end else [piece.end]
+        self.grid = np.array([piece.start, *inside, *end]).astype(dtype)
+        self.torque = array_of([piece.offset, piece.slope], quad=dtype != np.float64)

@@ -1,0 +1,158 @@
+"""Which scenes there are, and which ones a command line means. Knows no model; reads numbers only when asked to."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.load import load_scene
+from rotor_mbs.scenario.reading import read_toml, shown_path
+from rotor_mbs.scenario.resources import scenarios_folder
+from rotor_mbs.scenario.scene import Scene
+
+_PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
+_NAME = re.compile(rf"{_PIECE}(?:/{_PIECE})*")
+_NAME_RULE = "of the characters A-Z a-z 0-9 . _ -, with no dot in front"
+_TAKEN = ("bench", "errata", "stability", "sweep")  # groups of results files that are no scenes
+
+
+class _File(NamedTuple):
+    """A scene file: the path that was given, where that leads to, and the name its scene gets."""
+
+    path: Path
+    real: Path
+    name: str
+
+
+def list_scenes() -> list[tuple[str, str]]:
+    """(name, title) of every shipped scene; the title of a broken file says that it is broken."""
+    return [(name, _title(path)) for name, path in _shipped().items()]
+
+
+def find_scenes(arguments: Sequence[str]) -> list[Scene]:
+    """The scenes that the arguments mean, in their order, each once.
+
+    An argument is the name of a shipped scene (`paper/fig05`), a shipped folder (`paper`), a path to a TOML file, or a
+    path to a folder of TOML files; a shipped name goes before a path (write ./paper for a folder of one's own).
+    Raises InputError with all faults of all arguments and files.
+    """
+    problems: list[str] = []
+    files: dict[Path, _File] = {}
+    for argument in arguments:
+        try:
+            for file in _files(argument):
+                files.setdefault(file.real, file)
+        except InputError as error:
+            problems.extend(error.problems)
+    problems.extend(_name_clashes(files.values()))
+    scenes = []
+    for file in files.values():
+        try:
+            scenes.append(load_scene(file.path, file.name))
+        except InputError as error:
+            problems.extend(error.problems)
+    if problems:
+        raise InputError(problems)
+    return scenes
+
+
+def _shipped() -> dict[str, Path]:
+    folder = scenarios_folder()
+    names = ((path.relative_to(folder).with_suffix("").as_posix(), path) for path in folder.rglob("*.toml"))
+    return dict(sorted(names, key=lambda item: _natural(item[0])))
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Sorts 1kNm, 10kNm, 50kNm, 100kNm as they are meant."""
+    return [(int(piece), "") if piece.isdigit() else (-1, piece) for piece in re.split(r"([0-9]+)", name)]
+
+
+def _title(path: Path) -> str:
+    try:
+        title = read_toml(path)[1].get("title")
+    except InputError as error:
+        return f"(broken file: {error})"
+    return title if isinstance(title, str) else "(broken file: no title)"
+
+
+def _files(argument: str) -> list[_File]:
+    shipped = _shipped()
+    if argument in shipped:
+        return [_file(shipped[argument])]
+    inside = [_file(path) for name, path in shipped.items() if name.startswith(argument.rstrip("/") + "/")]
+    if inside:
+        return inside
+    path = Path(argument)
+    try:
+        is_folder, is_there = bool(argument) and path.is_dir(), bool(argument) and path.exists()
+    except (OSError, ValueError):  # a name too long for the file system, a NUL in it
+        is_folder = is_there = False
+    if is_folder:
+        return _files_in(path)
+    if path.suffix == ".toml":
+        return [_file(path)]
+    raise InputError(f"{_quoted(argument)}: {_why_unknown(argument, is_there, shipped)}")
+
+
+def _why_unknown(argument: str, is_there: bool, shipped: Iterable[str]) -> str:
+    if is_there:
+        return "is no TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
+    if not _NAME.fullmatch(argument):
+        return f"is no scene's name and no TOML file; allowed: pieces {_NAME_RULE}, joined by /"
+    names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
+    near = difflib.get_close_matches(argument, sorted(names), n=3, cutoff=0.5)
+    return "no such scene; " + (f"near: {', '.join(near)}" if near else "allowed: what `rotor-mbs list` names")
+
+
+def _files_in(folder: Path) -> list[_File]:
+    try:
+        paths = sorted(folder.glob("*.toml"), key=lambda path: _natural(path.name))
+    except OSError as error:
+        reason = f"cannot be read: {error.strerror}; allowed: a readable folder"
+        raise InputError(f"{shown_path(folder)}: {reason}") from error
+    if not paths:
+        raise InputError(f"{shown_path(folder)}: no TOML file in this folder; allowed: a folder of scene files")
+    return [_file(path) for path in paths]
+
+
+def _file(path: Path) -> _File:
+    try:
+        real = path.resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a NUL in the name
+        raise InputError(f"{shown_path(path)}: leads to no file; allowed: a readable TOML file") from error
+    return _File(path, real, _scene_name(path, real))
+
+
+def _scene_name(path: Path, real: Path) -> str:
+    """`folder/stem` for a shipped file, the stem for any other."""
+    folder = scenarios_folder().resolve()
+    if real.is_relative_to(folder):
+        return real.relative_to(folder).with_suffix("").as_posix()
+    stem = path.stem
+    if not re.fullmatch(_PIECE, stem):
+        raise InputError(f"{shown_path(path)}: the file's name cannot name a scene; allowed: a name {_NAME_RULE}")
+    if stem in _TAKEN or any(name.startswith(stem + "/") for name in _shipped()):
+        raise InputError(f"{shown_path(path)}: {stem} names a group of results; allowed: another file name")
+    return stem
+
+
+def _name_clashes(files: Iterable[_File]) -> list[str]:
+    first: dict[str, Path] = {}
+    clashes = []
+    for path, _, name in files:
+        other = first.setdefault(name, path)
+        if other is not path:
+            clashes.append(
+                f"{shown_path(path)}: its scene would be named {name}, as that of {shown_path(other)}; "
+                "allowed: different names"
+            )
+    return clashes
+
+
+def _quoted(argument: str) -> str:
+    text = argument if len(argument) <= 80 else argument[:77] + "..."
+    return f"'{text}'" if text.isprintable() else ascii(text)

@@ -1,0 +1,70 @@
+"""A scene file, strictly: a Scene, or every fault of the file at once. Knows no model and no shipped folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.lines import find_lines, line_of
+from rotor_mbs.scenario.reading import read_toml, shown_path
+from rotor_mbs.scenario.scene import Blade, Scene
+
+_MAX_FAULTS = 100  # lines for one file; nobody reads more, and a file of 1 MiB can hold 300 000
+
+
+def load_scene(path: Path, name: str) -> Scene:
+    """The scene in the TOML file `path`, under `name`. Quoted expressions are evaluated here, once for every model.
+
+    Raises InputError with all faults of the file, a line each: `file:line: key: what is wrong; allowed: ...`;
+    entries are counted from 1.
+    """
+    from pydantic import ValidationError  # late, with the schema: 0.2 s
+
+    from rotor_mbs.scenario.faults import faults_of
+    from rotor_mbs.scenario.fields import Known
+    from rotor_mbs.scenario.schema import SceneTable
+
+    text, tables = read_toml(path)
+    try:
+        return SceneTable.model_validate(tables, context=Known()).to_scene(name, text)
+    except ValidationError as error:
+        lines = find_lines(text)
+        found = sorted((line_of(lines, fault.path), fault.text) for fault in faults_of(error, tables))
+    shown = [f"{shown_path(path)}:{line}: {words}" for line, words in found[:_MAX_FAULTS]]
+    if len(found) > _MAX_FAULTS:
+        shown.append(f"{shown_path(path)}: {len(found) - _MAX_FAULTS} more faults")
+    raise InputError(shown)
+
+
+def scene_hash(scene: Scene) -> str:
+    """SHA-256, in hexadecimal, over all that a run of the scene depends on: its numbers, bit for bit, and outputs.
+
+    Name, title, figures and the text of the file (comments, order, how a number was written, one [blade] or several
+    equal ones) do not enter; neither does the tip where no tip path is asked for.
+    """
+    content = {
+        "gravity": scene.gravity.hex(),
+        "duration": scene.duration.hex(),
+        "samples": scene.samples,
+        "outputs": sorted(scene.outputs),
+        "blades": [_blade_content(blade, with_tip=scene.wants("tip")) for blade in scene.blades],
+        "hub_inertia": scene.hub_inertia.hex(),
+        "initial_angles": _hex(scene.initial_angles),
+        "initial_rates": _hex(scene.initial_rates),
+        "rotor_torque": [_hex(row) for row in scene.rotor_torque],
+        "bearing_stiffness": _hex(scene.bearing_stiffness),
+        "bearing_damping": _hex(scene.bearing_damping),
+        "shaft_damping": scene.shaft_damping.hex(),
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _blade_content(blade: Blade, *, with_tip: bool) -> list[list[str]]:
+    numbers = [(blade.mass,), blade.centre_of_mass, blade.inertia]
+    return [_hex(part) for part in ([*numbers, blade.tip] if with_tip else numbers)]
+
+
+def _hex(numbers: tuple[float, ...]) -> list[str]:
+    return [number.hex() for number in numbers]

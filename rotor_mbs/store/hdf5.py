@@ -1,0 +1,144 @@
+"""The only file that knows h5py: atomic files that HDF5 1.10, netCDF-4 readers, MATLAB and Octave can open."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import StoreError
+from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Quantity
+
+# What the library keeps of scales and their users; it writes them itself when a scale is made or attached.
+_SCALE_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid")
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Any]:
+    """A new HDF5 file under a temporary name beside `path`, put in its place when all is written and on the disk.
+
+    Raises StoreError where that cannot be done; what stood at `path` before then still stands.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with h5py.File(temporary, "w", libver=("earliest", "v108"), track_order=True) as file:
+            file.attrs["Conventions"] = CONVENTIONS
+            file.attrs["format"] = FORMAT
+            file.attrs["format_version"] = FORMAT_VERSION
+            yield file
+        with temporary.open("rb") as written:
+            os.fsync(written.fileno())
+        temporary.replace(path)
+    except (OSError, RuntimeError) as exc:
+        with suppress(OSError):
+            temporary.unlink()
+        raise StoreError(f"{path}: cannot be written: {_reason(exc)}; nothing stored before is lost") from exc
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+@contextmanager
+def open_file(path: Path) -> Iterator[Any]:
+    """An existing results file, read only. Raises StoreError where it is missing, damaged or another program's."""
+    if not path.is_file():
+        raise StoreError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; a results file is needed")
+    try:
+        file = h5py.File(path, "r")
+    except OSError as exc:
+        raise StoreError(f"{path}: not a readable HDF5 file ({_reason(exc)})") from exc
+    with file:
+        written_by = file.attrs.get("format")
+        if written_by != FORMAT:
+            raise StoreError(f"{path}: not a {FORMAT} results file (attribute format is {written_by!r})")
+        version = file.attrs.get("format_version")
+        if version != FORMAT_VERSION:
+            raise StoreError(f"{path}: format_version {version}, this program reads {FORMAT_VERSION}")
+        yield file
+
+
+def _reason(exc: BaseException) -> str:
+    """The operating system's words where there are any, else the library's first line."""
+    if isinstance(exc, OSError) and exc.errno:
+        return os.strerror(exc.errno)
+    text = str(exc)
+    for number in (28, 13, 30):  # no space, permission, read-only: HDF5 puts these into its own sentence
+        if os.strerror(number) in text:
+            return os.strerror(number)
+    return text.splitlines()[0] if text else type(exc).__name__
+
+
+def new_group(parent: Any, name: str) -> Any:
+    """A group, and those above it, that list their members in the order of writing."""
+    for part in name.split("/"):
+        parent = parent[part] if part in parent else parent.create_group(part, track_order=True)
+    return parent
+
+
+def put(group: Any, name: str, values: NDArray[Any], quantity: Quantity, *, compress: bool = False) -> Any:
+    """A dataset with unit and long name; its dimensions' scales must be there already. A scale is its own dimension."""
+    options = {"compression": "gzip", "shuffle": True} if compress and values.ndim and values.size > 64 else {}
+    dataset = group.create_dataset(name, data=values, **options)
+    dataset.attrs["units"] = quantity.units
+    dataset.attrs["long_name"] = quantity.long_name
+    if quantity.dimensions == (name,):
+        dataset.make_scale(name)
+    else:
+        for axis, dimension in enumerate(quantity.dimensions):
+            dataset.dims[axis].attach_scale(group[dimension])
+    return dataset
+
+
+def put_attributes(target: Any, values: Mapping[str, object]) -> None:
+    """Numbers as float64 or int64, truth as int8 (netCDF-4 has no booleans), lists of names as strings."""
+    for name, value in values.items():
+        if isinstance(value, bool):
+            target.attrs[name] = np.int8(value)
+        elif isinstance(value, (list, tuple)):
+            target.attrs.create(name, list(value), dtype=h5py.string_dtype())
+        else:
+            target.attrs[name] = value
+
+
+def attributes_of(target: Any) -> dict[str, Any]:
+    """As plain Python values."""
+    return {name: _plain(value) for name, value in target.attrs.items() if name != "REFERENCE_LIST"}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def copy_group(source: Any, target: Any) -> None:
+    """All members and attributes of one group into another, in order. Scales are made and attached anew: a copy by
+    the library itself would leave references that point nowhere."""
+    datasets = {name: item for name, item in source.items() if not is_group(item)}
+    for name, item in datasets.items():
+        copied = target.create_dataset(name, data=item[()], compression=item.compression, shuffle=item.shuffle)
+        copied.attrs.update({key: value for key, value in item.attrs.items() if key not in _SCALE_ATTRIBUTES})
+        if item.is_scale:
+            copied.make_scale(name)
+    for name, item in datasets.items():
+        for axis, dimension in enumerate(item.dims):
+            if len(dimension):
+                target[name].dims[axis].attach_scale(target[dimension[0].name.rpartition("/")[2]])
+    target.attrs.update(source.attrs)
+    for name, item in source.items():
+        if is_group(item):
+            copy_group(item, new_group(target, name))
+
+
+def is_group(item: Any) -> bool:
+    return isinstance(item, h5py.Group)

@@ -1,0 +1,59 @@
+"""Many results files into one, atomically: the pieces of a batch, and what was stored before. Judges nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rotor_mbs.store import hdf5, layout
+from rotor_mbs.store.read import open_results
+
+
+def merge(path: Path, sources: Sequence[Path], versions: Mapping[str, str]) -> None:
+    """All runs of `sources` into `path`, atomically; `path` may itself be among the sources.
+
+    A later run takes the place of an earlier one of the same scene and method. Runs of a scene whose numbers have
+    changed since (another scene_hash than in the last source that has it) belong to another machine and are left
+    out. Groups that are not scenes (bench, errata) come from the last source that has them. Raises StoreError.
+    """
+    runs, others = _plan(sources)
+    with hdf5.new_file(path) as file:
+        hdf5.put_attributes(file, {**versions, "created": datetime.now(UTC).isoformat(timespec="seconds")})
+        for scene_name in sorted(runs):
+            for source, methods in _by_source(runs[scene_name]).items():
+                with open_results(source) as results:
+                    _copy_scene(file, results.root[scene_name], scene_name, methods)
+        for name, source in others.items():
+            with open_results(source) as results:
+                hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
+
+
+def _plan(sources: Iterable[Path]) -> tuple[dict[str, dict[str, Path]], dict[str, Path]]:
+    """Scene -> method -> the source to take it from; and for groups that are not scenes, name -> source."""
+    latest: dict[str, tuple[str, dict[str, Path]]] = {}
+    others: dict[str, Path] = {}
+    for source in sources:
+        with open_results(source) as results:
+            others |= {name: source for name in layout.RESERVED if name in results.root}
+            for scene in results.scenes.values():
+                number = scene.attributes["scene_hash"]
+                known, runs = latest.get(scene.name, (number, {}))
+                kept = runs if known == number else {}
+                latest[scene.name] = (number, {**kept, **dict.fromkeys(scene.runs, source)})
+    return {name: runs for name, (_, runs) in latest.items()}, others
+
+
+def _by_source(runs: Mapping[str, Path]) -> dict[Path, list[str]]:
+    grouped: dict[Path, list[str]] = {}
+    for method, source in sorted(runs.items()):
+        grouped.setdefault(source, []).append(method)
+    return grouped
+
+
+def _copy_scene(file: Any, scene: Any, name: str, methods: Iterable[str]) -> None:
+    target = hdf5.new_group(file, name)
+    target.attrs.update(scene.attrs)
+    for method in methods:
+        hdf5.copy_group(scene[method], hdf5.new_group(target, method))

@@ -1,0 +1,425 @@
+"""Wrong scene files: one readable line per fault, with file, line, key and what is allowed, and never a traceback."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.load import load_scene
+from rotor_mbs.scenario.reading import MAX_BYTES
+
+SCENE = """\
+title = "A good scene"
+blades = 2
+gravity = 9.8
+duration = 10
+samples = 11
+outputs = ["angles", "tip"]
+
+[blade]
+mass = 2
+centre_of_mass = [0.5, 0, 3]
+inertia = [1, 1, 1, 0, 0, 0]
+tip = [0.5, 0, 7]
+
+[initial]
+angles = [0, 0, 0]
+rates = [0, 0, 0]
+
+[bearing]
+stiffness = 1
+damping = 2
+
+[torque]
+rotor = 5
+
+[hub]
+inertia = 1
+
+[shaft]
+damping = 3
+"""
+BLADE = "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ninertia = [1, 1, 1, 0, 0, 0]\ntip = [0.5, 0, 7]\n"
+ON_THE_AXIS = "[blade]\nmass = 2\ncentre_of_mass = [0, 0, 3]\ntip = [0.5, 0, 7]\n"
+
+# What to write for what, and the line and key of the one fault, with a piece of its message.
+WRONG = {
+    "title missing": ('title = "A good scene"\n', "", 1, "title", "is missing"),
+    "title empty": ('"A good scene"', '"  "', 1, "title", "is empty"),
+    "title too long": ("A good scene", "x" * 201, 1, "title", "201 characters"),
+    "title of two lines": ("good scene", "good\\nscene", 1, "title", "control character"),
+    "title turned around": ("good scene", "good\\u202Escene", 1, "title", "control character"),
+    "title a number": ('"A good scene"', "3", 1, "title", "3 is no text"),
+    "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
+    "unknown table": ("[hub]", "[tower]\nheight = 80\n[hub]", 25, "tower", "is no key here"),
+    "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "is no key here"),
+    "figures a text": ("blades = 2", 'figures = "5"\nblades = 2', 2, "figures", '"5" is no list'),
+    "figure a number": ("blades = 2", 'figures = ["5", 7]\nblades = 2', 2, r"figures \(entry 2\)", "7 is no text"),
+    "blades zero": ("blades = 2", "blades = 0", 2, "blades", "0 is out of range"),
+    "blades too many": ("blades = 2", "blades = 10001", 2, "blades", "out of range"),
+    "blades astronomical": ("blades = 2", f"blades = 0x{'f' * 5000}", 2, "blades", "so large a number"),
+    "blades broken": ("blades = 2", "blades = 2.5", 2, "blades", "2.5 is no whole number"),
+    "blades true": ("blades = 2", "blades = true", 2, "blades", "true is no whole number"),
+    "blades quoted": ("blades = 2", 'blades = "2"', 2, "blades", '"2" is no whole number'),
+    "gravity negative": ("gravity = 9.8", "gravity = -9.8", 3, "gravity", "-9.8 is out of range"),
+    "gravity NaN": ("gravity = 9.8", "gravity = nan", 3, "gravity", "nan is out of range"),
+    "gravity missing": ("gravity = 9.8\n", "", 1, "gravity", "is missing"),
+    "duration zero": ("duration = 10", "duration = 0", 4, "duration", "0 is out of range"),
+    "duration infinite": ("duration = 10", "duration = inf", 4, "duration", "inf is out of range"),
+    "duration a date": ("duration = 10", "duration = 2020-01-01", 4, "duration", "a date or time is no number"),
+    "samples one": ("samples = 11", "samples = 1", 5, "samples", "1 is out of range"),
+    "samples broken": ("samples = 11", "samples = 11.0", 5, "samples", "11.0 is no whole number"),
+    "samples too many": ("samples = 11", "samples = 10000001", 5, "samples", "out of range"),
+    "outputs empty": ('["angles", "tip"]', "[]", 6, "outputs", "0 entries"),
+    "outputs unknown": ('["angles", "tip"]', '["angles", "tips"]', 6, r"outputs \(entry 2\)", '"tips" is none of them'),
+    "outputs repeated": ('["angles", "tip"]', '["tip", "tip"]', 6, "outputs", "more than once"),
+    "blade missing": (BLADE, "", 1, "blade", "is missing"),
+    "mass missing": ("mass = 2\n", "", 8, r"blade\.mass", "is missing"),
+    "mass zero": ("mass = 2", "mass = 0", 9, r"blade\.mass", "0 is out of range"),
+    "mass negative": ("mass = 2", 'mass = "-2*pi"', 9, r"blade\.mass", '"-2\\*pi" is out of range'),
+    "mass true": ("mass = 2", "mass = true", 9, r"blade\.mass", "true is no number"),
+    "mass beyond doubles": ("mass = 2", f"mass = 1{'0' * 400}", 9, r"blade\.mass", "so large a number is out of range"),
+    "centre too short": ("[0.5, 0, 3]", "[0.5, 0]", 10, r"blade\.centre_of_mass", "2 entries"),
+    "centre on lines": (
+        "[0.5, 0, 3]",
+        '[0.5, # x ]\n  0,\n  "z"]',
+        12,
+        r"blade\.centre_of_mass \(entry 3\)",
+        "\"z\": 'z' stands where a number should",
+    ),
+    "inertia too long": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 1, 0, 0, 0, 0]", 11, r"blade\.inertia", "7 entries"),
+    "inertia negative": ("[1, 1, 1, 0, 0, 0]", "[1, 1, -1, 0, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
+    "inertia of no triangle": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 2.1, 0, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
+    "inertia of products alone": ("[1, 1, 1, 0, 0, 0]", "[0, 0, 0, 1, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
+    "inertia with large products": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 1, 0, 2, 0]", 11, r"blade\.inertia", "no rigid body"),
+    "tip missing where wanted": ("tip = [0.5, 0, 7]\n", "", 8, r"blade\.tip", "is missing"),
+    "tip a number": ("tip = [0.5, 0, 7]", "tip = 7", 12, r"blade\.tip", "7 is no list"),
+    "initial missing": ("[initial]\nangles = [0, 0, 0]\nrates = [0, 0, 0]\n", "", 1, "initial", "is missing"),
+    "angles missing": ("angles = [0, 0, 0]\n", "", 14, r"initial\.angles", "is missing"),
+    "angles too few": ("angles = [0, 0, 0]", "angles = [0, 0]", 15, r"initial\.angles", "2 numbers for a rotor and 2"),
+    "angle code": (
+        "angles = [0, 0, 0]",
+        "angles = [0, \"__import__('os')\", 0]",
+        15,
+        r"initial\.angles \(entry 2\)",
+        "no meaning in an expression",
+    ),
+    "angle infinite": ("angles = [0,", "angles = [1e400,", 15, r"initial\.angles \(entry 1\)", "inf is out of range"),
+    "angle quoted infinite": (
+        "angles = [0,",
+        'angles = ["1e400",',
+        15,
+        r"initial\.angles \(entry 1\)",
+        "no finite value",
+    ),
+    "angle a bomb": ("angles = [0,", 'angles = ["9**9**9**9",', 15, r"initial\.angles \(entry 1\)", "no finite value"),
+    "angle a list": ("angles = [0,", "angles = [[[[0]]],", 15, r"initial\.angles \(entry 1\)", "a list is no number"),
+    "rates too many": (
+        "rates = [0, 0, 0]",
+        "rates = [0, 0, 0, 0]",
+        16,
+        r"initial\.rates",
+        "4 numbers for a rotor and 2",
+    ),
+    "rate beyond 1e300": ("rates = [0,", "rates = [1e301,", 16, r"initial\.rates \(entry 1\)", "out of range"),
+    "stiffness negative": ("stiffness = 1", "stiffness = -1", 19, r"bearing\.stiffness", "-1 is out of range"),
+    "stiffness for one of two": (
+        "stiffness = 1",
+        "stiffness = [1]",
+        19,
+        r"bearing\.stiffness",
+        "1 number in a list for 2",
+    ),
+    "damping negative for one": (
+        "damping = 2",
+        "damping = [1, -1]",
+        20,
+        r"bearing\.damping \(entry 2\)",
+        "-1 is out of range",
+    ),
+    "torque a text": ("rotor = 5", 'rotor = "much"', 23, r"torque\.rotor", "'much' stands where a number should"),
+    "torque missing": ("rotor = 5\n", "", 22, r"torque\.rotor", "is missing"),
+    "torque without rows": ("rotor = 5", "rotor = []", 23, r"torque\.rotor", "0 entries"),
+    "torque row too long": ("rotor = 5", "rotor = [[0, 1],\n [1, 2, 3]]", 24, r"torque\.rotor \(row 2\)", "3 entries"),
+    "torque entry": ("rotor = 5", "rotor = [[0, 1], [1, nan]]", 23, r"torque\.rotor \(row 2, entry 2\)", "nan"),
+    "torque from before": ("rotor = 5", "rotor = [[-1, 1], [1, 1]]", 23, r"torque\.rotor", "below 0"),
+    "torque back in time": (
+        "rotor = 5",
+        "rotor = [[1, 1], [0, 1]]",
+        23,
+        r"torque\.rotor",
+        "row 2 is before that of row 1",
+    ),
+    "torque two jumps at once": (
+        "rotor = 5",
+        "rotor = [[1, 1], [1, 2], [1, 3]]",
+        23,
+        r"torque\.rotor",
+        "rows 1, 2 and 3",
+    ),
+    "hub negative": ("[hub]\ninertia = 1", "[hub]\ninertia = -1", 26, r"hub\.inertia", "-1 is out of range"),
+    "two hubs": ("[hub]\n", "[[hub]]\ninertia = 1\n[[hub]]\n", 25, "hub", "a list is no table"),
+    "shaft damping missing": ("[shaft]\ndamping = 3", "[shaft]", 28, r"shaft\.damping", "is missing"),
+    "one of two blade tables": ("[blade]", "[[blade]]", 8, "blade", r"1 \[\[blade\]\] table for 2 blades"),
+    "second blade table": (
+        BLADE,
+        BLADE.replace("[blade]", "[[blade]]") + BLADE.replace("[blade]", "[[blade]]").replace("= 2", "= 0"),
+        14,
+        r"blade\.mass \(blade 2\)",
+        "0 is out of range",
+    ),
+}
+
+
+def _problems(folder: Path, content: str | bytes) -> list[str]:
+    path = folder / "bad.toml"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(InputError) as caught:
+        load_scene(path, "bad")
+    problems = [problem.removeprefix(str(path)) for problem in caught.value.problems]
+    assert all(problem.isprintable() for problem in problems)
+    assert all(":" in problem and "; allowed: " in problem for problem in problems)
+    assert all(len(problem) < 400 for problem in problems)
+    assert not any(problem.endswith("allowed: ") for problem in problems)
+    return problems
+
+
+def test_the_scene_that_is_made_wrong_is_right(tmp_path: Path) -> None:
+    path = tmp_path / "good.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    assert load_scene(path, "good").title == "A good scene"
+
+
+@pytest.mark.parametrize(("old", "new", "line", "key", "words"), WRONG.values(), ids=WRONG)
+def test_one_fault_one_line(tmp_path: Path, old: str, new: str, line: int, key: str, words: str) -> None:
+    assert SCENE.count(old) == 1
+    text = SCENE.replace(old, new)
+    (problem,) = _problems(tmp_path, text)
+    assert re.match(rf":{line}: {key}: .*{words}.*; allowed: .+", problem), problem
+
+
+@pytest.mark.parametrize(
+    ("table", "key"),
+    [
+        (BLADE, "blade"),
+        ("[initial]\nangles = [0, 0, 0]\nrates = [0, 0, 0]\n", "initial"),
+        ("[torque]\nrotor = 5\n", "torque"),
+        ("[hub]\ninertia = 1\n", "hub"),
+    ],
+)
+def test_a_number_where_a_table_should_be(tmp_path: Path, table: str, key: str) -> None:
+    (problem,) = _problems(tmp_path, f"{key} = 3\n" + SCENE.replace(table, ""))
+    assert problem.startswith(f":1: {key}: 3 is no table; allowed: ")
+
+
+def test_a_run_that_cannot_fit_in_memory(tmp_path: Path) -> None:
+    # 20 blades: time, 21 angles, 21 rates, 60 tip coordinates are 103 values; 103 * 8 B * 3e6 = 2.3 GiB.
+    text = SCENE.replace("blades = 2", "blades = 20").replace("[0, 0, 0]\n", str([0] * 21) + "\n")
+    (problem,) = _problems(tmp_path, text.replace("samples = 11", "samples = 3000000"))
+    assert problem.startswith(
+        ":5: samples: 3000000 samples of 103 values of 8 bytes are 2.302 GiB; allowed: at most 2 GiB"
+    )
+
+
+def test_a_pitch_without_inertia_takes_no_rate_and_no_bearing(tmp_path: Path) -> None:
+    text = SCENE.replace(BLADE, ON_THE_AXIS).replace("rates = [0, 0, 0]", "rates = [1, 0, 4]")
+    rates, stiffness, damping = _problems(tmp_path, text)
+    assert rates.startswith(
+        ":15: initial.rates: a pitch rate for blade 2, whose pitch has no inertia; allowed: 0 there"
+    )
+    assert stiffness.startswith(":18: bearing.stiffness: acts on blades 1, 2, whose pitch has no inertia")
+    assert damping.startswith(":19: bearing.damping: acts on blades 1, 2")
+
+
+def test_a_bearing_may_spare_the_blade_without_pitch_inertia(tmp_path: Path) -> None:
+    tables = (BLADE + ON_THE_AXIS).replace("[blade]", "[[blade]]")
+    text = SCENE.replace(BLADE, tables).replace("stiffness = 1", "stiffness = [1, 0]")
+    (problem,) = _problems(tmp_path, text)
+    assert problem.startswith(":24: bearing.damping: acts on blade 2, whose pitch has no inertia")
+
+
+def test_all_faults_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
+    text = SCENE
+    for name in ("title empty", "blades true", "gravity NaN", "samples one", "outputs unknown", "mass zero"):
+        text = text.replace(*WRONG[name][:2])
+    for name in ("centre too short", "inertia negative", "angle code", "stiffness negative", "torque entry"):
+        text = text.replace(*WRONG[name][:2])
+    keys = [
+        problem.split(": ")[0] + " " + problem.split(": ")[1].split(" ")[0] for problem in _problems(tmp_path, text)
+    ]
+    assert keys == [
+        ":1 title",
+        ":2 blades",
+        ":3 gravity",
+        ":5 samples",
+        ":6 outputs",
+        ":9 blade.mass",
+        ":10 blade.centre_of_mass",
+        ":11 blade.inertia",
+        ":15 initial.angles",
+        ":19 bearing.stiffness",
+        ":23 torque.rotor",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "start"),
+    [
+        (b"", ": is empty"),
+        (b" \n\t\n", ": is empty"),
+        (b"\x7fELF\x00\x01\xff\xfe", ":1: is not UTF-8"),
+        (b"title = 'x'\n# \xe9\n", ":2: is not UTF-8"),
+        (b"title = 'x'\n\n\x00", ":3: holds a NUL byte"),
+        (b"x" * (MAX_BYTES + 1), ": is larger than 1048576 bytes"),
+        (b"title = \n", ":1: not TOML: invalid value"),
+        (b"title = 'x'\ntitle = 'y'\n", ":2: not TOML: cannot overwrite a value"),
+        (b"\n\nblades = 1 2\n", ":3: not TOML: expected newline"),
+        (b"title = 'x'\nblades = [1,\n2", ":3: not TOML: unclosed array (end of file)"),
+        (b"a = " + b"[" * 100_000, ":1: nested too deep"),
+        (b"a = " + b"{a=" * 100_000, ":1: nested too deep"),
+        (b"a." * 500_000 + b"a = 1", ":1: key of over 32 parts"),
+        (b"\n[" + b"'a' . " * 100_000 + b"a]", ":2: key of over 32 parts"),
+        (b"a = " + b"9" * 5000, ":1: a number is too long"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_no_toml_text(tmp_path: Path, content: bytes, start: str) -> None:
+    (problem,) = _problems(tmp_path, content)
+    assert problem.startswith(start)
+
+
+def test_a_flood_of_faults_is_cut_and_counted(tmp_path: Path) -> None:
+    path = tmp_path / "flood.toml"
+    path.write_text("\n".join(f"key{i} = 1" for i in range(300)), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_scene(path, "flood")
+    # 300 unknown keys and the 7 that are needed: 100 lines, and one that counts the rest.
+    assert len(caught.value.problems) == 101
+    assert caught.value.problems[-1].endswith(": 207 more faults")
+
+
+@pytest.mark.parametrize(
+    ("argument", "words"),
+    [
+        ("", "is no scene's name and no TOML file"),
+        ("../paper/fig05", "is no scene's name and no TOML file"),
+        ("paper/../paper/fig05", "is no scene's name and no TOML file"),
+        ("/paper/fig05", "is no scene's name and no TOML file"),
+        ("paper//fig05", "is no scene's name and no TOML file"),
+        ("paper/fig05\n", "is no scene's name and no TOML file"),
+        ("paper/\0", "is no scene's name and no TOML file"),
+        ("päper", "is no scene's name and no TOML file"),
+        ("paper/fig5", "no such scene; near: paper/fig05"),
+        ("papers", "no such scene; near: paper"),
+        ("nothing-like-it", "no such scene; allowed: what `rotor-mbs list` names"),
+        ("x" * 5000, "no such scene"),
+        ("missing.toml", "missing.toml: cannot be read: No such file"),
+        ("x" * 5000 + ".toml", "cannot be read"),
+        ("\0.toml", "leads to no file"),
+        ("empty", "no TOML file in this folder"),
+        ("text.txt", "is no TOML file"),
+        ("folder.toml", "no TOML file in this folder"),
+        ("odd name.toml", "cannot name a scene"),
+        ("..toml", "cannot name a scene"),
+        ("bench.toml", "bench names a group of results"),
+        ("paper.toml", "paper names a group of results"),
+        ("circle.toml", "leads to no file"),
+        ("pipe.toml", "is no regular file"),
+    ],
+)
+def test_arguments_that_name_no_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, argument: str, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("empty").mkdir()
+    Path("folder.toml").mkdir()
+    for name in ("text.txt", "odd name.toml", "..toml", "bench.toml", "paper.toml"):
+        Path(name).write_text(SCENE, encoding="utf-8")
+    Path("circle.toml").symlink_to("circle.toml")
+    os.mkfifo("pipe.toml")
+    with pytest.raises(InputError) as caught:
+        find_scenes([argument])
+    (problem,) = caught.value.problems
+    assert words in problem
+    assert problem.isprintable()
+
+
+def test_a_folder_where_a_file_should_be(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is a folder; allowed: a TOML file"):
+        load_scene(tmp_path, "folder")
+
+
+def test_faults_of_all_arguments_and_files_at_once(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.toml").write_text(SCENE.replace("mass = 2", "mass = -2"), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        find_scenes(["paper/fig08", "nonsense", str(tmp_path), "paper/fig00"])
+    assert len(caught.value.problems) == 4
+
+
+_LINES = SCENE.splitlines(keepends=True)
+_SNIPPETS = st.sampled_from(
+    [
+        "[",
+        "]",
+        "{",
+        "}",
+        "=",
+        '"',
+        "'''",
+        "nan",
+        "-1",
+        "1e999",
+        "true",
+        "[[blade]]\n",
+        "blade.",
+        "\n",
+        "[]",
+        "{}",
+        "#",
+        "0",
+    ]
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
+@given(st.lists(st.tuples(st.integers(0, len(SCENE)), st.integers(0, 12), _SNIPPETS | st.text(max_size=5)), max_size=4))
+def test_no_damage_to_a_file_gives_a_traceback(tmp_path: Path, damages: list[tuple[int, int, str]]) -> None:
+    text = SCENE
+    for start, length, snippet in damages:
+        text = text[:start] + snippet + text[start + length :]
+    path = tmp_path / "damaged.toml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    problems: tuple[str, ...] = ()
+    try:
+        load_scene(path, "damaged")
+    except InputError as error:
+        problems = error.problems
+    assert all(problem.isprintable() for problem in problems)
+    assert all(re.match(rf"{re.escape(str(path))}(:\d+)?: ", problem) for problem in problems)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
+@given(st.binary(max_size=200))
+def test_no_bytes_give_a_traceback(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "bytes.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError):
+        load_scene(path, "bytes")
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100, deadline=None)
+@given(st.sampled_from(_LINES), st.integers(1, 400))
+def test_no_nesting_gives_a_traceback(tmp_path: Path, line: str, depth: int) -> None:
+    path = tmp_path / "nested.toml"
+    nested = line.split("=")[0] + "= " + "[" * depth + "]" * depth + "\n"
+    path.write_text(SCENE.replace(line, nested), encoding="utf-8")
+    with pytest.raises(InputError):
+        load_scene(path, "nested")

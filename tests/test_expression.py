@@ -1,0 +1,196 @@
+"""Quoted arithmetic: what it may hold, that it is Python's float arithmetic, and that nothing else gets through."""
+
+from __future__ import annotations
+
+import ast
+import math
+
+import pytest
+from hypothesis import assume, example, given
+from hypothesis import strategies as st
+
+from rotor_mbs.scenario.expression import ALLOWED, MAX_DEPTH, MAX_LENGTH, evaluate
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1", 1.0),
+        (" 2.50 ", 2.5),
+        (".5", 0.5),
+        ("5.", 5.0),
+        ("1e-3", 1e-3),
+        ("1E+3", 1e3),
+        ("pi/6", math.pi / 6),
+        ("11*pi/12", 11 * math.pi / 12),
+        ("-pi/3", -math.pi / 3),
+        ("hypot(0.08, 0.03)", math.hypot(0.08, 0.03)),
+        ("sqrt(2)", math.sqrt(2.0)),
+        ("1 - 2 - 3", -4.0),
+        ("8/4/2", 1.0),
+        ("2**3**2", 512.0),
+        ("-2**2", -4.0),
+        ("2**-1", 0.5),
+        ("--3", 3.0),
+        ("2*-3", -6.0),
+        ("(1 + 2)*3", 9.0),
+        ("1 + 2*3", 7.0),
+        ("1e200*1e-200", 1.0),
+    ],
+)
+def test_value(text: str, value: float) -> None:
+    # The same operations in the same order: equal to the last bit.
+    assert evaluate(text) == value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "   ",
+        "1e400",
+        "9**9**9**9",
+        "1e300*1e300",
+        "1/0",
+        "0**-1",
+        "(-8)**(1/3)",
+        "sqrt(-1)",
+        "nan",
+        "inf",
+        "-inf",
+        "e",
+        "Pi",
+        "٣",
+        "１",
+        "²",
+        "1_000",
+        "0x10",
+        "1j",
+        "1 2",
+        "1,2",
+        "1 +",
+        "+1",
+        "*1",
+        "1//2",
+        "7 % 2",
+        "(1",
+        "1)",
+        "()",
+        "sqrt",
+        "sqrt()",
+        "sqrt(1, 2)",
+        "hypot(1)",
+        "hypot(1, 2, 3)",
+        "pi(2)",
+        "2pi",
+        "abs(1)",
+        "__import__('os')",
+        "(1).__class__",
+        "[1]",
+        "1\n+1",
+        "1 # one",
+        "1;2",
+        "true",
+    ],
+)
+def test_refused_with_one_sentence_that_says_what_is_allowed(text: str) -> None:
+    with pytest.raises(ValueError, match=r"; allowed: ") as caught:
+        evaluate(text)
+    assert str(caught.value).endswith(ALLOWED)
+    assert str(caught.value).isprintable()
+
+
+def test_length_is_bounded() -> None:
+    assert evaluate("1".ljust(MAX_LENGTH)) == 1.0
+    with pytest.raises(ValueError, match="longer"):
+        evaluate("1".ljust(MAX_LENGTH + 1))
+
+
+@pytest.mark.parametrize(("opening", "closing"), [("(", ")"), ("-", ""), ("1**", ""), ("sqrt(", ")")])
+def test_depth_is_bounded(opening: str, closing: str) -> None:
+    levels = MAX_DEPTH - 1
+    assert math.isfinite(evaluate(opening * levels + "1" + closing * levels))
+    with pytest.raises(ValueError, match="deeper"):
+        evaluate(opening * MAX_DEPTH + "1" + closing * MAX_DEPTH)
+
+
+_CONSTANTS = st.floats(min_value=0, max_value=1e20, allow_subnormal=False).map(ast.Constant) | st.just(ast.Name("pi"))
+_OPERATORS = st.sampled_from([ast.Add(), ast.Sub(), ast.Mult(), ast.Div(), ast.Pow()])
+
+
+def _larger(parts: st.SearchStrategy[ast.expr]) -> st.SearchStrategy[ast.expr]:
+    return (
+        st.builds(ast.BinOp, parts, _OPERATORS, parts)
+        | st.builds(lambda part: ast.UnaryOp(ast.USub(), part), parts)
+        | st.builds(lambda part: ast.Call(ast.Name("sqrt"), [part], []), parts)
+        | st.builds(lambda x, y: ast.Call(ast.Name("hypot"), [x, y], []), parts, parts)
+    )
+
+
+def _python_value(tree: ast.expr) -> float:
+    """What Python's floats make of the tree; NaN where some step has no finite real value."""
+    match tree:
+        case ast.Constant(value=float(value)):
+            return value
+        case ast.Name():
+            return math.pi
+        case ast.UnaryOp(operand=operand):
+            return -_python_value(operand)
+        case ast.BinOp(left=left, op=op, right=right):
+            return _operate(op, _python_value(left), _python_value(right))
+        case ast.Call(func=ast.Name(id="sqrt"), args=[x]):
+            value = _python_value(x)
+            return math.sqrt(value) if value >= 0 else math.nan
+        case ast.Call(args=[x, y]):
+            return _finite(math.hypot(_python_value(x), _python_value(y)))
+        case _:
+            raise AssertionError(ast.dump(tree))
+
+
+def _operate(op: ast.operator, x: float, y: float) -> float:
+    if math.isnan(x) or math.isnan(y):
+        return math.nan
+    try:
+        match op:
+            case ast.Add():
+                return _finite(x + y)
+            case ast.Sub():
+                return _finite(x - y)
+            case ast.Mult():
+                return _finite(x * y)
+            case ast.Div():
+                return _finite(x / y)
+            case _:
+                power = x**y
+                return _finite(power) if isinstance(power, float) else math.nan
+    except ArithmeticError:
+        return math.nan
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else math.nan
+
+
+@given(st.recursive(_CONSTANTS, _larger, max_leaves=8))
+def test_agrees_with_python_to_the_last_bit(tree: ast.expr) -> None:
+    # `ast.unparse` writes only the brackets that Python's precedence needs, so precedence is tested as well.
+    text = ast.unparse(tree)
+    assume(len(text) <= MAX_LENGTH)
+    expected = _python_value(tree)
+    if math.isfinite(expected):
+        assert evaluate(text).hex() == expected.hex()
+    else:
+        with pytest.raises(ValueError, match="no finite value"):
+            evaluate(text)
+
+
+@given(st.text() | st.text(alphabet="0123456789.eE+-*/(), pisqrthypot_", max_size=40))
+@example("9" * MAX_LENGTH)
+@example("(" * MAX_LENGTH)
+def test_any_text_is_a_finite_number_or_a_value_error(text: str) -> None:
+    message = ""
+    try:
+        assert math.isfinite(evaluate(text))
+    except ValueError as error:
+        message = str(error)
+    assert message.isprintable()

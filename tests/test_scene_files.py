@@ -1,0 +1,331 @@
+"""The shipped scenes against the paper's captions, and what loading a good file does."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from math import hypot, pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario import catalogue
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
+from rotor_mbs.scenario.lines import find_lines, line_of
+from rotor_mbs.scenario.load import load_scene, scene_hash
+from rotor_mbs.scenario.physics import is_rigid_body_inertia, values_per_sample
+from rotor_mbs.scenario.resources import reference_folder, scenarios_folder
+from rotor_mbs.scenario.scene import OUTPUTS, Scene
+
+# The captions: figures, q(0) in rad, dq/dt(0) in rad/s, rotor torque in N m.
+REST = (0.0, 0.0, 0.0, 0.0)
+PITCHED = (pi / 6, pi / 4, pi / 6, pi / 2)
+PAPER = {
+    "paper/fig03": (("3", "4a"), (11 * pi / 12, 0.0), (0.0, 0.0), 0.0),
+    "paper/fig04b": (("4b",), (11 * pi / 12, 0.0), (0.0, 0.0), 0.0),
+    "paper/fig05": (("5", "7a"), (pi / 6, 0.0, 0.0, 0.0), REST, 0.0),
+    "paper/fig06": (("6", "7b"), (pi / 6, 0.0, 0.0, 0.0), (pi / 10, 0.0, 0.0, 0.0), 0.0),
+    "paper/fig06-tenth": (("6",), (pi / 6, 0.0, 0.0, 0.0), (1 / 10, 0.0, 0.0, 0.0), 0.0),
+    "paper/fig08": (("8", "10a"), (0.0, pi / 4, 0.0, 0.0), REST, 0.0),
+    "paper/fig09": (("9", "10b"), (0.0, pi / 4, pi / 6, pi / 2), REST, 0.0),
+    "paper/fig11": (("11", "13a"), PITCHED, (pi / 10, 0.0, 0.0, 0.0), 0.0),
+    "paper/fig12": (("12",), PITCHED, (pi / 10, pi / 5, pi / 4, pi / 3), 0.0),
+    "paper/fig13b": (("13b",), PITCHED, (pi / 10, pi / 8, pi / 4, pi / 3), 0.0),
+    "paper/fig14a": (("14a",), (pi / 5, pi / 6, 0.0, 0.0), (0.0, -pi / 3, pi / 3, -pi / 3), 0.0),
+    "paper/fig14b": (("14b",), (0.0, 0.0, 0.0, pi / 5), (-pi / 6, pi / 4, 0.0, 0.0), 0.0),
+    "paper/fig14c": (("14c",), (0.0, pi / 2, 0.0, 0.0), (pi / 6, 0.0, 0.0, -pi / 3), 0.0),
+    "paper/fig15-1kNm": (("15", "16a"), REST, REST, 1e3),
+    "paper/fig15-10kNm": (("15",), REST, REST, 10e3),
+    "paper/fig15-50kNm": (("15",), REST, REST, 50e3),
+    "paper/fig15-100kNm": (("15", "16b"), REST, REST, 100e3),
+}
+
+SCENE = """
+title = "A scene"
+blades = 2
+gravity = 9.8
+duration = 1
+samples = 11
+outputs = ["angles"]
+
+[blade]
+mass = 2
+centre_of_mass = [0.5, 0, 3]
+
+[initial]
+angles = [0, 0, 0]
+rates = [0, 0, 0]
+"""
+
+
+@pytest.fixture(scope="module")
+def paper() -> dict[str, Scene]:
+    return {scene.name: scene for scene in find_scenes(["paper"])}
+
+
+def _load(folder: Path, text: str) -> Scene:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_scene(path, "scene")
+
+
+def test_the_paper_folder_holds_the_scenes_of_the_captions_in_order(paper: dict[str, Scene]) -> None:
+    assert list(paper) == list(PAPER)
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_shipped_scene_has_the_numbers_of_its_caption(paper: dict[str, Scene], name: str) -> None:
+    scene = paper[name]
+    figures, angles, rates, torque = PAPER[name]
+    # pi/6 and the like are one correctly rounded operation here and in the file: equal to the last bit.
+    assert scene.figures == figures
+    assert scene.initial_angles == angles
+    assert scene.initial_rates == rates
+    assert scene.rotor_torque == (((0.0, torque),) if torque else ())
+    assert len(scene.blades) == len(angles) - 1
+    c = 0.0 if name == "paper/fig04b" else hypot(0.08, 0.03)
+    for blade in scene.blades:  # Table 1
+        assert blade.mass == 15000.0
+        assert blade.centre_of_mass == (c, 0.0, 15.42)
+        assert blade.tip == (c, 0.0, 33.38)
+        assert blade.is_point_mass
+    assert scene.gravity == 9.8
+    assert (scene.duration, scene.samples) == ((10.83, 1084) if name == "paper/fig05" else (10.0, 1001))
+    assert scene.outputs == OUTPUTS
+    assert not scene.has_damping
+    assert scene.hub_inertia == 0.0
+    assert scene.bearing_stiffness == ()
+
+
+def test_only_the_scene_with_its_mass_on_the_axis_has_no_pitch_inertia(paper: dict[str, Scene]) -> None:
+    bare = [name for name, scene in paper.items() if not all(blade.has_pitch_inertia for blade in scene.blades)]
+    assert bare == ["paper/fig04b"]
+
+
+@pytest.mark.parametrize("torque", ["10", "50"])
+def test_torques_that_the_paper_does_not_print_say_so(paper: dict[str, Scene], torque: str) -> None:
+    scene = paper[f"paper/fig15-{torque}kNm"]
+    assert "not printed" in scene.title
+    assert f"does not print {torque} kN m" in scene.text
+
+
+def test_all_hashes_of_the_paper_differ(paper: dict[str, Scene]) -> None:
+    assert len({scene_hash(scene) for scene in paper.values()}) == len(paper)
+
+
+def test_what_is_optional_is_left_out(tmp_path: Path) -> None:
+    scene = _load(tmp_path, SCENE + "[torque]\nrotor = 0\n[bearing]\nstiffness = 0\ndamping = [0, 0]\n")
+    assert (scene.rotor_torque, scene.bearing_stiffness, scene.bearing_damping) == ((), (), ())
+    assert scene.figures == ()
+    assert scene.blades[0].tip == scene.blades[0].centre_of_mass == (0.5, 0.0, 3.0)
+
+
+def test_everything_that_can_be_said(tmp_path: Path) -> None:
+    text = SCENE.replace('["angles"]', '["energy", "tip", "angles"]').replace(
+        "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\n",
+        '[[blade]]\nmass = 2\ncentre_of_mass = [0.5, 0, "6/2"]\ntip = [0, 0, 7]\ninertia = [2, 2, 1, 0, 0, 0]\n'
+        "[[blade]]\nmass = 3\ncentre_of_mass = [0, 0, 4]\ntip = [0, 0, 8]\n",
+    )
+    text += (
+        "[torque]\nrotor = [[0, 1], [2, 5], [2, 'sqrt(4)']]\n[hub]\ninertia = 7\n[shaft]\ndamping = 8\n"
+        "[bearing]\nstiffness = [9, 0]\n"
+    )
+    scene = _load(tmp_path, text)
+    assert scene.outputs == ("angles", "tip", "energy")
+    assert [blade.mass for blade in scene.blades] == [2.0, 3.0]
+    assert [blade.tip for blade in scene.blades] == [(0.0, 0.0, 7.0), (0.0, 0.0, 8.0)]
+    assert scene.blades[0].inertia == (2.0, 2.0, 1.0, 0.0, 0.0, 0.0)
+    assert scene.rotor_torque == ((0.0, 1.0), (2.0, 5.0), (2.0, 2.0))
+    assert (scene.hub_inertia, scene.shaft_damping) == (7.0, 8.0)
+    assert (scene.bearing_stiffness, scene.bearing_damping) == ((9.0, 0.0), ())
+    assert scene.text == text
+
+
+def test_a_huge_rate_is_for_the_run_to_judge(tmp_path: Path) -> None:
+    assert _load(tmp_path, SCENE.replace("rates = [0,", "rates = [1e200,")).initial_rates[0] == 1e200
+
+
+def test_ten_thousand_blades_fit(tmp_path: Path) -> None:
+    zeros = str([0] * 10_001)
+    scene = _load(tmp_path, SCENE.replace("blades = 2", "blades = 10000").replace("[0, 0, 0]", zeros))
+    assert len(scene.blades) == len(scene.phases) == 10_000
+
+
+def test_hash_ignores_how_the_scene_is_written(tmp_path: Path) -> None:
+    plain = scene_hash(_load(tmp_path, SCENE))
+    rewritten = (
+        SCENE.replace("A scene", "Another title")
+        .replace("gravity = 9.8", 'gravity = "98/10" # a comment')
+        .replace("blades = 2", 'blades = 2\nfigures = ["1"]')
+        .replace("3]\n", "3.0]\ntip = [1, 2, 3]\n")  # no tip path is asked for
+        .replace("[blade]", "[[blade]]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\n[[blade]]")
+    )
+    assert scene_hash(_load(tmp_path, rewritten)) == plain
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("gravity = 9.8", "gravity = 9.800000000000002"),
+        ("duration = 1", "duration = 2"),
+        ("samples = 11", "samples = 12"),
+        ('["angles"]', '["rates"]'),
+        ("mass = 2", "mass = 3"),
+        ("[0.5, 0, 3]", "[0.5, 0, 4]"),
+        ("3]\n\n", "3]\ninertia = [1, 1, 1, 0, 0, 0]\n\n"),
+        ("angles = [0, 0, 0]", "angles = [0, 1, 0]"),
+        ("rates = [0, 0, 0]", "rates = [0, 0, 1]"),
+        ("[blade]", "hub.inertia = 1\n[blade]"),
+        ("[blade]", "shaft.damping = 1\n[blade]"),
+        ("[blade]", "bearing.damping = 1\n[blade]"),
+        ("[blade]", "bearing.stiffness = 1\n[blade]"),
+        ("[blade]", "torque.rotor = 1\n[blade]"),
+    ],
+)
+def test_hash_follows_every_number(tmp_path: Path, old: str, new: str) -> None:
+    assert SCENE.count(old) == 1
+    assert scene_hash(_load(tmp_path, SCENE.replace(old, new))) != scene_hash(_load(tmp_path, SCENE))
+
+
+@given(
+    arrays(float, (5, 3), elements=st.floats(-10, 10)),
+    arrays(float, 5, elements=st.floats(0, 10)),
+)
+def test_every_cloud_of_masses_is_a_rigid_body(r: np.ndarray, m: np.ndarray) -> None:
+    J = sum(mass * (point @ point * np.eye(3) - np.outer(point, point)) for mass, point in zip(m, r, strict=True))
+    assert is_rigid_body_inertia([J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
+
+
+@given(st.integers(0, 2), arrays(float, (3, 3), elements=st.floats(-1, 1)), st.floats(1e-6, 10.0))
+def test_no_turn_hides_a_broken_triangle_inequality(axis: int, random: np.ndarray, excess: float) -> None:
+    moments = np.array([1.0, 1.0, 1.0])
+    moments[axis] = 2.0 + excess
+    R, _ = np.linalg.qr(random)
+    J = R @ np.diag(moments) @ R.T
+    assert not is_rigid_body_inertia([J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
+
+
+def test_values_per_sample_by_hand() -> None:
+    # Three blades: time, 4 angles, 4 rates; 3 tips of 3; 4 energies.
+    assert values_per_sample(3, ("angles",)) == 9
+    assert values_per_sample(3, OUTPUTS) == 9 + 9 + 4
+
+
+# Every value is the number of its line.
+NUMBERED = '''first = 1
+"quoted key" = 2 # = 99
+a.b.c = 3
+d = [4, # ]
+  5, [5,
+  6], ["#", "]", '"', 6]]
+e = """
+]= 99
+"""
+f = {x = 10, y = [10, 10]}
+g = \'\'\'[[
+99 = "\'\'\'
+h = 13
+i = 1979-05-27 07:32:00
+j = 15
+
+[t] # [99]
+x = 18
+u.v = 19
+[t.w]
+x = 21
+[[many]]
+x = 23
+[many.sub]
+x = 25
+[[many]]
+x = 27
+[[many.deep]]
+x = 29
+[[many.deep]]
+x = 31
+[ "spaced" . name ]
+x = -33
+'''
+
+
+def _leaves(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[tuple[str | int, ...], int]]:
+    if isinstance(value, dict):
+        return [leaf for key, part in value.items() for leaf in _leaves(part, (*path, key))]
+    if isinstance(value, list):
+        return [leaf for i, part in enumerate(value) for leaf in _leaves(part, (*path, i))]
+    return [(path, abs(value))] if isinstance(value, int) else []
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_the_line_of_every_key(newline: str) -> None:
+    leaves = _leaves(tomllib.loads(NUMBERED))
+    assert len(leaves) == 22
+    lines = find_lines(NUMBERED.replace("\n", newline))
+    assert [(path, lines.get(path)) for path, _ in leaves] == leaves
+
+
+def test_a_key_that_is_not_there_has_the_line_of_what_encloses_it() -> None:
+    lines = find_lines(NUMBERED)
+    assert line_of(lines, ("many", 1, "missing")) == 26
+    assert line_of(lines, ("t", "x", 3)) == 18
+    assert line_of(lines, ("missing",)) == 1
+
+
+@given(st.text(alphabet="ab=.,[]{}\"'#\n 1\\", max_size=60))
+def test_no_text_stops_the_line_scanner(text: str) -> None:
+    assert all(1 <= line <= text.count("\n") + 1 for line in find_lines(text).values())
+
+
+def test_arguments_keep_their_order_and_name_a_scene_once(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(SCENE, encoding="utf-8")
+    fig05 = scenarios_folder() / "paper" / "fig05.toml"
+    scenes = find_scenes(["paper/fig08", str(fig05), str(own), "paper/fig05", str(tmp_path), "paper"])
+    names = [scene.name for scene in scenes]
+    assert names[:3] == ["paper/fig08", "paper/fig05", "own"]
+    assert names[3:] == [name for name in PAPER if name not in names[:3]]
+
+
+def test_list_needs_neither_pydantic_nor_numpy() -> None:
+    # Each costs more than half of the 0.3 s that `rotor-mbs list` may take.
+    code = (
+        "import sys; from rotor_mbs.scenario.catalogue import list_scenes; assert list_scenes(); "
+        "assert not {'pydantic', 'numpy'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_a_broken_shipped_file_does_not_stop_the_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "group").mkdir()
+    (tmp_path / "group" / "bad.toml").write_text("title = ", encoding="utf-8")
+    (tmp_path / "group" / "good.toml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "group" / "untitled.toml").write_text("blades = 1", encoding="utf-8")
+    monkeypatch.setattr(catalogue, "scenarios_folder", lambda: tmp_path)
+    (bad, bad_title), good, (_, untitled) = list_scenes()
+    assert good == ("group/good", "A scene")
+    assert bad == "group/bad"
+    assert re.match(r"\(broken file: .*bad\.toml:1: not TOML", bad_title)
+    assert untitled == "(broken file: no title)"
+
+
+def test_resources_are_the_folders_of_the_checkout() -> None:
+    assert (scenarios_folder() / "paper" / "fig05.toml").is_file()
+    assert reference_folder().name == "reference"
+
+
+def test_two_files_with_one_name_are_refused(tmp_path: Path) -> None:
+    paths = [tmp_path / folder / "same.toml" for folder in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text(SCENE, encoding="utf-8")
+    with pytest.raises(InputError, match="its scene would be named same, as that of") as caught:
+        find_scenes([str(path) for path in paths])
+    assert len(caught.value.problems) == 1
