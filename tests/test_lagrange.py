@@ -221,7 +221,7 @@ def test_error_growth_is_that_of_neighbouring_runs() -> None:
             state = np.hstack([other.angles - base.angles, other.rates - base.rates])
             largest = np.maximum(largest, np.linalg.norm(state, axis=1) / 1e-7)
     assert (largest <= growth * 1.001).all()
-    assert (growth <= largest * math.sqrt(8) * 1.001).all()  # eight columns: the matrix norm is at most √8 of the largest
+    assert (growth <= largest * math.sqrt(8) * 1.001).all()  # eight columns: at most √8 of the largest
 
 
 def test_the_stand_in_reference_says_what_it_is_worth() -> None:
@@ -250,3 +250,15 @@ def test_radau_converges() -> None:
     ]
     assert errors[0] > 10 * errors[1] > 100 * errors[2]
     assert errors[2] <= 1e-7
+
+
+def test_ode45_on_the_right_equations_converges_in_its_tolerance() -> None:
+    """MATLAB's step control with the right closed form: a thousandth of the tolerance, a hundredth of the error."""
+    scene = paper("fig12", duration=2.0, samples=201)
+    exact = run(scene).angles
+    loose, tight = (
+        np.abs(run(scene, "lagrange/ode45", relative_tolerance=tol, absolute_tolerance=tol / 1e3).angles - exact).max()
+        for tol in (1e-6, 1e-9)
+    )
+    assert tight <= loose / 100
+    assert tight <= 1e-5

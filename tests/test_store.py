@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -128,4 +127,4 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_litter(tmp_path: Path) ->
     with pytest.raises(TypeError):
         stored(tmp_path / "a.h5", unstorable=object())
     assert (tmp_path / "a.h5").read_bytes() == before
-    assert os.listdir(tmp_path) == ["a.h5"]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]

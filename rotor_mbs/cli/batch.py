@@ -21,6 +21,7 @@ from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
+from rotor_mbs.trajectory.outcome import is_held
 
 
 @dataclass(frozen=True)
@@ -41,14 +42,20 @@ class Batch:
 
 @dataclass(frozen=True)
 class Report:
-    """How a batch went: (label, summary) of every run made, and how many were there already."""
+    """How a batch went: every run made, and how many were there already."""
 
-    made: list[tuple[str, Summary]]
+    made: list[tuple[Task, Summary]]
     kept: int
 
     @property
-    def failures(self) -> list[tuple[str, Summary]]:
-        return [(label, summary) for label, summary in self.made if summary.status != "ok"]
+    def failures(self) -> list[tuple[Task, Summary]]:
+        """Runs that should have succeeded and did not. How far the printed model gets is data, not a failure."""
+        return [(task, summary) for task, summary in self.made if summary.status != "ok" and is_held(task.method)]
+
+    @property
+    def broken_off(self) -> list[tuple[Task, Summary]]:
+        """Runs of the printed model that did not reach the end."""
+        return [(task, summary) for task, summary in self.made if summary.status != "ok" and not is_held(task.method)]
 
 
 def execute(batch: Batch) -> Report:
@@ -67,13 +74,13 @@ def execute(batch: Batch) -> Report:
         for method in batch.methods[scene.name]
     ]
     _refuse_losses(batch, [*references, *runs])
-    made: list[tuple[str, Summary]] = []
+    made: list[tuple[Task, Summary]] = []
     missing = [[task for task in wave if not _is_there(task, there)] for wave in (references, runs)]
     progress = Progress(sum(map(len, missing)))
     for wave in missing:
         for finished in run_tasks(perform, wave, batch.workers, batch.timeout_s):
             summary = _settle(finished)
-            made.append((finished.task.label, summary))
+            made.append((finished.task, summary))
             progress.tell(_line(finished.task, summary), keep=summary.status != "ok")
     progress.close()
     if made or not batch.output.exists() or any(parts.iterdir()):

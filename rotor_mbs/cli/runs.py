@@ -6,21 +6,26 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
 from rotor_mbs.cli.batch import Batch, Report, default_methods, execute
 from rotor_mbs.errors import InputError
-from rotor_mbs.models.registry import DEFAULT_METHODS, ERRATA_METHODS, check_names
+from rotor_mbs.models.registry import ERRATA_METHODS, available_defaults, check_names
+from rotor_mbs.runner.environment import machine, numerics_fingerprint, versions
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.errata import errata_fingerprint, write_errata
+from rotor_mbs.store.merge import merge
+from rotor_mbs.store.read import open_results
 
 
 def run(arguments: argparse.Namespace) -> int:
     """A batch into one file. Methods named with -m must be able to represent every scene; the default ones may not."""
     scenes = find_scenes(arguments.scenes)
     asked = check_names(arguments.method or ())
-    methods, refused = _methods(scenes, asked or DEFAULT_METHODS)
+    methods, refused = _methods(scenes, asked or available_defaults())
     if asked and refused:
         raise InputError(refused)
     for line in refused:
@@ -35,13 +40,28 @@ def reproduce(arguments: argparse.Namespace) -> int:
 
     start = time.monotonic()
     scenes = find_scenes(["paper"])
-    methods, _ = _methods(scenes, (*DEFAULT_METHODS, *ERRATA_METHODS))
+    methods, _ = _methods(scenes, (*available_defaults(), *ERRATA_METHODS))
     results = arguments.output / "results.h5"
     report = execute(Batch(scenes, methods, results, arguments.jobs, arguments.timeout))
+    _add_errata(results)
     status = _tell(report, results)
     index = render(results, arguments.output / "report", jobs=arguments.jobs)
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
+
+
+def _add_errata(path: Path) -> None:
+    """The check of every printed entry, into the results, unless the same code's is there already."""
+    from rotor_mbs.models.printed.errata import check_errata
+
+    with open_results(path) as results:
+        if errata_fingerprint(results) == numerics_fingerprint():
+            return
+    piece = path.with_name(f"{path.name}.errata")
+    checks = [asdict(check) | {"explained_by": ", ".join(check.explained_by)} for check in check_errata()]
+    write_errata(piece, checks, numerics_fingerprint())
+    merge(path, [path, piece], {**versions(), **machine()})
+    piece.unlink()
 
 
 def freeze(arguments: argparse.Namespace) -> int:
@@ -68,6 +88,9 @@ def _methods(scenes: Sequence[Scene], names: Sequence[str]) -> tuple[dict[str, S
 
 def _tell(report: Report, output: Path) -> int:
     """The batch in a few lines; 1 where a run that should succeed did not."""
-    ended = len(report.made) - len(report.failures)
-    print(f"{output}: {len(report.made)} runs made ({ended} ok), {report.kept} there already")
-    return 1 if report.failures else 0
+    failed, broken_off = len(report.failures), len(report.broken_off)
+    ok = len(report.made) - failed - broken_off
+    parts = [f"{ok} ok", f"{failed} failed" if failed else "", f"{broken_off} printed broke off" if broken_off else ""]
+    made = f"{len(report.made)} runs made ({', '.join(filter(None, parts))})" if report.made else "nothing to do"
+    print(f"{output}: {made}, {report.kept} there already")
+    return 1 if failed else 0

@@ -104,12 +104,12 @@ def _models(scene: Scene) -> list[_Model]:
     models: dict[str, _Model] = {}
     for name in METHOD_NAMES:
         model = name.split("/")[0]
-        if model in models:
-            models[model].methods.append(name)
+        known = models.setdefault(model, _Model(model, []))
+        known.methods.append(name)
+        if known.items:
             continue
-        models[model] = _Model(model, [name])
         try:
-            models[model].items = find_method(name).items(scene)
+            known.items, known.refused = find_method(name).items(scene), ""
         except MethodRefusal as exc:
-            models[model].refused = str(exc)
+            known.refused = str(exc)
     return list(models.values())

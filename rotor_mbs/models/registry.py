@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 from collections.abc import Sequence
 
 from rotor_mbs.errors import InputError
@@ -43,6 +44,15 @@ DEFAULT_METHODS = ("printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exud
 
 # What each erratum alone does to a scene; the reproduction runs these too.
 ERRATA_METHODS = ("printed_e1/ode45", "printed_e2/ode45", "printed_e3/ode45")
+
+# Where heyoka is not to be had.
+_STAND_INS = {"lagrange/taylor": "lagrange/dop853"}
+
+
+def available_defaults() -> tuple[str, ...]:
+    """DEFAULT_METHODS, with a stand-in where an engine is not installed."""
+    missing = importlib.util.find_spec("heyoka") is None
+    return tuple(_STAND_INS.get(name, name) if missing else name for name in DEFAULT_METHODS)
 
 
 def find_method(name: str) -> Method:

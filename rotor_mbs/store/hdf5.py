@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -15,35 +16,43 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import StoreError
 from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Quantity
 
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
+
 # What the library keeps of scales and their users; it writes them itself when a scale is made or attached.
 _SCALE_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid")
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Any]:
-    """A new HDF5 file under a temporary name beside `path`, put in its place when all is written and on the disk.
+    """A new HDF5 file, put in the place of `path` when all of it is written and on the disk.
 
-    Raises StoreError where that cannot be done; what stood at `path` before then still stands.
+    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
+    where the file cannot be written; what stood at `path` before then still stands.
     """
+    image = io.BytesIO()
+    with h5py.File(image, "w", libver=("earliest", "v108"), track_order=True) as file:
+        file.attrs["Conventions"] = CONVENTIONS
+        file.attrs["format"] = FORMAT
+        file.attrs["format_version"] = FORMAT_VERSION
+        yield file
+    replace_file(path, image.getbuffer())
+
+
+def replace_file(path: Path, content: Buffer) -> None:
+    """`content` under a temporary name beside `path`, forced to the disk, then renamed. Raises StoreError."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with h5py.File(temporary, "w", libver=("earliest", "v108"), track_order=True) as file:
-            file.attrs["Conventions"] = CONVENTIONS
-            file.attrs["format"] = FORMAT
-            file.attrs["format_version"] = FORMAT_VERSION
-            yield file
-        with temporary.open("rb") as written:
-            os.fsync(written.fileno())
+        with temporary.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
         temporary.replace(path)
-    except (OSError, RuntimeError) as exc:
+    except OSError as exc:
         with suppress(OSError):
             temporary.unlink()
-        raise StoreError(f"{path}: cannot be written: {_reason(exc)}; nothing stored before is lost") from exc
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
+        raise StoreError(f"{path}: cannot be written: {exc.strerror}; nothing stored before is lost") from exc
 
 
 @contextmanager
@@ -54,7 +63,7 @@ def open_file(path: Path) -> Iterator[Any]:
     try:
         file = h5py.File(path, "r")
     except OSError as exc:
-        raise StoreError(f"{path}: not a readable HDF5 file ({_reason(exc)})") from exc
+        raise StoreError(f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]})") from exc
     with file:
         written_by = file.attrs.get("format")
         if written_by != FORMAT:
@@ -63,17 +72,6 @@ def open_file(path: Path) -> Iterator[Any]:
         if version != FORMAT_VERSION:
             raise StoreError(f"{path}: format_version {version}, this program reads {FORMAT_VERSION}")
         yield file
-
-
-def _reason(exc: BaseException) -> str:
-    """The operating system's words where there are any, else the library's first line."""
-    if isinstance(exc, OSError) and exc.errno:
-        return os.strerror(exc.errno)
-    text = str(exc)
-    for number in (28, 13, 30):  # no space, permission, read-only: HDF5 puts these into its own sentence
-        if os.strerror(number) in text:
-            return os.strerror(number)
-    return text.splitlines()[0] if text else type(exc).__name__
 
 
 def new_group(parent: Any, name: str) -> Any:

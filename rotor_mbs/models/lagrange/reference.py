@@ -9,6 +9,7 @@ import numpy as np
 
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of, heyoka, is_available
+from rotor_mbs.models.lagrange.rate_units import rate_units
 from rotor_mbs.models.lagrange.stand_in import StandInReference
 from rotor_mbs.models.lagrange.system import Propagation, System, build_system, compiled, initial_state, set_parameters
 from rotor_mbs.scenario.scene import Scene
@@ -75,7 +76,7 @@ def _quad_propagation(scene: Scene, system: System, tolerance: float) -> Propaga
 def error_growth(scene: Scene) -> Array:
     """(samples,) How many times a small error of the initial state may have grown by each sample, at most.
 
-    The largest singular value of the state transition matrix (angles in rad, rates in rad/s), from the variational
+    The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the variational
     equations of the closed form; infinite once it is past what double precision can hold.
     """
     engine = heyoka()
@@ -95,6 +96,7 @@ def error_growth(scene: Scene) -> Array:
     propagation = Propagation(integrator, system, whole, times)
     propagation.run()
     growth = np.full(scene.samples, np.inf)
-    matrices = propagation.states[:, count:].reshape(-1, count, count)
+    units = np.concatenate([np.ones(count // 2), rate_units(scene)])
+    matrices = propagation.states[:, count:].reshape(-1, count, count) * units / units[:, None]
     growth[: len(matrices)] = np.linalg.norm(matrices, ord=2, axis=(1, 2))
     return growth

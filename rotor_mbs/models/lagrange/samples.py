@@ -18,7 +18,7 @@ def trajectory(scene: Scene, time: Array, states: Array, moving: tuple[int, ...]
     """
     count = len(moving)
     columns = list(moving)
-    angles = np.tile(np.array(scene.initial_angles), (len(time), 1))
+    angles = np.tile(np.array(scene.initial_angles, dtype=float), (len(time), 1))
     rates = np.zeros_like(angles)
     angles[:, columns] = states[:, :count]
     rates[:, columns] = states[:, count : 2 * count]

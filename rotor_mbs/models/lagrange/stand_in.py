@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.models.lagrange.scipy_run import ScipySolver
+from rotor_mbs.models.lagrange.integrators import scipy_integrator
+from rotor_mbs.models.lagrange.plain import PlainSolver
+from rotor_mbs.models.lagrange.rate_units import rate_units
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration, Trajectory
 
@@ -23,7 +25,9 @@ class StandInReference:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._runs = [ScipySolver(scene, "DOP853", *tolerances) for tolerances in (_TIGHTEST, _LOOSER)]
+        self._runs = [
+            PlainSolver(scene, scipy_integrator("DOP853", *tolerances)) for tolerances in (_TIGHTEST, _LOOSER)
+        ]
 
     def integrate(self) -> Integration:
         best, _ = (run.integrate() for run in self._runs)
@@ -41,16 +45,21 @@ class StandInReference:
     def _growth(self, result: Trajectory) -> Array:
         """(n,) by the same measure as the variational equations: largest singular value of the difference quotients."""
         state = np.hstack([result.angles, result.rates])
+        moving = rate_units(self._scene)
+        all_rates = np.ones(result.rates.shape[1])
+        all_rates[_moving(self._scene)] = moving
+        by_row = np.concatenate([np.ones(len(all_rates)), all_rates])
+        by_column = np.stack([np.ones(len(moving)), moving], axis=1).ravel()  # the neighbours' order
         columns = []
         for neighbour in _neighbours(self._scene):
-            solver = ScipySolver(neighbour, "DOP853", *_TIGHTEST)
+            solver = PlainSolver(neighbour, scipy_integrator("DOP853", *_TIGHTEST))
             solver.integrate()
             near = solver.observe()
             column = np.full_like(state, np.inf)
             rows = min(len(near.time), len(state))
             column[:rows] = (np.hstack([near.angles, near.rates])[:rows] - state[:rows]) / _PERTURBATION
             columns.append(column)
-        matrices = np.stack(columns, axis=-1)
+        matrices = np.stack(columns, axis=-1) * by_column / by_row[:, None]
         growth = np.full(len(state), np.inf)
         finite = np.isfinite(matrices).all(axis=(1, 2))
         growth[finite] = np.linalg.norm(matrices[finite], ord=2, axis=(1, 2))
@@ -60,11 +69,14 @@ class StandInReference:
 def _neighbours(scene: Scene) -> list[Scene]:
     """The scene started a little off, in one angle or rate each; pitches without inertia have no neighbour."""
     found = []
-    moving = [0] + [1 + i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
-    for i in moving:
+    for i in _moving(scene):
         angles, rates = list(scene.initial_angles), list(scene.initial_rates)
         angles[i] += _PERTURBATION
         rates[i] += _PERTURBATION
         found.append(replace(scene, initial_angles=tuple(angles)))
         found.append(replace(scene, initial_rates=tuple(rates)))
     return found
+
+
+def _moving(scene: Scene) -> list[int]:
+    return [0] + [1 + i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]

@@ -49,6 +49,8 @@ class TaylorSolver:
 
 
 def items(scene: Scene) -> list[Item]:
+    """Raises MethodRefusal where heyoka is not installed, before anything is built."""
+    heyoka()
     return samples.items(scene)
 
 

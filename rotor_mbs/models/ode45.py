@@ -1,0 +1,217 @@
+"""MATLAB's ode45: Dormand and Prince's pair with that function's own step control. Knows nothing of rotors.
+
+On a chaotic problem the step control decides the digits, so it is followed to the letter; sources:
+
+[DP]  J. R. Dormand, P. J. Prince: A family of embedded Runge-Kutta formulae. J. Comput. Appl. Math. 6 (1980), 19-26.
+[SR]  L. F. Shampine, M. W. Reichelt: The MATLAB ODE Suite. SIAM J. Sci. Comput. 18 (1997), 1-22.
+[JSS] J. C. Jimenez, A. Sotolongo, J. M. Sanchez-Bornot: Locally Linearized Runge Kutta method of Dormand and
+      Prince. Appl. Math. Comput. 247 (2014), 589-606; its Table 2 lists the interpolant of ode45.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+RightHandSide = Callable[[float, Sequence[float]], list[float]]
+
+F = Fraction
+# [DP] Table 2, RK5(4)7M. The last row of A is b: local extrapolation, first same as last.
+NODES = (F(0), F(1, 5), F(3, 10), F(4, 5), F(8, 9), F(1), F(1))
+STAGES = (
+    (F(1, 5),),
+    (F(3, 40), F(9, 40)),
+    (F(44, 45), F(-56, 15), F(32, 9)),
+    (F(19372, 6561), F(-25360, 2187), F(64448, 6561), F(-212, 729)),
+    (F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)),
+    (F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)),
+)
+# Fifth-order weights less the fourth-order ones.
+ERROR = (F(71, 57600), F(0), F(-71, 16695), F(71, 1920), F(-17253, 339200), F(22, 525), F(-1, 40))
+# [JSS] Table 2: weight of stage i in y(t + s h) is h Σ_j INTERPOLANT[i][j] s^(j+1).
+INTERPOLANT = (
+    (F(1), F(-183, 64), F(37, 12), F(-145, 128)),
+    (F(0), F(0), F(0), F(0)),
+    (F(0), F(1500, 371), F(-1000, 159), F(1000, 371)),
+    (F(0), F(-125, 32), F(125, 12), F(-375, 64)),
+    (F(0), F(9477, 3392), F(-729, 106), F(25515, 6784)),
+    (F(0), F(-11, 7), F(11, 3), F(-55, 28)),
+    (F(0), F(3, 2), F(-4), F(5, 2)),
+)
+
+_POWER = 1.0 / 5.0  # one over the order of the formula that is carried on
+_C2, _C3, _C4, _C5 = (float(node) for node in NODES[1:5])
+(
+    (_A21,),
+    (_A31, _A32),
+    (_A41, _A42, _A43),
+    (_A51, _A52, _A53, _A54),
+    (_A61, _A62, _A63, _A64, _A65),
+    (_B1, _, _B3, _B4, _B5, _B6),
+) = ([float(weight) for weight in row] for row in STAGES)
+_E1, _, _E3, _E4, _E5, _E6, _E7 = (float(weight) for weight in ERROR)
+_INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INTERPOLANT])
+
+
+@dataclass(frozen=True, slots=True)
+class Ode45Result:
+    """Every accepted step with its stages, so that the solution can be read off at any time it reached.
+
+    time (k+1,), state (k+1, n), stages (k, 7, n)
+    """
+
+    time: Array
+    state: Array
+    stages: Array
+    success: bool
+    message: str
+    failed_steps: int
+    evaluations: int
+
+    @property
+    def steps(self) -> int:
+        return len(self.time) - 1
+
+    def at(self, times: Array) -> Array:
+        """(len(times), n): the pair's quartic interpolant at any order of times within [0, time[-1]].
+
+        Raises ValueError for a time beyond what was reached.
+        """
+        if np.any(times < self.time[0]) or np.any(times > self.time[-1]):
+            raise ValueError(f"the solution covers [{self.time[0]:g}, {self.time[-1]:g}] only")
+        if self.steps == 0:
+            return np.repeat(self.state, len(times), axis=0)
+        step = np.clip(np.searchsorted(self.time, times, side="right") - 1, 0, self.steps - 1)
+        h = self.time[step + 1] - self.time[step]
+        s = (times - self.time[step]) / h
+        weights = s[:, None] ** np.arange(1, 5) @ _INTERPOLANT.T  # (len(times), 7)
+        value: Array = self.state[step] + h[:, None] * np.einsum("ts,tsn->tn", weights, self.stages[step])
+        at_end = s == 1.0  # the last step's end: the state itself, free of the interpolant's rounding
+        value[at_end] = self.state[step[at_end] + 1]
+        return value
+
+    def refined(self, points: int = 4) -> tuple[Array, Array]:
+        """(time, state) as ode45 returns them by default: `points` per step, of which the last is the step's end."""
+        fractions = np.arange(points) / points
+        inner = self.time[:-1, None] + np.diff(self.time)[:, None] * fractions
+        time = np.append(inner.ravel(), self.time[-1])
+        state = self.at(time)
+        state[::points] = self.state
+        return time, state
+
+
+def ode45(
+    f: RightHandSide, t_end: float, initial_state: Sequence[float], rel_tol: float = 1e-3, abs_tol: float = 1e-6
+) -> Ode45Result:
+    """Solve y' = f(t, y) over [0, t_end], t_end > 0, in plain floats.
+
+    Where `f` is not defined it returns NaN: such a step is a failed one. A step that would have to be shorter than
+    16 units in the last place of t ends the run with success False and the part that was reached.
+    """
+    threshold = abs_tol / rel_tol
+    t, y = 0.0, [float(value) for value in initial_state]
+    k1 = f(t, y)
+    times, states, stages = [t], [y], []
+    evaluations, failed_steps = 1, 0
+    h_max = 0.1 * t_end
+    h = first_step(y, k1, h_max, rel_tol, threshold)
+    done, message = False, ""
+    while not done:
+        h_min = smallest_step(t)
+        h = min(h_max, max(h_min, h))
+        if done := 1.1 * h >= t_end - t:
+            h = t_end - t  # the last step is stretched, or cut, to the end
+        failed_here = False
+        while True:
+            y_new, k, error = _attempt(f, t, y, k1, h, threshold)
+            evaluations += 6
+            if error <= rel_tol:
+                break
+            failed_steps += 1
+            if h <= h_min:
+                message = (
+                    f"Failure at t={t:e}. Unable to meet integration tolerances without reducing the step size "
+                    f"below the smallest value allowed ({h_min:e}) at time t."
+                )
+                break
+            h, done = max(h_min, _after_failure(h, error, rel_tol, failed_here)), False
+            failed_here = True
+        if message:
+            break
+        t, y, k1 = (t_end if done else t + h), y_new, k[6]
+        times.append(t)
+        states.append(y)
+        stages.append(k)
+        if not failed_here:
+            h = _after_success(h, error, rel_tol)
+    return Ode45Result(
+        np.array(times),
+        np.array(states),
+        np.array(stages).reshape(len(stages), 7, len(y)),
+        not message,
+        message,
+        failed_steps,
+        evaluations,
+    )
+
+
+def smallest_step(t: float) -> float:
+    """hmin of ode45 at time t: 16 units in the last place."""
+    return 16.0 * math.ulp(t)
+
+
+def first_step(y: Sequence[float], k1: Sequence[float], h_max: float, rel_tol: float, threshold: float) -> float:
+    """The first step ode45 tries: h_max, or less where the slope at the start is steep."""
+    slope = max(abs(rate) / max(abs(value), threshold) for value, rate in zip(y, k1, strict=True))
+    rate_of_change = 1.25 * slope / rel_tol**_POWER
+    return 1.0 / rate_of_change if h_max * rate_of_change > 1.0 else h_max
+
+
+def _after_success(h: float, error: float, rel_tol: float) -> float:
+    shrink = 1.25 * (error / rel_tol) ** _POWER
+    return h / shrink if shrink > 0.2 else 5.0 * h
+
+
+def _after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -> float:
+    return 0.5 * h if failed_before else h * max(0.1, 0.8 * (rel_tol / error) ** _POWER)
+
+
+def _attempt(
+    f: RightHandSide, t: float, y: list[float], k1: list[float], h: float, threshold: float
+) -> tuple[list[float], tuple[list[float], ...], float]:
+    """One step of the pair: new state, the seven stages, error relative to the state (inf where it is not a number).
+
+    Lists of floats: for the few equations of a rotor twice as fast as NumPy arrays.
+    """
+    k2 = f(t + _C2 * h, [a + h * (_A21 * p) for a, p in zip(y, k1, strict=True)])
+    k3 = f(t + _C3 * h, [a + h * (_A31 * p + _A32 * q) for a, p, q in zip(y, k1, k2, strict=True)])
+    k4 = f(t + _C4 * h, [a + h * (_A41 * p + _A42 * q + _A43 * r) for a, p, q, r in zip(y, k1, k2, k3, strict=True)])
+    k5 = f(
+        t + _C5 * h,
+        [a + h * (_A51 * p + _A52 * q + _A53 * r + _A54 * u) for a, p, q, r, u in zip(y, k1, k2, k3, k4, strict=True)],
+    )
+    k6 = f(
+        t + h,
+        [
+            a + h * (_A61 * p + _A62 * q + _A63 * r + _A64 * u + _A65 * v)
+            for a, p, q, r, u, v in zip(y, k1, k2, k3, k4, k5, strict=True)
+        ],
+    )
+    y_new = [
+        a + h * (_B1 * p + _B3 * r + _B4 * u + _B5 * v + _B6 * w)
+        for a, p, r, u, v, w in zip(y, k1, k3, k4, k5, k6, strict=True)
+    ]
+    k7 = f(t + h, y_new)
+    ratios = [
+        abs(_E1 * p + _E3 * r + _E4 * u + _E5 * v + _E6 * w + _E7 * x) / max(abs(a), abs(b), threshold)
+        for a, b, p, r, u, v, w, x in zip(y, y_new, k1, k3, k4, k5, k6, k7, strict=True)
+    ]
+    # The sum is finite only if every ratio is; max alone can lose a NaN.
+    error = h * max(ratios) if math.isfinite(sum(ratios)) else math.inf
+    return y_new, (k1, k2, k3, k4, k5, k6, k7), error

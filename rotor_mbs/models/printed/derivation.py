@@ -1,0 +1,135 @@
+"""The paper's own way from its matrices to the equations of motion, (24)-(38), for any number of blades.
+
+Each of the errata E1, E2, E3 can be left in or mended. Knows nothing of the closed form or of any integrator.
+
+E1 and E2 stand in matrices and reach every equation after them. E3 stands in (53)-(55) alone, the general model of
+the rotor: (30), for one blade, is printed with the square of the pitch rate. As printed, then, one blade has the square
+and two or more blades have the first power. The coefficient of that term is zero once E2 is mended, so that E3 alone
+changes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.models.printed import matrices
+from rotor_mbs.models.printed.matrices import AS_PRINTED, Errata, Matrix
+
+Array = NDArray[np.float64]
+PseudoInertia = tuple[tuple[int, int, float], ...]
+
+
+class BladeTerms(NamedTuple):
+    """What one blade adds to the equations at (q2, q3).
+
+    d_ij        kg m², coefficients of the accelerations
+    h_i_jk      kg m², coefficients of q̇j q̇k in row i
+    gravity_i   N m
+    """
+
+    d_22: float
+    d_23: float
+    d_33: float
+    h_2_22: float
+    h_2_23: float
+    h_2_33: float
+    h_3_22: float
+    h_3_23: float
+    h_3_33: float
+    gravity_2: float
+    gravity_3: float
+
+
+def pseudo_inertia(m: float) -> PseudoInertia:
+    """J3 of (20) for a point mass m (kg) in the origin of frame 3: what is not zero, as (row, column, value)."""
+    return ((3, 3, m),)
+
+
+def trace(u: Matrix, inertia: PseudoInertia, v: Matrix) -> float:
+    """Trace of U J Vᵀ, as in (24) and (26)."""
+    u0, u1, u2, _ = u  # the last row of a derivative is zero
+    v0, v1, v2, _ = v
+    total = 0.0
+    for a, b, value in inertia:
+        total += value * (u0[a] * v0[b] + u1[a] * v1[b] + u2[a] * v2[b])
+    return total
+
+
+def blade_terms(
+    q2: float, q3: float, m: float, c: float, d: float, g: float, errata: Errata = AS_PRINTED
+) -> BladeTerms:
+    """(24), (26), (27), (31) for one blade whose own rotor angle is q2."""
+    s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
+    j3 = pseudo_inertia(m)
+    u2 = matrices.u32(s2, c2, s3, c3, c, d, errata)
+    u3 = matrices.u33(s2, c2, s3, c3, c)
+    u22 = matrices.u32_2(s2, c2, s3, c3, c, d)
+    u23 = matrices.u32_3(s2, c2, s3, c3, c, errata)
+    u32 = matrices.u33_2(s2, c2, s3, c3, c)
+    u33 = matrices.u33_3(s2, c2, s3, c3, c, errata)
+    return BladeTerms(
+        d_22=trace(u2, j3, u2),
+        d_23=trace(u3, j3, u2),
+        d_33=trace(u3, j3, u3),
+        h_2_22=trace(u22, j3, u2),
+        h_2_23=trace(u23, j3, u2) + trace(u32, j3, u2),
+        h_2_33=trace(u33, j3, u2),
+        h_3_22=trace(u22, j3, u3),
+        h_3_23=trace(u23, j3, u3) + trace(u32, j3, u3),
+        h_3_33=trace(u33, j3, u3),
+        gravity_2=m * g * u2[2][3],  # (31): gravity (0, 0, -g, 0), the mass in the origin of frame 3
+        gravity_3=m * g * u3[2][3],
+    )
+
+
+class DerivedRotor:
+    """Blades alike, each a point mass m (kg) at (c, 0, d) (m), at the given phases (rad); gravity g (m/s²)."""
+
+    def __init__(
+        self, m: float, c: float, d: float, g: float, phases: Sequence[float], errata: Errata = AS_PRINTED
+    ) -> None:
+        self._constants = m, c, d, g, errata
+        self._phases = tuple(phases)
+        self._first_power = errata.e3 and len(self._phases) > 1
+
+    def blades(self, angles: Sequence[float]) -> list[BladeTerms]:
+        """Terms of every blade by (34)-(36); angles (1 + blades,) rad."""
+        return [
+            blade_terms(angles[0] + phase, pitch, *self._constants)
+            for phase, pitch in zip(self._phases, angles[1:], strict=True)
+        ]
+
+    def forces(self, blades: Sequence[BladeTerms], rates: Sequence[float]) -> tuple[float, list[float]]:
+        """H + C of the rotor's row and of every pitch row; rates (1 + blades,) rad/s; N m."""
+        v2 = rates[0]
+        rotor = 0.0
+        pitches = []
+        for terms, v3 in zip(blades, rates[1:], strict=True):
+            rotor += terms.h_2_22 * v2 * v2 + terms.h_2_23 * v2 * v3 + terms.h_2_33 * v3 * v3 + terms.gravity_2
+            last = v3 if self._first_power else v3 * v3
+            pitches.append(terms.h_3_22 * v2 * v2 + terms.h_3_23 * v2 * v3 + terms.h_3_33 * last + terms.gravity_3)
+        return rotor, pitches
+
+    def mass_matrix(self, angles: Sequence[float]) -> Array:
+        """D, (1 + blades, 1 + blades), kg m²."""
+        blades = self.blades(angles)
+        matrix = np.diag([sum(terms.d_22 for terms in blades), *(terms.d_33 for terms in blades)])
+        matrix[0, 1:] = matrix[1:, 0] = [terms.d_23 for terms in blades]
+        return matrix
+
+    def accelerations(self, torque: float, angles: Sequence[float], rates: Sequence[float]) -> list[float]:
+        """τ = D q̈ + H + C solved for q̈ (rad/s²), the pitches eliminated one by one; torque on the rotor in N m."""
+        blades = self.blades(angles)
+        rotor, pitches = self.forces(blades, rates)
+        inertia, moment = 0.0, torque - rotor
+        for terms, force in zip(blades, pitches, strict=True):
+            ratio = terms.d_23 / terms.d_33
+            inertia += terms.d_22 - ratio * terms.d_23
+            moment += ratio * force
+        a2 = moment / inertia
+        return [a2, *((-f - terms.d_23 * a2) / terms.d_33 for terms, f in zip(blades, pitches, strict=True))]

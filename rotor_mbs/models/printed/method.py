@@ -1,0 +1,160 @@
+"""The methods printed/ode45, the paper's equations to the letter, and printed_e1, _e2, _e3/ode45, one erratum alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.models.ode45 import Ode45Result, RightHandSide, ode45
+from rotor_mbs.models.printed import literal, observables
+from rotor_mbs.models.printed.blades import PointMassRotor, point_mass_rotor
+from rotor_mbs.models.printed.derivation import DerivedRotor
+from rotor_mbs.models.printed.matrices import Errata
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.trajectory.record import Array, Integration, Item, Refined, Trajectory
+
+# (torque in N m, angles and rates) -> accelerations; all of the coordinates that move.
+Accelerations = Callable[[float, Sequence[float]], Sequence[float]]
+
+
+class PrintedSolver:
+    """One scene's printed equations under ode45."""
+
+    def __init__(
+        self, scene: Scene, rotor: PointMassRotor, accelerations: Accelerations, rel_tol: float, abs_tol: float
+    ) -> None:
+        self._scene = scene
+        self._rotor = rotor
+        moving = len(scene.initial_angles) if rotor.pitches_move else 1
+        self._moving = moving
+        self._initial = [*scene.initial_angles[:moving], *scene.initial_rates[:moving]]
+        self._right_hand_side = right_hand_side(scene, accelerations, moving)
+        self._tolerances = rel_tol, abs_tol
+        self._result: Ode45Result | None = None
+
+    def integrate(self) -> Integration:
+        result = ode45(self._right_hand_side, self._scene.duration, self._initial, *self._tolerances)
+        self._result = result
+        return Integration(
+            result.success, result.message, float(result.time[-1]), result.steps, rhs_evaluations=result.evaluations
+        )
+
+    def observe(self) -> Trajectory:
+        scene, rotor, result = self._scene, self._rotor, self._result
+        if result is None:
+            raise RuntimeError("observe comes after integrate")
+        time = np.linspace(0.0, scene.duration, scene.samples)
+        time = time[time <= result.time[-1]]
+        angles, rates = self._coordinates(result.at(time))
+        refined_time, refined_state = result.refined()
+        trajectory = Trajectory(time, angles, rates, refined=Refined(refined_time, *self._coordinates(refined_state)))
+        if scene.wants("tip"):
+            trajectory.tip = observables.tip_path(rotor, angles)
+        if scene.wants("energy"):
+            trajectory.kinetic_energy = observables.kinetic_energy(rotor, angles, rates)
+            trajectory.potential_energy = observables.potential_energy(rotor, angles)
+            trajectory.work = self._work(result, time)
+        return trajectory
+
+    def _work(self, result: Ode45Result, time: Array) -> Array:
+        if not self._scene.has_torque:
+            return np.zeros(len(time))
+        return observables.torque_work(
+            self._scene.rotor_torque, lambda times: result.at(times)[:, 0], result.time, time
+        )
+
+    def _coordinates(self, states: Array) -> tuple[Array, Array]:
+        """Angles and rates, (n, 1 + blades) each, of states of what moves; a held pitch stays where it started."""
+        angles = np.tile(np.array(self._scene.initial_angles, dtype=float), (len(states), 1))
+        rates = np.zeros_like(angles)
+        angles[:, : self._moving] = states[:, : self._moving]
+        rates[:, : self._moving] = states[:, self._moving :]
+        return angles, rates
+
+
+class PrintedMethod:
+    """The literal equations, or the paper's derivation with chosen errata."""
+
+    DEFAULTS: Mapping[str, object] = MappingProxyType({"relative_tolerance": 1e-6, "absolute_tolerance": 1e-9})
+
+    def __init__(self, name: str, errata: Errata | None = None) -> None:
+        self._name = name
+        self._errata = errata
+
+    def items(self, scene: Scene) -> list[Item]:
+        rotor = self._rotor(scene)
+        sources = ("(33), rotor row", "(33), pitch row")
+        if len(scene.blades) > 1:
+            sources = ("(42)-(45), (52), (56)", "(46)-(51), (53)-(56)")
+        built = [Item("equation", "rotor", sources[0])]
+        for i in range(1, 1 + len(scene.blades)):
+            if rotor.pitches_move:
+                built.append(Item("equation", f"pitch {i}", sources[1]))
+            else:
+                built.append(Item("term", f"blade {i} held", "its pitch has no inertia"))
+        if scene.gravity != 0.0:
+            built.append(Item("term", "gravity"))
+        if scene.has_torque:
+            built.append(Item("term", "rotor torque"))
+        return built + [Item("output", name) for name in scene.outputs]
+
+    def build(self, scene: Scene, settings: Mapping[str, object]) -> PrintedSolver:
+        """Raises MethodRefusal where the printed equations cannot represent the scene."""
+        rotor = self._rotor(scene)
+        return PrintedSolver(
+            scene,
+            rotor,
+            self._accelerations(rotor),
+            self._tolerance(settings, "relative_tolerance"),
+            self._tolerance(settings, "absolute_tolerance"),
+        )
+
+    def _rotor(self, scene: Scene) -> PointMassRotor:
+        return point_mass_rotor(self._name, scene, blade_counts=() if self._errata else (1, 3))
+
+    def _accelerations(self, rotor: PointMassRotor) -> Accelerations:
+        m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
+        if not rotor.pitches_move:
+            return lambda torque, state: [literal.held_pitch_acceleration(m, d, g, torque, state[0], rotor.phases)]
+        if self._errata:
+            derived = DerivedRotor(m, c, d, g, rotor.phases, self._errata)
+            n = 1 + len(rotor.phases)
+            return lambda torque, state: derived.accelerations(torque, state[:n], state[n:])
+        if len(rotor.phases) == 1:
+            return lambda torque, state: literal.one_blade_accelerations(m, c, d, g, torque, state)
+        return lambda torque, state: literal.three_blade_accelerations(m, c, d, g, torque, state)
+
+    def _tolerance(self, settings: Mapping[str, object], key: str) -> float:
+        value = float(str(settings[key]))
+        if not (math.isfinite(value) and value > 0.0):
+            raise MethodRefusal(f"{self._name}: {key} must be a positive number, not {settings[key]}")
+        return value
+
+
+def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
+    """y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
+    undefined = [math.nan] * (2 * moving)
+    constant = scene.torque_at(0.0) if scene.has_constant_torque else None
+
+    def f(t: float, y: Sequence[float]) -> list[float]:
+        torque = scene.torque_at(t) if constant is None else constant
+        try:
+            return [*y[moving:], *accelerations(torque, y)]
+        except (ZeroDivisionError, OverflowError, ValueError):  # the last is the sine of an infinite angle
+            return undefined
+
+    return f
+
+
+METHODS: Mapping[str, PrintedMethod] = MappingProxyType(
+    {
+        "printed/ode45": PrintedMethod("printed/ode45"),
+        "printed_e1/ode45": PrintedMethod("printed_e1/ode45", Errata(e1=True, e2=False, e3=False)),
+        "printed_e2/ode45": PrintedMethod("printed_e2/ode45", Errata(e1=False, e2=True, e3=False)),
+        "printed_e3/ode45": PrintedMethod("printed_e3/ode45", Errata(e1=False, e2=False, e3=True)),
+    }
+)

@@ -1,0 +1,90 @@
+"""Tip path, energies and work of the printed model's motion, from the paper's matrix (3). Knows no equation of motion.
+
+The energies are the physical ones, with the velocities that (3) implies, whatever equations made the motion: their
+sum less the work of the torque tells how much energy those equations make.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.models.printed import matrices
+from rotor_mbs.models.printed.blades import PointMassRotor
+from rotor_mbs.models.printed.matrices import MENDED
+
+Array = NDArray[np.float64]
+
+# Gauss's three points in [0, 1]: exact to degree five, so for a quartic interpolant.
+_GAUSS_POINTS = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
+_GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+
+
+def tip_path(rotor: PointMassRotor, angles: Array) -> Array:
+    """(n, blades, 3) m, base frame, of angles (n, 1 + blades) rad: (3) applied to the tip as frame 3 sees it."""
+    x, y, z = rotor.tip
+    paths = []
+    for sines in _sines(rotor, angles):
+        rows = matrices.a3(*sines, rotor.c, rotor.d)[:3]
+        paths.append(np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in rows], axis=-1))
+    return np.stack(paths, axis=1)
+
+
+def kinetic_energy(rotor: PointMassRotor, angles: Array, rates: Array) -> Array:
+    """(n,) J: ½ m v² with v from the last columns of (8), E1 mended, and (9)."""
+    total = np.zeros(len(angles))
+    for pitch, sines in enumerate(_sines(rotor, angles), start=1):
+        u32 = matrices.u32(*sines, rotor.c, rotor.d, MENDED)
+        u33 = matrices.u33(*sines, rotor.c)
+        for by_q2, by_q3 in zip(u32[:3], u33[:3], strict=True):
+            total += 0.5 * rotor.m * (by_q2[3] * rates[:, 0] + by_q3[3] * rates[:, pitch]) ** 2
+    return total
+
+
+def potential_energy(rotor: PointMassRotor, angles: Array) -> Array:
+    """(n,) J, zero at the height of the shaft."""
+    total = np.zeros(len(angles))
+    for sines in _sines(rotor, angles):
+        total += rotor.m * rotor.g * matrices.a3(*sines, rotor.c, rotor.d)[2][3]
+    return total
+
+
+def torque_work(
+    torque: Sequence[tuple[float, float]], rotor_angle: Callable[[Array], Array], knots: Array, times: Array
+) -> Array:
+    """(n,) J done up to each of `times` by a torque ((t, τ), ...) that is linear between its rows and held outside.
+
+    Where τ is linear, ∫τ q̇2 dt = [τ q2] - τ' ∫q2 dt, and the integral is exact for a rotor_angle that is a quartic
+    between `knots` (s). No column of rates enters: the work is that of the angles that are reported.
+    """
+    breaks = np.array([row[0] for row in torque])
+    values = np.array([row[1] for row in torque])
+    inside = breaks[(breaks > 0.0) & (breaks < times[-1])]
+    grid = np.unique(np.concatenate([knots[knots <= times[-1]], inside, times]))
+    start, width = grid[:-1], np.diff(grid)
+    at_start, at_end = _torque_between(breaks, values, start, grid[1:])
+    points = start[:, None] + width[:, None] * _GAUSS_POINTS
+    mean_angle = rotor_angle(points.ravel()).reshape(points.shape) @ _GAUSS_WEIGHTS
+    angle = rotor_angle(grid)
+    done = at_end * (angle[1:] - mean_angle) + at_start * (mean_angle - angle[:-1])
+    total = np.concatenate([[0.0], np.cumsum(done)])
+    work: Array = total[np.searchsorted(grid, times)]
+    return work
+
+
+def _torque_between(breaks: Array, values: Array, start: Array, end: Array) -> tuple[Array, Array]:
+    """Torque at both ends of intervals that no row of the table splits; at a jump, the value on the inner side."""
+    row = np.searchsorted(breaks, start, side="right") - 1
+    before = np.clip(row, 0, len(breaks) - 1)
+    after = np.clip(row + 1, 0, len(breaks) - 1)
+    span = breaks[after] - breaks[before]
+    slope = np.divide(values[after] - values[before], span, out=np.zeros_like(span), where=span > 0.0)
+    return values[before] + slope * (start - breaks[before]), values[before] + slope * (end - breaks[before])
+
+
+def _sines(rotor: PointMassRotor, angles: Array) -> list[tuple[Array, Array, Array, Array]]:
+    """s2, c2, s3, c3 of every blade, each (n,)."""
+    turns = [(angles[:, 0] + phase, angles[:, 1 + i]) for i, phase in enumerate(rotor.phases)]
+    return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]

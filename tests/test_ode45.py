@@ -1,0 +1,193 @@
+"""MATLAB's ode45, alone: its pair by order conditions, its step rules by hand, its results by exact solutions."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from rotor_mbs.models.ode45 import ERROR, INTERPOLANT, NODES, STAGES, first_step, ode45, smallest_step
+
+A = [[*row, *[Fraction(0)] * (7 - len(row))] for row in ((), *STAGES)]
+B = A[6]
+
+
+def harmonic(_, y):
+    return [y[1], -y[0]]
+
+
+def harmonic_exact(t):
+    return np.stack([np.cos(t), -np.sin(t)], axis=-1)
+
+
+def weighted(weights, *columns):
+    """Σ_i weights_i Π columns_i."""
+    return sum(w * math.prod(column[i] for column in columns) for i, w in enumerate(weights))
+
+
+def times_a(column):
+    return [sum(a * x for a, x in zip(row, column, strict=True)) for row in A]
+
+
+C = list(NODES)
+C2, C3 = [c**2 for c in C], [c**3 for c in C]
+# Every rooted tree up to order four: elementary weight column and density.
+TREES = [
+    ([Fraction(1)] * 7, 1, 1),
+    (C, 2, 2),
+    (C2, 3, 3),
+    (times_a(C), 3, 6),
+    (C3, 4, 4),
+    ([c * x for c, x in zip(C, times_a(C), strict=True)], 4, 8),
+    (times_a(C2), 4, 12),
+    (times_a(times_a(C)), 4, 24),
+]
+
+
+def test_row_sums_are_the_nodes():
+    assert [sum(row) for row in A] == C
+
+
+@pytest.mark.parametrize(("column", "order", "density"), TREES)
+def test_order_conditions_hold_exactly(column, order, density):
+    assert weighted(B, column) == Fraction(1, density)
+    assert weighted(ERROR, column) == 0  # so the lower formula is of order four, too
+    # The interpolant satisfies them at every s: s^order / density, coefficient by coefficient.
+    for power in range(1, 5):
+        coefficient = weighted([row[power - 1] for row in INTERPOLANT], column)
+        assert coefficient == (Fraction(1, density) if power == order else 0)
+
+
+def test_the_pair_is_of_orders_five_and_four():
+    C4 = [c**4 for c in C]
+    assert weighted(B, C4) == Fraction(1, 5)
+    assert weighted(ERROR, C4) != 0
+
+
+def test_interpolant_meets_state_and_slope_at_both_ends():
+    assert [sum(row) for row in INTERPOLANT] == [*B[:6], 0]
+    assert [row[0] for row in INTERPOLANT] == [1, 0, 0, 0, 0, 0, 0]
+    assert [sum(k * x for k, x in enumerate(row, start=1)) for row in INTERPOLANT] == [0, 0, 0, 0, 0, 0, 1]
+
+
+def test_order_of_convergence_of_steps_and_of_the_interpolant():
+    # At a tolerance that accepts everything there are ten steps of T/10, so that the error goes as T·h⁵ ~ T⁶ at the
+    # steps, and between them as the interpolant's own h⁵ ~ T⁵.
+    spans = np.array([0.5, 1.0, 2.0])
+    at_steps, between = [], []
+    for span in spans:
+        result = ode45(harmonic, span, [1.0, 0.0], 1e10, 1e10)
+        assert result.steps == 10
+        middle = (result.time[1:] + result.time[:-1]) / 2.0
+        at_steps.append(np.abs(result.state[-1] - harmonic_exact(span)).max())
+        between.append(np.abs(result.at(middle) - harmonic_exact(middle)).max())
+    assert np.polyfit(np.log(spans), np.log(at_steps), 1)[0] == pytest.approx(6.0, abs=0.2)
+    assert np.polyfit(np.log(spans), np.log(between), 1)[0] == pytest.approx(5.0, abs=0.2)
+
+
+@pytest.mark.parametrize("rel_tol", [1e-4, 1e-6, 1e-8])
+def test_every_accepted_step_meets_the_tolerance(rel_tol):
+    abs_tol = 1e-3 * rel_tol
+
+    def van_der_pol(_, y):
+        return [y[1], 5.0 * (1.0 - y[0] ** 2) * y[1] - y[0]]
+
+    result = ode45(van_der_pol, 20.0, [2.0, 0.0], rel_tol, abs_tol)
+    assert result.success
+    assert result.failed_steps > 0
+    h = np.diff(result.time)
+    raw = np.abs(np.einsum("s,ksn->kn", np.array([float(e) for e in ERROR]), result.stages))
+    scale = np.maximum(np.maximum(np.abs(result.state[:-1]), np.abs(result.state[1:])), abs_tol / rel_tol)
+    error = h * (raw / scale).max(axis=1)
+    assert error.max() <= rel_tol * (1.0 + 1e-9)  # rounding of the sum that is formed here in another order
+    assert error.max() > 0.5 * rel_tol  # and is not held far below it
+
+
+def test_tolerance_controls_the_error():
+    # Unit rate of error growth on a circle: the error at the end is a small multiple of the tolerance.
+    for rel_tol in (1e-5, 1e-7, 1e-9):
+        result = ode45(harmonic, 10.0, [1.0, 0.0], rel_tol, rel_tol)
+        assert np.abs(result.state[-1] - harmonic_exact(10.0)).max() < 100.0 * rel_tol
+
+
+def test_first_step_by_hand():
+    # y' = -20 y at y = 1, RelTol 1e-5: rh = 1.25·20 / (1e-5)^(1/5) = 250, so 1/250; T/10 = 0.1 would be longer.
+    assert first_step([1.0], [-20.0], 0.1, 1e-5, 1e-3) == pytest.approx(0.004, rel=1e-12)
+    # A state below the threshold 1e-3 is taken as the threshold: rh = 1.25·(0.02/1e-3)/0.1 = 250 again.
+    assert first_step([0.0], [0.02], 0.1, 1e-5, 1e-3) == pytest.approx(0.004, rel=1e-12)
+    assert first_step([1.0], [0.0], 0.1, 1e-5, 1e-3) == 0.1
+
+
+def test_growth_cap_and_stretched_last_step_by_hand():
+    # y' = k has no error: each step is five times the last, up to T/10. With 6 h0 = 0.095 the steps of 0.1 end at
+    # 0.895, and 0.105 is left, less than 1.1·0.1: one step.
+    h0 = 0.095 / 6.0
+    k = 0.1 / (1.25 * h0)  # 1/rh = h0 at RelTol 1e-5
+    result = ode45(lambda _t, _y: [k], 1.0, [1.0], 1e-5, 1e-8)
+    expected = [0.0, h0, *(0.095 + 0.1 * np.arange(9)), 1.0]
+    np.testing.assert_allclose(result.time, expected, rtol=1e-12)
+    assert result.time[-1] == 1.0
+    assert result.evaluations == 1 + 6 * result.steps
+
+
+def wall(position):
+    """y' = 0 up to `position`, not defined beyond."""
+    return lambda t, _y: [0.0 if t < position else math.nan]
+
+
+def test_steps_after_failures_by_hand():
+    # From 0.4 the step 0.1 meets the wall at 0.4041: then a tenth, 0.01, then halves: 0.005, 0.0025 fits.
+    result = ode45(wall(0.4041), 1.0, [1.0])
+    np.testing.assert_allclose(result.time[4:6], [0.4, 0.4025], rtol=1e-12)
+    # Wall at 0.45: 0.1 fails, 0.01 fits; no growth after it: 0.01 again; then 0.05 fails, 0.005 fits, and 0.005 again.
+    result = ode45(wall(0.45), 1.0, [1.0])
+    np.testing.assert_allclose(result.time[4:9], [0.4, 0.41, 0.42, 0.425, 0.43], rtol=1e-12)
+
+
+def test_a_wall_ends_the_run_with_what_was_reached():
+    result = ode45(wall(0.45), 1.0, [1.0])
+    assert not result.success
+    assert result.message.startswith("Failure at t=4.5")
+    assert 0.45 - 2.0 * smallest_step(0.45) <= result.time[-1] < 0.45
+    assert np.all(result.state == 1.0)
+
+
+def test_a_blow_up_ends_the_run_at_its_time():
+    # y' = y², y(0) = 1 is 1/(1 - t): no step is short enough at t = 1.
+    result = ode45(lambda _, y: [y[0] ** 2], 2.0, [1.0], 1e-6, 1e-9)
+    assert not result.success
+    assert "smallest value allowed" in result.message
+    assert result.time[-1] == pytest.approx(1.0, abs=1e-5)
+    early = result.time < 0.9
+    # The error in 1/y grows by at most RelTol a step, and 1/y has fallen to a tenth at t = 0.9.
+    np.testing.assert_allclose(result.state[early, 0], 1.0 / (1.0 - result.time[early]), rtol=10 * 1e-6 * early.sum())
+
+
+def test_no_step_at_all():
+    result = ode45(lambda _t, _y: [math.nan], 1.0, [1.0])
+    assert not result.success
+    assert result.steps == 0
+    assert result.at(np.array([0.0])).tolist() == [[1.0]]
+    assert [part.tolist() for part in result.refined()] == [[0.0], [[1.0]]]
+
+
+def test_read_off_between_and_at_the_steps():
+    result = ode45(harmonic, 10.0, [1.0, 0.0], 1e-8, 1e-8)
+    assert np.array_equal(result.at(result.time), result.state)
+    times = np.linspace(0.0, 10.0, 777)[::-1]
+    # The interpolant is one order lower than the steps: its own error is h⁵ k with h ~ 0.08, k < 1e-2, so 1e-7.
+    np.testing.assert_allclose(result.at(times), harmonic_exact(times), atol=1e-7)
+    with pytest.raises(ValueError, match="covers"):
+        result.at(np.array([10.1]))
+
+
+def test_refined_output_has_four_points_a_step():
+    result = ode45(harmonic, 10.0, [1.0, 0.0])
+    time, state = result.refined()
+    assert len(time) == 4 * result.steps + 1
+    assert np.array_equal(time[::4], result.time)
+    assert np.array_equal(state[::4], result.state)
+    np.testing.assert_allclose(np.diff(time)[:4], result.time[1] / 4.0, rtol=1e-12)
+    assert np.array_equal(state, result.at(time))

@@ -1,0 +1,158 @@
+"""The printed model: its literal text, the paper's derivation, and the right equations made here from T and V alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rotor_mbs.models.printed import literal
+from rotor_mbs.models.printed.derivation import DerivedRotor
+from rotor_mbs.models.printed.matrices import AS_PRINTED, MENDED, Errata
+
+THIRDS = tuple(2.0 * math.pi * i / 3.0 for i in range(3))
+M, C, D, G = 15000.0, math.hypot(0.08, 0.03), 15.42, 9.8  # Table 1
+
+
+def phases(blades):
+    return tuple(2.0 * math.pi * i / blades for i in range(blades))
+
+
+def random_motion(rng, blades):
+    return rng.uniform(-np.pi, np.pi, 1 + blades).tolist(), rng.uniform(-2.0, 2.0, 1 + blades).tolist()
+
+
+def constants(rng):
+    """m, c, d, g of order one: every term then weighs in the sum."""
+    return rng.uniform(0.5, 2.0, 4).tolist()
+
+
+@pytest.mark.parametrize("blades", [1, 3])
+def test_literal_text_is_the_derivation_with_nothing_mended(blades):
+    rng = np.random.default_rng(1)
+    text = {1: literal.one_blade_accelerations, 3: literal.three_blade_accelerations}[blades]
+    for _ in range(50):
+        angles, rates = random_motion(rng, blades)
+        m, c, d, g = constants(rng)
+        torque = rng.uniform(-1.0, 1.0)
+        rotor = DerivedRotor(m, c, d, g, phases(blades), AS_PRINTED)
+        derived = np.array(rotor.accelerations(torque, angles, rates))
+        # Rounding, some 1e-15, times the condition of the mass matrix, which is singular at a pitch of ±π/2.
+        bound = 1e-14 * np.linalg.cond(rotor.mass_matrix(angles)) * max(1.0, np.abs(derived).max())
+        assert bound < 1e-2 * max(1.0, np.abs(derived).max())
+        np.testing.assert_allclose(text(m, c, d, g, torque, angles + rates), derived, rtol=0.0, atol=bound)
+
+
+def positions(angles, c, d, phases):
+    """(blades, 3) places of the mass points, from rotation matrices about y and z written out here."""
+    places = []
+    for phase, pitch in zip(phases, angles[1:], strict=True):
+        turn = angles[0] + phase
+        about_y = np.array([[np.cos(turn), 0 * turn, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0 * turn, np.cos(turn)]])
+        about_z = np.array([[np.cos(pitch), -np.sin(pitch), 0], [np.sin(pitch), np.cos(pitch), 0], [0, 0, 1]])
+        places.append(about_y @ about_z @ np.array([c, 0.0, d]))
+    return np.array(places)
+
+
+class Lagrangian:
+    """T and V of the point masses, and from them Lagrange's equations by complex steps and central differences."""
+
+    def __init__(self, m, c, d, g, phases):
+        self.m, self.c, self.d, self.g, self.phases = m, c, d, g, phases
+
+    def velocity(self, q, qd):
+        return positions(q + 1e-30j * qd, self.c, self.d, self.phases).imag / 1e-30
+
+    def momentum(self, q, qd):
+        """∂T/∂q̇: T is a square of velocities that are linear in q̇."""
+        v = self.velocity(q, qd)
+        return np.array([self.m * np.sum(v * self.velocity(q, unit)) for unit in np.eye(len(q))])
+
+    def energies(self, q, qd):
+        v, z = self.velocity(q, qd), positions(q, self.c, self.d, self.phases)[:, 2]
+        return 0.5 * self.m * np.sum(v**2), self.m * self.g * np.sum(z)
+
+    def forces(self, q, qd, qdd):
+        """d/dt ∂L/∂q̇ - ∂L/∂q; the step 1e-5 cuts off 1e-10."""
+        h = 1e-5
+        along = (self.momentum(q + h * qd, qd + h * qdd) - self.momentum(q - h * qd, qd - h * qdd)) / (2.0 * h)
+        slope = []
+        for unit in np.eye(len(q)):
+            (t1, v1), (t0, v0) = self.energies(q + h * unit, qd), self.energies(q - h * unit, qd)
+            slope.append(((t1 - v1) - (t0 - v0)) / (2.0 * h))
+        return along - np.array(slope)
+
+
+@pytest.mark.parametrize("blades", [1, 2, 3, 5])
+def test_all_mended_are_lagranges_equations(blades):
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        angles, rates = random_motion(rng, blades)
+        chosen = constants(rng)
+        torque = rng.uniform(-1.0, 1.0)
+        rotor = DerivedRotor(*chosen, phases(blades), MENDED)
+        accelerations = np.array(rotor.accelerations(torque, angles, rates))
+        forces = Lagrangian(*chosen, phases(blades)).forces(np.array(angles), np.array(rates), accelerations)
+        # Differences cut off 1e-10 of terms as large as the accelerations.
+        scale = max(1.0, np.abs(accelerations).max())
+        np.testing.assert_allclose(forces / scale, [torque / scale, *[0.0] * blades], atol=1e-7)
+
+
+@pytest.mark.parametrize("errata", [Errata(True, False, False), Errata(False, True, False), AS_PRINTED])
+def test_a_fault_left_in_breaks_lagranges_equations(errata):
+    angles, rates = [0.3, 0.8, -0.5, 1.1], [0.7, -1.2, 0.4, 0.9]
+    chosen = 1.3, 0.9, 1.1, 1.7
+    accelerations = np.array(DerivedRotor(*chosen, THIRDS, errata).accelerations(0.0, angles, rates))
+    forces = Lagrangian(*chosen, THIRDS).forces(np.array(angles), np.array(rates), accelerations)
+    assert np.abs(forces).max() > 0.1
+
+
+def test_third_erratum_alone_changes_nothing():
+    # The coefficient of the term it stands in comes from E2.
+    rng = np.random.default_rng(3)
+    alone, none = (
+        DerivedRotor(*constants(np.random.default_rng(4)), THIRDS, e) for e in (Errata(False, False), MENDED)
+    )
+    for _ in range(10):
+        angles, rates = random_motion(rng, 3)
+        np.testing.assert_allclose(
+            alone.accelerations(0.0, angles, rates), none.accelerations(0.0, angles, rates), rtol=1e-10, atol=1e-10
+        )
+
+
+def test_one_blade_has_the_square_and_three_have_not():
+    # (30) against (53): at a pitch rate of 2 the last term differs by a factor of two, of one blade by none.
+    angles, rates = [0.4, 0.6], [0.0, 2.0]
+    for errata in (AS_PRINTED, Errata(e3=False)):
+        one = DerivedRotor(1.0, 1.0, 1.0, 0.0, (0.0,), errata)
+        _, (h3,) = one.forces(one.blades(angles), rates)
+        s2, c2, s3, c3 = math.sin(0.4), math.cos(0.4), math.sin(0.6), math.cos(0.6)
+        assert h3 == pytest.approx(c3 * s3 * (s2 * c2 - c2**2) * 4.0, rel=1e-12)
+    three = DerivedRotor(1.0, 1.0, 1.0, 0.0, THIRDS)
+    _, (h_2, *_) = three.forces(three.blades([0.4, 0.6, 0.0, 0.0]), [0.0, 2.0, 0.0, 0.0])
+    assert h_2 == pytest.approx(h3 / 2.0, rel=1e-12)
+
+
+def test_mass_matrix_is_singular_where_the_pitch_is_a_right_angle():
+    one = DerivedRotor(M, C, D, G, (0.0,))
+    assert np.linalg.det(one.mass_matrix([0.3, 0.5])) > 1.0
+    assert np.linalg.cond(one.mass_matrix([0.3, math.pi / 2.0])) > 1e15
+
+
+def test_rotor_gravity_is_the_first_row_of_56_but_for_rounding():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        q2, q3, q4, q5 = rng.uniform(-np.pi, np.pi, 4)
+        sines = [f(q) for q in (q2, q3, q4, q5) for f in (math.sin, math.cos)]
+        cosines = math.cos(q3), math.cos(q4), math.cos(q5)
+        simplified = literal.gravity_three(M, C, G, *sines)[0]
+        # Three weights m g d = 2.3e6 N m are added: some units of 4.7e-10.
+        assert literal.rotor_gravity(M, C, D, G, q2, *cosines) == pytest.approx(simplified, abs=1e-8)
+
+
+def test_figure_5_starts_in_an_equilibrium_that_only_rounding_leaves():
+    angle = math.pi / 6.0
+    simplified = literal.gravity_three(M, C, G, math.sin(angle), math.cos(angle), *[0.0, 1.0] * 3)
+    assert simplified == (0.0, 0.0, 0.0, 0.0)
+    assert 0.0 < abs(literal.rotor_gravity(M, C, D, G, angle, 1.0, 1.0, 1.0)) < 1e-8
