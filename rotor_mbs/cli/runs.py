@@ -10,8 +10,10 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.batch import Batch, Report, default_methods, execute
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.models.choice import choose
 from rotor_mbs.models.registry import ERRATA_METHODS, available_defaults, check_names
 from rotor_mbs.runner.environment import machine, numerics_fingerprint, versions
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -22,21 +24,27 @@ from rotor_mbs.store.read import open_results
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """A batch into one file. Methods named with -m must be able to represent every scene; the default ones may not."""
+    """A batch into one file. Methods named with -m must be able to represent every scene; without, a rule takes them."""
     scenes = find_scenes(arguments.scenes)
     asked = check_names(arguments.method or ())
-    methods, refused = _methods(scenes, asked or available_defaults())
-    if asked and refused:
-        raise InputError(refused)
-    for line in refused:
-        print(line, file=sys.stderr)
+    if asked:
+        methods, refused = _methods(scenes, asked)
+        if refused:
+            raise InputError(refused)
+    else:
+        methods, told = _chosen(scenes)
+        for line in told:
+            print(line, file=sys.stderr)
+        scenes = [scene for scene in scenes if methods[scene.name]]
+        if not scenes:
+            return EXIT_BAD_INPUT
     report = execute(Batch(scenes, methods, arguments.output, arguments.jobs, arguments.timeout))
     return _tell(report, arguments.output)
 
 
 def reproduce(arguments: argparse.Namespace) -> int:
     """Every scene of the paper, its default methods and each erratum alone, and the report."""
-    from rotor_mbs.cli.reports import render
+    from rotor_mbs.cli.reports import render_if_changed
 
     start = time.monotonic()
     scenes = find_scenes(["paper"])
@@ -45,7 +53,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
     report = execute(Batch(scenes, methods, results, arguments.jobs, arguments.timeout))
     _add_errata(results)
     status = _tell(report, results)
-    index = render(results, arguments.output / "report", jobs=arguments.jobs)
+    index = render_if_changed(results, arguments.output / "report", arguments.jobs)
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
 
@@ -75,6 +83,22 @@ def freeze(arguments: argparse.Namespace) -> int:
     thin(full, arguments.output, datetime.now(UTC).date().isoformat())
     full.unlink()
     return _tell(report, arguments.output)
+
+
+def _chosen(scenes: Sequence[Scene]) -> tuple[dict[str, Sequence[str]], list[str]]:
+    """The methods that the rule takes for each scene, none where it refuses; and a line for each choice that needs one."""
+    methods: dict[str, Sequence[str]] = {}
+    told: list[str] = []
+    for scene in scenes:
+        try:
+            choice = choose(scene, available_defaults())
+        except MethodRefusal as exc:
+            methods[scene.name] = ()
+            told.append(str(exc))
+            continue
+        methods[scene.name], left_out = default_methods(scene, choice.methods)
+        told += [f"{scene.name}: {choice.methods[0]}: {choice.reason}", *left_out]
+    return methods, told
 
 
 def _methods(scenes: Sequence[Scene], names: Sequence[str]) -> tuple[dict[str, Sequence[str]], list[str]]:

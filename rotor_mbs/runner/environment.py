@@ -42,13 +42,19 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-@functools.cache
 def numerics_fingerprint() -> str:
-    """sha256 over the sources that decide a run's numbers: a changed model makes stored runs stale."""
+    """Of the sources that decide a run's numbers: a changed model makes stored runs stale."""
+    return fingerprint(*_NUMERICS)
+
+
+@functools.cache
+def fingerprint(*folders: str) -> str:
+    """sha256 over every file of this package's `folders`."""
     package = Path(rotor_mbs.__file__).parent
     digest = hashlib.sha256()
-    for folder in _NUMERICS:
-        for path in sorted((package / folder).rglob("*.py")):
-            digest.update(str(path.relative_to(package)).encode())
-            digest.update(path.read_bytes())
+    for folder in folders:
+        for path in sorted((package / folder).rglob("*")):
+            if path.is_file() and path.suffix != ".pyc":
+                digest.update(str(path.relative_to(package)).encode())
+                digest.update(path.read_bytes())
     return digest.hexdigest()

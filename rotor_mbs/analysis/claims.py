@@ -1,0 +1,112 @@
+"""Each published number and claim against the printed equations and against the right model. Knows no page, no plot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from rotor_mbs.analysis import methods
+from rotor_mbs.analysis.published import Asked, Condition, Published, published
+from rotor_mbs.analysis.statistics import measure
+from rotor_mbs.store.read import StoredRun, StoredScene
+
+Choice = Callable[[StoredScene], StoredRun | None]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A test carried out. value, limit: numbers read off the runs (None: undefined); holds: None where data lack."""
+
+    test: Condition
+    value: float | None
+    limit: float | None
+    holds: bool | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one model gives. holds: None where the file cannot decide; broke_off: scenes whose run ended early."""
+
+    holds: bool | None
+    value: float | None = None
+    readings: tuple[Reading, ...] = ()
+    broke_off: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A number or claim of the paper with what the printed and the right model give."""
+
+    published: Published
+    printed: Outcome
+    right: Outcome
+
+    @property
+    def is_decided(self) -> bool:
+        return self.printed.holds is not None or self.right.holds is not None
+
+
+def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Claim]:
+    """All that the paper says and `scenes` can decide for one model at least; `items`: what to test, default all."""
+    found = []
+    for item in published() if items is None else items:
+        printed = _outcome(item, _Runs(scenes, methods.printed_run))
+        found.append(Claim(item, printed, _outcome(item, _Runs(scenes, methods.right_run))))
+    return [claim for claim in found if claim.is_decided]
+
+
+@dataclass(frozen=True)
+class _Runs:
+    scenes: Mapping[str, StoredScene]
+    choose: Choice
+
+    def of(self, scene: str) -> StoredRun | None:
+        return self.choose(self.scenes[scene]) if scene in self.scenes else None
+
+    def value(self, asked: Asked) -> float | None:
+        run = self.of(asked.scene)
+        return None if run is None else measure(run, asked)
+
+
+def _outcome(item: Published, runs: _Runs) -> Outcome:
+    early = tuple(sorted(scene for scene in item.scenes if _ended_early(runs.of(scene))))
+    if item.of is not None:
+        value = runs.value(item.of)
+        return Outcome(None if value is None else rounds_to(value, item.value, item.decimals), value, (), early)
+    readings = tuple(_read(test, runs) for test in item.tests)
+    return Outcome(_all_hold(readings), None, readings, early)
+
+
+def rounds_to(value: float, printed: float, decimals: int) -> bool:
+    """Whether `value`, rounded as it would be printed, is the printed number."""
+    return f"{value:.{decimals}f}" == f"{printed:.{decimals}f}"
+
+
+def _ended_early(run: StoredRun | None) -> bool:
+    return run is not None and run.status not in ("ok", "inaccurate")
+
+
+def _all_hold(readings: Iterable[Reading]) -> bool | None:
+    """False as soon as one fails, even where others cannot be decided."""
+    verdicts = [reading.holds for reading in readings]
+    if False in verdicts:
+        return False
+    return None if None in verdicts or not verdicts else True
+
+
+def _read(test: Condition, runs: _Runs) -> Reading:
+    if runs.of(test.of.scene) is None or (test.than is not None and runs.of(test.than.scene) is None):
+        return Reading(test, None, None, None)
+    value = runs.value(test.of)
+    limit = runs.value(test.than) if test.than is not None else None
+    undefined = value is None or (test.than is not None and limit is None)
+    return Reading(test, value, limit, False if undefined else _relation(test, value, limit))
+
+
+def _relation(test: Condition, value: float | None, limit: float | None) -> bool:
+    assert value is not None
+    against = limit if limit is not None else test.bound
+    assert against is not None
+    if test.relation == "opposite":
+        return value * against < 0.0
+    return value < against if test.relation == "<" else value > against

@@ -1,0 +1,74 @@
+"""One number read off a stored run: an extreme, a range, how it grows. Knows no claim and no method.
+
+Extremes are read off an integrator's own output points where the run has them, as off a printed figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.analysis.published import Asked
+from rotor_mbs.store.read import StoredRun
+
+Array = NDArray[np.float64]
+
+_DATASETS = {"angle": "angles", "rate": "rates"}
+
+
+def measure(run: StoredRun, asked: Asked) -> float | None:
+    """The number in rad or rad/s (reversals and growth: 1); None where the run has no such data or it is undefined."""
+    series = _series(run, _DATASETS[asked.quantity], asked.coordinate)
+    if series is None:
+        return None
+    return STATISTICS[asked.statistic](*series)
+
+
+def _series(run: StoredRun, name: str, coordinate: int) -> tuple[Array, Array] | None:
+    for time, values in (("refined_time", f"refined_{name}"), ("time", name)):
+        if time in run and values in run:
+            data = run.array(values)
+            if len(data) and coordinate < data.shape[1]:
+                return run.array(time), data[:, coordinate]
+    return None
+
+
+def _range(x: Array) -> float:
+    return float(x.max() - x.min())
+
+
+def _reversals(x: Array) -> float:
+    signs = np.sign(x[x != 0.0])
+    return float(np.count_nonzero(signs[1:] != signs[:-1]))
+
+
+def _growth(t: Array, x: Array) -> float | None:
+    """Largest departure from the start over the second half of the time reached by that over the first half."""
+    first = t <= 0.5 * (t[0] + t[-1])
+    away = np.abs(x - x[0])
+    before = float(away[first].max())
+    return float(away[~first].max()) / before if before > 0.0 and not first.all() else None
+
+
+def _swing_ratio(x: Array) -> float | None:
+    """Largest by smallest way from one turning point to the next; the start counts as one."""
+    moving = np.flatnonzero(np.diff(x) != 0.0)
+    signs = np.sign(np.diff(x)[moving])
+    turning = moving[1:][signs[1:] != signs[:-1]]
+    swings = np.abs(np.diff(x[[0, *turning]]))
+    return float(swings.max() / swings.min()) if len(swings) >= 2 else None
+
+
+STATISTICS: dict[str, Callable[[Array, Array], float | None]] = {
+    "min": lambda _, x: float(x.min()),
+    "max": lambda _, x: float(x.max()),
+    "max_abs": lambda _, x: float(np.abs(x).max()),
+    "range": lambda _, x: _range(x),
+    "max_abs_change": lambda _, x: float(np.abs(x - x[0]).max()),
+    "net_change": lambda _, x: float(x[-1] - x[0]),
+    "reversals": lambda _, x: _reversals(x),
+    "growth": _growth,
+    "swing_ratio": lambda _, x: _swing_ratio(x),
+}

@@ -1,0 +1,44 @@
+"""`report`, and the report at the end of `reproduce`: HTML pages from a results file, with no model loaded."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+from pathlib import Path
+
+from rotor_mbs.report.build import write_report
+from rotor_mbs.report.files import INDEX
+from rotor_mbs.runner.environment import fingerprint
+from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.store.hdf5 import replace_file
+
+_STAMP = ".made-from"
+
+
+def report(arguments: argparse.Namespace) -> int:
+    """Pages from `arguments.file` into `arguments.output`."""
+    print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
+    return 0
+
+
+def render_if_changed(results: Path, output: Path, jobs: int) -> Path:
+    """The index of the report on `results` in `output`; made anew unless the same data and code have made it before.
+
+    Raises StoreError.
+    """
+    made_from = _digest(results)
+    stamp = output / _STAMP
+    if not (stamp.is_file() and stamp.read_text() == made_from and (output / INDEX).is_file()):
+        write_report(results, output, jobs)
+        replace_file(stamp, made_from.encode())
+    return output / INDEX
+
+
+def _digest(results: Path) -> str:
+    """Of all that a report depends on."""
+    digest = hashlib.sha256(fingerprint("report", "analysis", "store").encode())
+    for path in (results, *sorted(reference_folder().glob("*.toml"))):
+        with path.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()

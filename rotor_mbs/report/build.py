@@ -1,0 +1,127 @@
+"""A report from a results file: pages made in parallel, each worker with the file open for itself, then written.
+
+Knows the order of things only.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from rotor_mbs.analysis import errata as errata_analysis
+from rotor_mbs.analysis import methods, published
+from rotor_mbs.analysis.claims import Claim, claims
+from rotor_mbs.analysis.order import natural
+from rotor_mbs.errors import StoreError
+from rotor_mbs.report import metrics, said, texts
+from rotor_mbs.report.errata_page import errata_page
+from rotor_mbs.report.files import ERRATA, INDEX, page_names, write_pages
+from rotor_mbs.report.index_page import index_page
+from rotor_mbs.report.pages import ScenePage, render
+from rotor_mbs.store.read import Results, StoredScene, open_results
+
+_PIECES = 2  # per worker
+
+
+@dataclass(frozen=True)
+class SceneTask:
+    """A scene's page to be made, and what it needs to know of the rest of the file."""
+
+    scene: str
+    claims: tuple[Claim, ...]
+    conditions: tuple[str, ...]
+    has_errata: bool
+    previous: str
+    next: str
+
+
+def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
+    """Pages from the results file into the folder `output`, with `jobs` processes; returns the index.
+
+    Raises StoreError where the file cannot be read, has no scene, or the folder cannot be written. Nothing is written
+    before every page is made.
+    """
+    with open_results(results) as opened:
+        tasks, files, pages = _prepared(opened)
+    for scene, text in _rendered(results, tasks, jobs).items():
+        pages[files[scene]] = text
+    write_pages(output, pages)
+    return output / INDEX
+
+
+def scene_pages(results: Path, tasks: Sequence[SceneTask]) -> dict[str, str]:
+    """HTML of each task's scene. Raises StoreError."""
+    with open_results(results) as opened:
+        return {task.scene: render("scene", _scene_page(opened.scenes[task.scene], task)) for task in tasks}
+
+
+def _prepared(opened: Results) -> tuple[list[SceneTask], dict[str, str], dict[str, str]]:
+    """What is to be made for the scenes, their file names, and the pages that need the whole file."""
+    scenes = {name: opened.scenes[name] for name in natural(opened.scenes)}
+    if not scenes:
+        raise StoreError(f"{opened.path}: no scene in it, nothing to report")
+    files = page_names(scenes)
+    said_of = claims(scenes)
+    conditions = published.conditions() if said_of else {}
+    entries = errata_analysis.entries(opened)
+    errata = published.errata() if entries or _speaks_of_errata(scenes) else ()
+    pages = {INDEX: render("index", index_page(opened, scenes, files, said_of, conditions, errata))}
+    if errata:
+        pages[ERRATA] = render("errata", errata_page(errata, entries, scenes, files))
+    tasks = list(_tasks(files, said_of, conditions, has_errata=bool(errata)))
+    return tasks, files, pages
+
+
+def _speaks_of_errata(scenes: Mapping[str, StoredScene]) -> bool:
+    return any(
+        name in scene.methods for scene in scenes.values() for name in (methods.PRINTED, *methods.ALONE.values())
+    )
+
+
+def _tasks(
+    files: Mapping[str, str], said_of: Sequence[Claim], conditions: Mapping[str, str], *, has_errata: bool
+) -> Iterator[SceneTask]:
+    names = list(files)
+    for i, name in enumerate(names):
+        yield SceneTask(
+            name,
+            tuple(claim for claim in said_of if name in claim.published.scenes),
+            tuple(said.conditions_of(name, conditions)),
+            has_errata,
+            files[names[i - 1]] if i else "",
+            files[names[i + 1]] if i + 1 < len(names) else "",
+        )
+
+
+def _rendered(results: Path, tasks: Sequence[SceneTask], jobs: int) -> dict[str, str]:
+    """HTML by scene, made in `jobs` processes (here where it is one)."""
+    workers = min(jobs, len(tasks))
+    if workers <= 1:
+        return scene_pages(results, tasks)
+    # A few pages a piece: opening the file costs as much as two pictures, waiting for the slowest piece more.
+    pieces = [tasks[start :: _PIECES * workers] for start in range(_PIECES * workers)]
+    # spawn: the parent may have threads of numerical libraries, which a fork would copy half-way.
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        made = list(pool.map(scene_pages, [results] * len(pieces), pieces))
+    return {scene: text for piece in made for scene, text in piece.items()}
+
+
+def _scene_page(scene: StoredScene, task: SceneTask) -> ScenePage:
+    from rotor_mbs.report.scene_page import lead, sections, source_comment  # late: matplotlib, in the workers alone
+
+    return ScenePage(
+        name=scene.name,
+        title=scene.title,
+        figures=texts.figures(str(scene.attributes.get("figures", ""))),
+        lead=lead(scene),
+        failures=metrics.failures(scene),
+        source=source_comment(scene),
+        sections=sections(scene, task.claims, task.conditions),
+        toml=str(scene.attributes.get("scene_toml", "")),
+        has_errata=task.has_errata,
+        previous=task.previous,
+        next=task.next,
+    )

@@ -1,0 +1,127 @@
+"""The only file that knows matplotlib: panels to draw on, one style for all, SVG text with the same bytes every time.
+
+Uses Figure directly: no pyplot, hence no global state and no window. Knows no run and no quantity.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from typing import Any, NamedTuple
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullLocator
+
+from rotor_mbs.report.numbers import power
+
+WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
+_STYLE: Any = {
+    "font.family": ["sans-serif"],
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.5,
+    "axes.labelsize": 9.5,
+    "xtick.labelsize": 9.5,
+    "ytick.labelsize": 9.5,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-2, 4),
+    "axes.unicode_minus": True,
+    "axes.xmargin": 0.01,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.25,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "rotor_mbs",
+}
+
+
+class Panels(NamedTuple):
+    """A figure and its axes, from top to bottom."""
+
+    figure: Figure
+    axes: list[Any]
+
+
+def panels(heights: tuple[float, ...], x_label: str) -> Panels:
+    """Panels one below the other over one horizontal axis; heights in inches, that of the top one first."""
+    with matplotlib.rc_context(_STYLE):
+        figure = _figure(sum(heights) + 0.6)
+        grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+        axes: list[Axes] = []
+        for row in range(len(heights)):
+            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
+            axes[-1].tick_params(labelbottom=row == len(heights) - 1, length=3)
+        axes[-1].set_xlabel(x_label)
+        _fit(figure, bottom=0.45)
+    return Panels(figure, axes)
+
+
+def space_above(strip: float, reach: float, depth: float) -> Panels:
+    """A space with equal scales (±reach m across, ±depth m along the shaft); below it, a panel `strip` inches high.
+
+    No panel where `strip` is 0.
+    """
+    from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]  # late: 0.1 s
+
+    with matplotlib.rc_context(_STYLE):
+        below = strip + 0.7 if strip else 0.0
+        height = 4.1 + below
+        figure = _figure(height)
+        lower = below / height
+        space = Axes3D(figure, (0.0, lower, 1.0, 1.0 - lower), auto_add_to_figure=False, proj_type="ortho")
+        figure.add_axes(space)
+        space.set_box_aspect((reach, depth, reach), zoom=1.08)
+        space.set(xlim=(-reach, reach), ylim=(-depth, depth), zlim=(-reach, reach))
+        space.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+        space.view_init(elev=14.0, azim=-62.0)
+        for axis in (space.xaxis, space.yaxis, space.zaxis):
+            axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+            axis.set_major_locator(MultipleLocator(_step(reach)))
+        axes: list[Any] = [space]
+        if strip:
+            axes.append(figure.add_axes((0.16, 0.45 / height, 0.8, strip / height)))
+    return Panels(figure, axes)
+
+
+def log_axis(axes: Any, lowest: float, highest: float) -> None:
+    """A vertical log axis over whole decades, labelled 10⁻¹²; at most eight labels."""
+    low, high = math.floor(math.log10(lowest)), math.ceil(math.log10(highest))
+    high = max(high, low + 1)
+    axes.set_yscale("log")
+    axes.set_ylim(10.0**low, 10.0**high)
+    every = max(1, math.ceil((high - low) / 7))
+    axes.yaxis.set_major_locator(LogLocator(base=10.0**every, numticks=12))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power(round(math.log10(value)))))
+
+
+def svg_text(figure: Figure) -> str:
+    """The figure as matplotlib writes it, without a date."""
+    with matplotlib.rc_context(_STYLE):
+        stream = io.StringIO()
+        FigureCanvasSVG(figure).print_svg(  # type: ignore[no-untyped-call]
+            stream, metadata={"Date": None, "Creator": None}
+        )
+    return stream.getvalue()
+
+
+def _figure(height: float) -> Figure:
+    return Figure(figsize=(WIDTH, height), facecolor="white")
+
+
+def _fit(figure: Figure, bottom: float) -> None:
+    """Fixed margins: nothing to lay out, so nothing that a different font could shift."""
+    height = float(figure.get_figheight())
+    figure.subplots_adjust(left=0.16, right=0.965, bottom=bottom / height, top=1.0 - 0.15 / height, hspace=0.09)
+
+
+def _step(reach: float) -> float:
+    """A tick's step of 1, 2 or 5 times a power of ten: two or three ticks each side of zero."""
+    power_of_ten = 10.0 ** math.floor(math.log10(reach))
+    return next(step * power_of_ten for step in (5.0, 2.0, 1.0, 0.5, 0.2) if reach / (step * power_of_ten) >= 1.5)

@@ -1,0 +1,67 @@
+"""File names from scene names, and pages into a folder: own old pages replaced, foreign files left alone."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from rotor_mbs.errors import StoreError
+
+GENERATOR = "rotor_mbs report"
+INDEX, ERRATA = "index.html", "errata.html"
+_LONGEST = 100  # characters; file systems allow 255 bytes
+
+
+def page_names(scenes: Iterable[str]) -> dict[str, str]:
+    """A file name for each scene: "paper-fig05.html" for "paper/fig05"; all different, also where case is ignored.
+
+    Raises StoreError for a name with a part ".." or ".": no file of this program has one.
+    """
+    names: dict[str, str] = {}
+    taken = {INDEX, ERRATA}
+    for scene in scenes:
+        if {"..", "."} & set(re.split(r"[/\\]", scene)):
+            raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
+        stem = re.sub(r"[^A-Za-z0-9._-]+", "-", scene)[:_LONGEST].strip(".-") or "scene"
+        name, number = f"{stem}.html", 2
+        while name.lower() in taken:
+            name, number = f"{stem}-{number}.html", number + 1
+        taken.add(name.lower())
+        names[scene] = name
+    return names
+
+
+def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
+    """Each page whole or not at all; then removes pages of an earlier report that are no longer made.
+
+    Raises StoreError where the folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in pages.items():
+            _replace(folder / name, text)
+        for old in folder.glob("*.html"):
+            if old.name not in pages and _is_ours(old):
+                old.unlink()
+    except OSError as exc:
+        raise StoreError(f"{folder}: the report cannot be written: {exc.strerror or exc}") from exc
+
+
+def _replace(path: Path, text: str) -> None:
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.replace(path)
+    except OSError:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether the page says that this program made it."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return f'<meta name="generator" content="{GENERATOR}">' in file.read(2000)

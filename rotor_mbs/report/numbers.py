@@ -1,0 +1,59 @@
+"""Numbers for human eyes: few digits, powers of ten, SI prefixes, a true minus sign. Knows no quantity's meaning."""
+
+from __future__ import annotations
+
+import math
+
+NOTHING = "–"  # a number that does not exist
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+SPACE = "\N{NO-BREAK SPACE}"
+
+
+def power(exponent: int) -> str:
+    """10⁻¹⁰ for -10."""
+    return "10" + str(exponent).translate(_SUPERSCRIPT)
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """`digits` significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰; a dash for None, NaN in words."""
+    if value is None:
+        return NOTHING
+    if not math.isfinite(value):
+        return "not finite"
+    if value == 0.0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    if -3 <= int(exponent) < 4:
+        return minus(f"{value:.{max(digits - 1 - int(exponent), 0)}f}")
+    return minus(f"{mantissa}×{power(int(exponent))}")
+
+
+def fixed(value: float | None, decimals: int) -> str:
+    """So many decimals, as a paper prints them; without the sign of a zero."""
+    if value is None:
+        return NOTHING
+    text = f"{value:.{decimals}f}"
+    return minus(text if float(text) else text.lstrip("-"))
+
+
+def quantity(value: float | None, unit: str, digits: int = 2) -> str:
+    """A number with its unit, held together."""
+    return number(value, digits) if value is None else f"{number(value, digits)}{SPACE}{unit}"
+
+
+def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
+    """With an SI prefix: 1.12 MJ, 687 J, 4.1 mJ; powers of ten beyond tera and below nano."""
+    if value is None or not math.isfinite(value) or value == 0.0:
+        return quantity(value, unit, digits)
+    rounded = float(f"{value:.{digits - 1}e}")
+    if not 1e-9 <= abs(rounded) < 1e15:
+        return quantity(value, unit, min(digits, 2))
+    scale, prefix = next((s, p) for s, p in _PREFIXES if abs(rounded) >= s)
+    scaled = rounded / scale
+    decimals = max(digits - 1 - math.floor(math.log10(abs(scaled))), 0)
+    return f"{minus(f'{scaled:.{decimals}f}')}{SPACE}{prefix}{unit}"
+
+
+def minus(text: str) -> str:
+    return text.replace("-", "−")

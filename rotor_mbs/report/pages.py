@@ -1,0 +1,76 @@
+"""Pages as HTML text: templates filled with what other modules made. Everything from a file is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup
+
+from rotor_mbs.analysis.published import Erratum
+from rotor_mbs.report import stability_texts, texts
+from rotor_mbs.report.files import GENERATOR
+from rotor_mbs.report.parts import Section, Table
+
+_TEMPLATES = Path(__file__).resolve().parent / "templates"
+
+
+@dataclass(frozen=True)
+class ScenePage:
+    """A scene. previous, next: file names or ""; source: where the scene comes from; toml: its file's text."""
+
+    name: str
+    title: str
+    figures: str
+    lead: Sequence[str]
+    failures: Sequence[str]
+    source: str
+    sections: Sequence[Section]
+    toml: str
+    has_errata: bool = False
+    previous: str = ""
+    next: str = ""
+
+
+@dataclass(frozen=True)
+class IndexPage:
+    """All scenes. machine: (what, version); is_paper: whether scenes of the paper are among them."""
+
+    finding: Sequence[str]
+    sections: Sequence[Section]
+    machine: Sequence[tuple[str, str]]
+    has_errata: bool
+    is_paper: bool
+
+
+@dataclass(frozen=True)
+class ErrataPage:
+    """The errata. agreeing: the checked entries that are right, None where no check is stored."""
+
+    errata: Sequence[Erratum]
+    sections: Sequence[Section]
+    agreeing: Table | None
+    agreeing_summary: str
+
+
+def render(template: str, page: object) -> str:
+    """The page by `template` ("scene", "index", "errata", "bench"); each knows its own kind of page."""
+    return _environment().get_template(f"{template}.html.j2").render(page=page)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    style = (_TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
+    environment.globals.update(t=texts, w=stability_texts, generator=GENERATOR, style=Markup(style))
+    return environment
