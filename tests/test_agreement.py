@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scenes import PAPER, paper
 
+from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.cli.work import reference_trajectory
 from rotor_mbs.models.base import solve
 from rotor_mbs.models.registry import find_method
@@ -104,3 +105,20 @@ def test_a_run_that_leaves_zero_pitch_is_told_with_its_rate() -> None:
     rate = np.sqrt(scene.gravity / scene.blades[0].centre_of_mass[0] * -np.sin(azimuth))
     assert metrics["zero_pitch_growth_per_s"] == pytest.approx(rate, rel=0.02)  # cosh, not exp, in the first samples
     assert metrics["zero_pitch_left_s"] == pytest.approx(np.arccosh(1e-9 / 1e-12) / rate, abs=0.02)  # two samples
+
+
+@pytest.mark.parametrize("name", ["fig03", "fig04b", "fig05", "fig06", "fig15-100kNm"])
+def test_the_chain_extrapolated_to_step_zero_follows_the_exact_solution(name: str) -> None:
+    """Second order: 3e-8 rad at its default step. Two steps and Richardson's (4 a - b) / 3 leave the model, no scheme.
+
+    The Newton tolerance is tightened, since the default one's remainder, 1e-10 rad, is no power of the step.
+    """
+    scene = paper(name, outputs=("angles", "rates"))
+    newton = {"newton_relative_tolerance": 1e-12, "newton_absolute_tolerance": 1e-13}
+    coarse, fine = (
+        solve(CHAIN, find_method(CHAIN), scene, {"step": step, **newton}).trajectory for step in (1e-3, 5e-4)
+    )
+    exact = exact_rotor_angle(scene, fine.time)
+    assert exact is not None
+    assert np.abs((4 * fine.angles[:, 0] - coarse.angles[:, 0]) / 3 - exact[1]).max() <= 1e-10
+    assert not fine.angles[:, 1:].any()

@@ -20,11 +20,11 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.outcome import Verdict, judge
 
 FAULTS = {
-    "Coriolis term dropped": ("2.0 * half_slope * spin + coupling_slope * rate", "coupling_slope * rate"),
-    "centrifugal term dropped": ("2.0 * half_slope * spin + coupling_slope * rate", "2.0 * half_slope * spin"),
-    "wrong sign of the spin's moment on a pitch": ("half_slope * (spin * spin)", "-half_slope * (spin * spin)"),
-    "gravity on the pitch dropped": ("(pitch_moment - gravity)", "(pitch_moment)"),
-    "coupling's sign turned": ("alone - ratio * rotor", "alone + ratio * rotor"),
+    "Coriolis term dropped": ("2.0 * (spin * rate) + ", ""),
+    "centrifugal term dropped": (" - blade.coupling_s * (rate * rate)", ""),
+    "wrong sign of the spin's moment on a pitch": ("on_s = blade.half_slope_sc", "on_s = -blade.half_slope_sc"),
+    "gravity on the pitch dropped": (" - blade.weight_x * sin_phi", ""),
+    "coupling's sign turned": ("on_s - blade.coupling_s * rotor", "on_s + blade.coupling_s * rotor"),
     # E1 of the paper: c² m c3² more in the rotor's own inertia.
     "E1 in the mass matrix": ("schur = schur + (", "schur = schur + (blade.pitch_inertia * (c * c) + "),
 }

@@ -12,6 +12,9 @@ import rotor_mbs
 
 _DEFAULT_FOLDER = Path("rotor-mbs-out")
 _DEFAULT_TIMEOUT_S = 60.0
+# The suite has runs by the dozen that no limit would let end: so that it ends in minutes, they are given less.
+_SUITE_TIMEOUT_S = 8.0
+_DEFAULT_BUDGET_S = 28.0  # the paper's seventeen scenes in eight minutes
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
@@ -47,6 +50,20 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("-o", "--output", type=Path, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
     _add_batch_options(run)
 
+    bench = _command(commands, "bench", "error against run time, method by method", "bench:bench")
+    bench.add_argument("scenes", nargs="*", metavar="SCENE", help="a name (paper/fig05), a folder (paper), a TOML file")
+    bench.add_argument("-m", "--method", action="append", metavar="METHOD", help="model/integrator; may be repeated")
+    bench.add_argument("-o", "--output", type=Path, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
+    bench.add_argument("--growth", action="store_true", help="also how cost grows with blades and with duration")
+    bench.add_argument(
+        "--repeats", type=_positive(int, "a whole number from 1 up"), default=20, metavar="N",
+        help="timed runs of each point (default: %(default)s; 5 at most for runs over 0.5 s)",
+    )  # fmt: skip
+    bench.add_argument(
+        "--budget", type=_positive(float, "seconds, more than 0"), default=_DEFAULT_BUDGET_S, metavar="SECONDS",
+        help="for each scene (default: %(default)g)",
+    )  # fmt: skip
+
     reference = _command(
         commands, "reference", "quad precision references, computed anew, as they are frozen", "runs:freeze"
     )
@@ -54,10 +71,58 @@ def _parser() -> argparse.ArgumentParser:
     reference.add_argument("-o", "--output", type=Path, required=True, metavar="FILE")
     _add_batch_options(reference)
 
+    check = _command(commands, "check", "accuracy verdicts; exit status 1 where one fails", "check:check")
+    check.add_argument(
+        "file", nargs="?", type=Path, metavar="FILE", help="a results file (default: a quick set, computed)"
+    )
+    check.add_argument("--bounds", type=Path, metavar="TOML", help="own bounds, read before reference/accuracy.toml")
+    check.add_argument("--junit", type=Path, metavar="XML", help="verdicts as JUnit XML")
+    check.add_argument("--json", metavar="FILE", help="verdicts as JSON; - for standard output")
+    check.add_argument("--github", action="store_true", help="failures as GitHub annotations")
+    check.add_argument("--speed", action="store_true", help="run times too, against a calibration run")
+    check.add_argument("-v", "--verbose", action="store_true", help="print verdicts that pass, too")
+    _add_jobs(check)
+
+    _add_sweep(commands)
+
+    stability = _command(
+        commands, "stability", "stiff and extreme scenes by every method: where each holds, and the map of it",
+        "stability:stability",
+    )  # fmt: skip
+    stability.add_argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)")
+    stability.add_argument(
+        "-o", "--output", type=Path, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
+    )
+    stability.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
+    _add_batch_options(stability, timeout_s=_SUITE_TIMEOUT_S)
+
     report = _command(commands, "report", "HTML pages from a results file", "reports:report")
     report.add_argument("file", type=Path, metavar="FILE")
     report.add_argument("-o", "--output", type=Path, default=Path("report"), metavar="DIR", help=_default("DIR"))
     return parser
+
+
+def _add_sweep(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    sweep = _command(commands, "sweep", "a parameter study into one dataset", "sweep:sweep")
+    sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one, such as sweeps/fig11-spread")
+    sweep.add_argument(
+        "-m", "--method", action="append", metavar="METHOD", help="in place of the file's; may be repeated"
+    )
+    sweep.add_argument("-o", "--output", type=Path, metavar="FILE", help="(default: the sweep's name with .h5)")
+    sweep.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
+    sweep.add_argument("--part", type=_part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
+    sweep.add_argument("--dry-run", action="store_true", help="how many runs, about how long, how much")
+    sweep.add_argument("--yes", action="store_true", help="start a sweep of over a million runs")
+    sweep.add_argument("--json", action="store_true", help="progress and summary as JSON lines")
+    _add_batch_options(sweep)
+
+
+def _part(text: str) -> tuple[int, int]:
+    """(K, N) of "K/N"."""
+    number, _, parts = text.partition("/")
+    if not (number.isdecimal() and parts.isdecimal() and 1 <= int(number) <= int(parts)):
+        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: K/N with K from 1 to N")
+    return int(number), int(parts)
 
 
 def _default(metavar: str) -> str:
@@ -83,13 +148,17 @@ def _late(target: str) -> Callable[[argparse.Namespace], int]:
     return call
 
 
-def _add_batch_options(parser: argparse.ArgumentParser) -> None:
+def _add_jobs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-j", "--jobs", type=_positive(int, "a whole number from 1 up"), default=_cores(), metavar="N",
         help="parallel processes (default: the cores, %(default)s)",
     )  # fmt: skip
+
+
+def _add_batch_options(parser: argparse.ArgumentParser, timeout_s: float = _DEFAULT_TIMEOUT_S) -> None:
+    _add_jobs(parser)
     parser.add_argument(
-        "--timeout", type=_positive(float, "seconds, more than 0"), default=_DEFAULT_TIMEOUT_S, metavar="SECONDS",
+        "--timeout", type=_positive(float, "seconds, more than 0"), default=timeout_s, metavar="SECONDS",
         help="a run longer than this is ended and recorded as timed_out (default: %(default)g)",
     )  # fmt: skip
 

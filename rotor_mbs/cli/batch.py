@@ -69,7 +69,7 @@ def execute(batch: Batch) -> Report:
     there = _hashes(batch.output) if batch.output.exists() else {}
     references = [_reference_task(batch, scene, parts) for scene in batch.scenes]
     runs = [
-        _task(scene, method, parts, reference, batch.output, there)
+        _task(batch, scene, method, parts, reference, there)
         for scene, reference in zip(batch.scenes, references, strict=True)
         for method in batch.methods[scene.name]
     ]
@@ -78,7 +78,7 @@ def execute(batch: Batch) -> Report:
     missing = [[task for task in wave if not _is_there(task, there)] for wave in (references, runs)]
     progress = Progress(sum(map(len, missing)))
     for wave in missing:
-        for finished in run_tasks(perform, wave, batch.workers, batch.timeout_s):
+        for finished in run_tasks(perform, wave, batch.workers, _hard_limit(batch.timeout_s)):
             summary = _settle(finished)
             made.append((finished.task, summary))
             progress.tell(_line(finished.task, summary), keep=summary.status != "ok")
@@ -88,6 +88,11 @@ def execute(batch: Batch) -> Report:
         merge(batch.output, [*sources, *sorted(parts.glob("*.h5"))], {**versions(), **machine()})
     shutil.rmtree(parts)
     return Report(made, len(references) + len(runs) - len(made))
+
+
+def _hard_limit(timeout_s: float) -> float:
+    """When a process is ended from outside: what ends itself at its time limit needs a moment to write what it has."""
+    return 1.2 * timeout_s + 10.0
 
 
 def default_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
@@ -142,16 +147,18 @@ def _reference_task(batch: Batch, scene: Scene, parts: Path) -> Task:
     number = scene_hash(scene)
     frozen, stamp = _frozen_references().get(number, (None, "")) if batch.use_frozen else (None, "")
     run_hash = _run_hash(number, REFERENCE, stamp)
-    return Task(scene, number, REFERENCE, run_hash, _piece(parts, scene, REFERENCE, run_hash), frozen=frozen)
+    piece = _piece(parts, scene, REFERENCE, run_hash)
+    return Task(scene, number, REFERENCE, run_hash, piece, time_limit_s=batch.timeout_s, frozen=frozen)
 
 
 def _task(
-    scene: Scene, method: str, parts: Path, reference: Task, output: Path, there: Mapping[tuple[str, str], str]
+    batch: Batch, scene: Scene, method: str, parts: Path, reference: Task, there: Mapping[tuple[str, str], str]
 ) -> Task:
     run_hash = _run_hash(reference.scene_hash, method, reference.run_hash)
     merged = there.get((scene.name, REFERENCE)) == reference.run_hash
-    source = output if merged else reference.piece
-    return Task(scene, reference.scene_hash, method, run_hash, _piece(parts, scene, method, run_hash), reference=source)
+    source = batch.output if merged else reference.piece
+    piece = _piece(parts, scene, method, run_hash)
+    return Task(scene, reference.scene_hash, method, run_hash, piece, reference=source, time_limit_s=batch.timeout_s)
 
 
 def _piece(parts: Path, scene: Scene, method: str, run_hash: str) -> Path:

@@ -7,10 +7,12 @@ import hashlib
 import os
 from pathlib import Path
 
+from rotor_mbs.report.bench_build import write_bench_report
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.files import INDEX
 from rotor_mbs.runner.environment import fingerprint
 from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.store.bench import read_curves
 from rotor_mbs.store.hdf5 import replace_file
 
 _STAMP = ".made-from"
@@ -19,6 +21,8 @@ _STAMP = ".made-from"
 def report(arguments: argparse.Namespace) -> int:
     """Pages from `arguments.file` into `arguments.output`."""
     print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
+    if read_curves(arguments.file):
+        print(write_bench_report(arguments.file, arguments.output / "bench"))
     return 0
 
 

@@ -24,7 +24,7 @@ from rotor_mbs.store.read import open_results
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """A batch into one file. Methods named with -m must be able to represent every scene; without, a rule takes them."""
+    """A batch into one file. Methods named with -m must represent every scene; without, a rule takes them."""
     scenes = find_scenes(arguments.scenes)
     asked = check_names(arguments.method or ())
     if asked:
@@ -86,7 +86,7 @@ def freeze(arguments: argparse.Namespace) -> int:
 
 
 def _chosen(scenes: Sequence[Scene]) -> tuple[dict[str, Sequence[str]], list[str]]:
-    """The methods that the rule takes for each scene, none where it refuses; and a line for each choice that needs one."""
+    """The methods that the rule takes for each scene, none where it refuses; and why, in a line each."""
     methods: dict[str, Sequence[str]] = {}
     told: list[str] = []
     for scene in scenes:

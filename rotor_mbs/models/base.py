@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 from typing import Protocol
 
+from rotor_mbs.models.deadline import time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Integration, Item, Run, Trajectory
 
@@ -39,10 +40,13 @@ def solve(
     settings: Mapping[str, object],
     repeats: int = 1,
     budget_s: float = float("inf"),
+    time_limit_s: float = float("inf"),
 ) -> Run:
     """Build once, integrate up to `repeats` times while within `budget_s` (garbage collector off), observe once.
 
-    Raises MethodRefusal as `build` does. An engine's failure is in the result, not an exception.
+    The integrations together end themselves after `time_limit_s`; building (a compiler may be at work) does not count.
+    Raises MethodRefusal as `build` does, OutOfTimeError where a method cannot keep what it reached. An engine's failure
+    is in the result, not an exception.
     """
     chosen = {**method.DEFAULTS, **settings}
     start = time.perf_counter()
@@ -52,10 +56,11 @@ def solve(
     gc_was_on = gc.isenabled()
     gc.disable()
     try:
-        while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
-            start = time.perf_counter()
-            integration = solver.integrate()
-            run_times.append(time.perf_counter() - start)
+        with time_limit(time_limit_s):
+            while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
+                start = time.perf_counter()
+                integration = solver.integrate()
+                run_times.append(time.perf_counter() - start)
     finally:
         if gc_was_on:
             gc.enable()

@@ -68,3 +68,16 @@ def check_names(names: Sequence[str]) -> tuple[str, ...]:
         allowed = ", ".join(METHOD_NAMES)
         raise InputError([f"unknown method {name!r}; allowed: {allowed}" for name in unknown])
     return tuple(dict.fromkeys(names))
+
+
+def load_engine(name: str) -> None:
+    """Imports what the method called `name` computes with, and lets no compiled code of an earlier process be used.
+
+    For timings: neither an import nor what happens to lie in a cache on disk belongs to a run.
+    """
+    if name == "lagrange/taylor":
+        importlib.import_module("rotor_mbs.models.lagrange.heyoka_adapter").compile_anew()
+    elif name.startswith("exudyn"):
+        importlib.import_module("rotor_mbs.models.multibody.adapter")
+    else:
+        importlib.import_module("scipy.integrate")

@@ -16,11 +16,12 @@ from rotor_mbs.analysis import methods, published
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.analysis.order import natural
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report import metrics, said, texts
+from rotor_mbs.report import metrics, paper_set, said
 from rotor_mbs.report.errata_page import errata_page
-from rotor_mbs.report.files import ERRATA, INDEX, page_names, write_pages
+from rotor_mbs.report.files import ERRATA, INDEX, WALK, page_names, write_pages
 from rotor_mbs.report.index_page import index_page
-from rotor_mbs.report.pages import ScenePage, render
+from rotor_mbs.report.language import speaking, texts
+from rotor_mbs.report.pages import Entry, ScenePage, WalkPage, render
 from rotor_mbs.store.read import Results, StoredScene, open_results
 
 _PIECES = 2  # per worker
@@ -38,27 +39,58 @@ class SceneTask:
     next: str
 
 
-def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
+@dataclass(frozen=True)
+class FigureTask:
+    """A figure of the paper for the walk, and what it needs to know of the rest of the file."""
+
+    number: str
+    claims: tuple[Claim, ...]
+    files: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What a worker gives back: pages by scene, the walk's entries by figure."""
+
+    pages: dict[str, str]
+    entries: dict[str, Entry]
+
+
+def write_report(results: Path, output: Path, jobs: int = 1, language: str = "en") -> Path:
     """Pages from the results file into the folder `output`, with `jobs` processes; returns the index.
 
     Raises StoreError where the file cannot be read, has no scene, or the folder cannot be written. Nothing is written
     before every page is made.
     """
-    with open_results(results) as opened:
-        tasks, files, pages = _prepared(opened)
-    for scene, text in _rendered(results, tasks, jobs).items():
-        pages[files[scene]] = text
+    with speaking(language):
+        with open_results(results) as opened:
+            tasks, files, pages = _prepared(opened)
+        made = _made(results, tasks, jobs, language)
+        if made.entries:
+            in_order = sorted(made.entries.values(), key=lambda entry: int(entry.number))
+            pages[WALK] = render("walk", WalkPage(in_order, has_errata=ERRATA in pages))
+    pages |= {files[scene]: text for scene, text in made.pages.items()}
     write_pages(output, pages)
     return output / INDEX
 
 
-def scene_pages(results: Path, tasks: Sequence[SceneTask]) -> dict[str, str]:
-    """HTML of each task's scene. Raises StoreError."""
-    with open_results(results) as opened:
-        return {task.scene: render("scene", _scene_page(opened.scenes[task.scene], task)) for task in tasks}
+def made_of(results: Path, tasks: Sequence[SceneTask | FigureTask], language: str) -> _Made:
+    """HTML of each scene, entry of each figure. Raises StoreError."""
+    from rotor_mbs.report import walk  # late: matplotlib, in the workers alone
+
+    made = _Made({}, {})
+    with speaking(language), open_results(results) as opened:
+        figures = {one.number: one for one in paper_set.available(opened.scenes)}
+        for task in tasks:
+            if isinstance(task, SceneTask):
+                made.pages[task.scene] = render("scene", _scene_page(opened.scenes[task.scene], task))
+            else:
+                figure = figures[task.number]
+                made.entries[task.number] = walk.entry(figure, opened.scenes, task.claims, task.files)
+    return made
 
 
-def _prepared(opened: Results) -> tuple[list[SceneTask], dict[str, str], dict[str, str]]:
+def _prepared(opened: Results) -> tuple[list[SceneTask | FigureTask], dict[str, str], dict[str, str]]:
     """What is to be made for the scenes, their file names, and the pages that need the whole file."""
     scenes = {name: opened.scenes[name] for name in natural(opened.scenes)}
     if not scenes:
@@ -68,10 +100,13 @@ def _prepared(opened: Results) -> tuple[list[SceneTask], dict[str, str], dict[st
     conditions = published.conditions() if said_of else {}
     entries = errata_analysis.entries(opened)
     errata = published.errata() if entries or _speaks_of_errata(scenes) else ()
-    pages = {INDEX: render("index", index_page(opened, scenes, files, said_of, conditions, errata))}
+    figures = paper_set.available(scenes)
+    index = index_page(opened, scenes, files, said_of, conditions, errata, has_walk=bool(figures))
+    pages = {INDEX: render("index", index)}
     if errata:
         pages[ERRATA] = render("errata", errata_page(errata, entries, scenes, files))
-    tasks = list(_tasks(files, said_of, conditions, has_errata=bool(errata)))
+    tasks: list[SceneTask | FigureTask] = list(_tasks(files, said_of, conditions, has_errata=bool(errata)))
+    tasks += [FigureTask(one.number, tuple(said_of), files) for one in figures]
     return tasks, files, pages
 
 
@@ -96,17 +131,20 @@ def _tasks(
         )
 
 
-def _rendered(results: Path, tasks: Sequence[SceneTask], jobs: int) -> dict[str, str]:
-    """HTML by scene, made in `jobs` processes (here where it is one)."""
+def _made(results: Path, tasks: Sequence[SceneTask | FigureTask], jobs: int, language: str) -> _Made:
+    """All tasks, in `jobs` processes (here where it is one)."""
     workers = min(jobs, len(tasks))
     if workers <= 1:
-        return scene_pages(results, tasks)
-    # A few pages a piece: opening the file costs as much as two pictures, waiting for the slowest piece more.
+        return made_of(results, tasks, language)
+    # A few tasks a piece: opening the file costs as much as two pictures, waiting for the slowest piece more.
     pieces = [tasks[start :: _PIECES * workers] for start in range(_PIECES * workers)]
+    made = _Made({}, {})
     # spawn: the parent may have threads of numerical libraries, which a fork would copy half-way.
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        made = list(pool.map(scene_pages, [results] * len(pieces), pieces))
-    return {scene: text for piece in made for scene, text in piece.items()}
+        for piece in pool.map(made_of, [results] * len(pieces), pieces, [language] * len(pieces)):
+            made.pages.update(piece.pages)
+            made.entries.update(piece.entries)
+    return made
 
 
 def _scene_page(scene: StoredScene, task: SceneTask) -> ScenePage:

@@ -7,17 +7,24 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullLocator
 
 from rotor_mbs.report.numbers import power
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
+PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
+PRINT_STYLE: Any = matplotlib.rc_params_from_file(  # what the file says, and no more
+    Path(__file__).with_name("print.mplstyle"), use_default_template=False
+)
 _STYLE: Any = {
     "font.family": ["sans-serif"],
     "font.sans-serif": ["DejaVu Sans"],
@@ -89,6 +96,44 @@ def space_above(strip: float, reach: float, depth: float) -> Panels:
     return Panels(figure, axes)
 
 
+def grid(rows: int, columns: int, height: float, *, for_print: bool = False) -> Panels:
+    """Axes row by row, `height` inches each; for_print: at a journal's page width, in the style for manuscripts."""
+    with matplotlib.rc_context(PRINT_STYLE if for_print else _STYLE):
+        top, bottom = (0.5, 0.75) if for_print else (0.28, 0.45)
+        width = PRINT_WIDTH if for_print else WIDTH
+        figure = Figure(figsize=(width, rows * height + top + bottom), facecolor="white")
+        made = figure.subplots(rows, columns, squeeze=False)
+        whole = float(figure.get_figheight())
+        figure.subplots_adjust(
+            left=0.8 / width, right=1.0 - 0.12 / width, bottom=bottom / whole, top=1.0 - top / whole,
+            hspace=0.22 / height, wspace=0.24,
+        )  # fmt: skip
+    return Panels(figure, list(made.flat))
+
+
+def flat_space(axes: Any, across: float, up: float) -> None:
+    """Empty axes of equal scales, ±across and ±up m, for a space that was projected by its drawer."""
+    axes.set(xlim=(-across, across), ylim=(-up, up), aspect="equal")
+    axes.set_axis_off()
+
+
+def legend_below(figure: Figure, labelled: Sequence[tuple[str, str, Any]]) -> None:
+    """(label, colour, line) of each curve, in a row at the foot of the figure."""
+    with matplotlib.rc_context(PRINT_STYLE):
+        lines = [Line2D([], [], color=colour, linestyle=line) for _, colour, line in labelled]
+        names = [label for label, _, _ in labelled]
+        figure.legend(lines, names, loc="lower center", ncols=min(len(lines), 5), handlelength=2.6)
+
+
+def encoded(figure: Figure, kind: str) -> bytes:
+    """The figure as a file: "pdf", "svg" or "png"; the same bytes every time."""
+    metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
+    with matplotlib.rc_context(PRINT_STYLE):
+        stream = io.BytesIO()
+        figure.savefig(stream, format=kind, metadata=metadata)
+    return stream.getvalue()
+
+
 def log_axis(axes: Any, lowest: float, highest: float) -> None:
     """A vertical log axis over whole decades, labelled 10⁻¹²; at most eight labels."""
     low, high = math.floor(math.log10(lowest)), math.ceil(math.log10(highest))
@@ -125,3 +170,10 @@ def _step(reach: float) -> float:
     """A tick's step of 1, 2 or 5 times a power of ten: two or three ticks each side of zero."""
     power_of_ten = 10.0 ** math.floor(math.log10(reach))
     return next(step * power_of_ten for step in (5.0, 2.0, 1.0, 0.5, 0.2) if reach / (step * power_of_ten) >= 1.5)
+
+
+def colour_bar(figure: Figure, axes: Any, drawn: Any, label: str) -> None:
+    """What the colours of `drawn` mean, to the right of its axes."""
+    with matplotlib.rc_context(_STYLE):
+        bar = figure.colorbar(drawn, ax=axes)
+        bar.set_label(label)

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.report import canvas, texts
+from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import GREY, Look, coordinate_look
 
 Array = NDArray[Any]
@@ -54,7 +55,7 @@ def motion(run: Motion, marked: Sequence[tuple[Motion, Look]] = (), horizon: flo
             if theirs is not None:
                 _marks(axes, other.time, theirs, look, place / len(marked))
         axes.set_ylabel(label)
-        _set_range(axes, values)
+        set_range(axes, values)
         _horizon(axes, run.time, horizon)
     return picture
 
@@ -206,7 +207,7 @@ def _with_sparse_marks(axes: Any, time: Array, values: Array, look: Look) -> Non
     )  # fmt: skip
 
 
-def _set_range(axes: Any, values: Array) -> None:
+def set_range(axes: Any, values: Array) -> None:
     """Cuts off a runaway; does not blow up rounding where nothing moves."""
     if is_cut(values):
         usual = float(np.quantile(np.abs(values).max(axis=1), 0.9))

@@ -11,7 +11,7 @@ from pathlib import Path
 from rotor_mbs.errors import StoreError
 
 GENERATOR = "rotor_mbs report"
-INDEX, ERRATA = "index.html", "errata.html"
+INDEX, ERRATA, WALK = "index.html", "errata.html", "figures.html"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 
 
@@ -21,7 +21,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
-    taken = {INDEX, ERRATA}
+    taken = {INDEX, ERRATA, WALK}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")

@@ -8,7 +8,8 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import finding
-from rotor_mbs.report import metrics, said, texts
+from rotor_mbs.report import metrics, said
+from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import name_of
 from rotor_mbs.report.numbers import number, prefixed, quantity
 from rotor_mbs.report.pages import IndexPage
@@ -26,6 +27,8 @@ def index_page(
     claims: Sequence[Claim],
     conditions: Mapping[str, str],
     errata: Sequence[Erratum],
+    *,
+    has_walk: bool = False,
 ) -> IndexPage:
     """scenes: in order; files: each scene's page; errata: empty where the report has no such page."""
     has_numbers = any(claim.published.is_number for claim in claims)
@@ -47,6 +50,7 @@ def index_page(
         machine,
         has_errata=bool(errata),
         is_paper=bool(claims),
+        has_walk=has_walk,
     )
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rotor_mbs.report.language import texts
+
 # Okabe & Ito's colours, told apart by the colour-blind; the yellow is left out, it does not show on white.
 COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 GREY = "#666666"
@@ -51,7 +53,7 @@ _OTHERS = (
 
 
 def name_of(method: str) -> str:
-    return NAMES.get(method, method)
+    return texts.METHOD_NAMES.get(method, method)
 
 
 def looks(methods: list[str]) -> dict[str, Look]:

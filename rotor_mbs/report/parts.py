@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from markupsafe import Markup
 
 from rotor_mbs.report.names import GREY, Look
+from rotor_mbs.report.viewer import Viewer
 
 _DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
 _MARKS = {
@@ -66,7 +67,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: pictures side by side with a common legend, then tables. Left out where it has neither."""
+    """A part of a page: pictures side by side with a common legend, then tables. Left out where it has neither.
+
+    viewer: what moves above the pictures.
+    """
 
     id: str
     heading: str
@@ -74,6 +78,7 @@ class Section:
     legend: Sequence[Sample] = ()
     tables: Sequence[Table] = ()
     notes: Sequence[str] = field(default_factory=tuple)
+    viewer: Viewer | None = None
 
     @property
     def tables_beside(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from rotor_mbs.analysis.claims import Claim, Outcome, Reading
-from rotor_mbs.report import texts
+from rotor_mbs.report.language import spoken, texts
 from rotor_mbs.report.numbers import fixed
 from rotor_mbs.report.parts import Cell, Table
 
@@ -83,7 +83,7 @@ def _evidence(outcome: Outcome) -> str:
         return ""
     text = _reading(shown[0])
     if len(shown) > 1:
-        text += f"; {len(shown) - 1} more {'such' if failed else 'tests hold'}"
+        text += texts.more_readings(len(shown) - 1, bool(failed))
     if outcome.broke_off:
         text += f" ({texts.ENDED_EARLY_NOTE} {', '.join(outcome.broke_off)})"
     return text
@@ -100,7 +100,7 @@ def _reading(reading: Reading) -> str:
     sign = (
         texts.relation(test.relation, test.bound)
         if reading.holds
-        else f"not {texts.relation(test.relation, test.bound)}"
+        else texts.not_so(texts.relation(test.relation, test.bound))
     )
     text += f", {sign}"
     if test.than is not None:

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import canvas, figures, metrics, said, texts, vector
+from rotor_mbs.report import canvas, figures, metrics, said, vector
+from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import GREY, Look, coordinate_look, looks, name_of
 from rotor_mbs.report.parts import Picture, Sample, Section, line_sample, mark_sample, run_sample
 from rotor_mbs.store.layout import REFERENCE
+from rotor_mbs.report.viewer import viewer
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]
@@ -81,10 +83,10 @@ def sections(scene: StoredScene, claims: Sequence[Claim], conditions: Sequence[s
     tables = [said.number_table(claims), said.claim_table(claims)]
     found = [
         Section("said", texts.PAPER_SAYS, tables=[table for table in tables if table.rows], notes=conditions),
+        paths(drawn),
         motion(drawn),
         difference(drawn),
         energy(drawn),
-        paths(drawn),
         Section("metrics", texts.METRICS, tables=[metrics.metrics_table(scene)], notes=metrics.metrics_notes(scene)),
     ]
     return [section for section in found if section.has_content]
@@ -102,7 +104,7 @@ def motion(drawn: Drawn) -> Section:
         marked |= {n: other for n, other in others.items() if "angles" in other or "rates" in other}
         pictures.append(_motion_picture(drawn, run, marked))
     labels = runs[0].labels
-    legend = [line_sample(label, *coordinate_look(i)) for i, label in enumerate(labels)]
+    legend = [line_sample(texts.coordinate(label), *coordinate_look(i)) for i, label in enumerate(labels)]
     legend += [mark_sample(name_of(name), drawn.looks[name]) for name in marked]
     pictures += _rotor_picture(drawn)
     table = metrics.range_table({_heading(drawn, run): run for run in runs})
@@ -271,7 +273,10 @@ def paths(drawn: Drawn) -> Section:
         replace(line_sample(texts.SHAFT, GREY, "-"), width=4.0),
     ]
     table = metrics.path_table({_heading(drawn, run): run for run in runs})
-    return Section("paths", texts.PATHS, pictures, legend, [table], [texts.PATHS_NOTE])
+    name = drawn.scene.title
+    moving = viewer(drawn.scene, {name_of(run.method): run for run in drawn.sides}, texts.viewer_described(name))
+    heading = texts.PATHS if moving is None else texts.MOVING
+    return Section("paths", heading, pictures, legend, [table], [texts.PATHS_NOTE], moving)
 
 
 def _path_picture(drawn: Drawn, run: StoredRun) -> Picture:

@@ -5,12 +5,17 @@ Knows numbers and names, not where they come from. Another language is another m
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from math import inf
+from typing import TYPE_CHECKING
 
 from rotor_mbs.analysis.methods import model_of
 from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Tally
-from rotor_mbs.report.names import name_of
+from rotor_mbs.report.names import NAMES, name_of
 from rotor_mbs.report.numbers import number, prefixed, quantity
+
+if TYPE_CHECKING:
+    from rotor_mbs.report.walk_facts import Facts
 
 LANGUAGE = "en"
 REPORT = "Rotor report"
@@ -38,6 +43,47 @@ METRICS = "Methods in numbers"
 SCENE_FILE = "Scene file"
 ENTRIES = "Checked entries"
 EFFECTS = "What each erratum alone does to each scene"
+
+# The viewer
+MOVING = "The rotor moving"
+PLAY, PAUSE, TIME, SPEED, MODELS, VIEW = "Play", "Pause", "Time", "Speed", "Models", "View"
+SIDE_BY_SIDE, OVERLAID = "side by side", "overlaid"
+OFFSET_DRAWN = "Offset drawn"
+ENDED_AT, DASHED = "ended at", "dashed"
+VIEWS = {"oblique": "Oblique", "front": "Front", "side": "Side", "top": "Top"}
+VIEWER_KEYS = (
+    "Drag the picture, or use the arrow keys on it, to turn the view; the space bar plays, comma and full stop go "
+    "frame by frame."
+)
+VIEWER_OFFSET = (
+    "The tip and the centre of mass lie so near the pitch axis that pitch could not be seen: their distance from it, "
+    "and with it the paths, are drawn larger by the factor stated (1 is true to scale)."
+)
+METHOD_NAMES = NAMES
+
+# The walk through the paper's figures
+WALK, FIGURES, FIGURE_TITLES = "The paper's figures, one by one", "Figures", {
+    "motion": "position and velocity", "paths": "paths of the tips", "torques": "a constant torque on the rotor",
+}  # fmt: skip
+WALK_LEAD = (
+    "Each figure of the paper in its own layout: the equations as printed, integrated by ode45 as the paper did, beside "
+    "the right model and Exudyn. Every picture has its own scales."
+)
+EXUDYN_COLUMN = "Exudyn"
+PART_A, PART_B = "(a) position", "(b) angular velocity"
+FIGURE_NOTES = {
+    "6": "The caption prints π/10 rad/s, the running text 1/10; drawn is the caption's.",
+    "13": "The text takes panel (b) for the run of Fig. 12 (blade 1 at π/5 rad/s), the caption prints π/8; drawn is the "
+    "caption's.",
+    "14": "As read from the PDF, the caption gives three pairs of conditions for four panels: which pair belongs to which "
+    "panel is not certain, and the condition of panel (d) is not known. Nothing is drawn for it.",
+    "15": "1 and 100 kN·m are printed in the caption of Fig. 16; the paper's other torques are not known, 10 and "
+    "50 kN·m were chosen.",
+}
+DOWNLOADS_NOTE = (
+    "SVG and PNG: the picture at print size, 132 mm across, the PNG with 600 dots an inch. Whole figures for a "
+    "manuscript, as PDF, SVG or PNG: rotor-mbs figures."
+)
 
 # Navigation
 INDEX = "All scenes"
@@ -140,6 +186,88 @@ def angle_column(side: str) -> str:
 
 def length_column(side: str) -> str:
     return f"{side}: length of path"
+
+
+def viewer_described(title: str) -> str:
+    return f"{title}: the blades and the paths of their tips, moving. The pictures below show the same at rest."
+
+
+def coordinate(label: str) -> str:
+    """A coordinate by its name in the file: rotor, pitch 1 ..."""
+    return label
+
+
+def more_readings(count: int, failed: bool) -> str:
+    return f"; {count} more {'such' if failed else 'tests hold'}"
+
+
+def not_so(relation_text: str) -> str:
+    return f"not {relation_text}"
+
+
+def figure_heading(number_of: str, kind: str) -> str:
+    return f"{FIGURE} {number_of}: {FIGURE_TITLES[kind]}"
+
+
+def walk_picture(figure: str, heading: str) -> str:
+    return f"{FIGURE} {figure}, {heading}"
+
+
+def conditions(angles: str, rates: str, torque: float | None, gravity: float, duration: float) -> str:
+    """Of a start; torque in N m, None where it changes over time."""
+    parts = [f"q(0) = [{angles}] rad", f"dq/dt(0) = [{rates}] rad/s"]
+    parts.append("torque changing over time" if torque is None else f"rotor torque {prefixed(torque, 'N·m')}")
+    return f"{', '.join(parts)}, g = {number(gravity, 3)} m/s², {quantity(duration, 's', 4)}."
+
+
+def walk_same(facts: Facts) -> str:
+    """What is the same in the models."""
+    parts = []
+    if facts.seen_apart is not None and facts.seen_apart > 0.0:
+        how_long = "throughout" if facts.seen_apart == inf else f"up to {quantity(facts.seen_apart, 's', 3)}"
+        parts.append(f"the printed model shows the right motion {how_long}")
+    if facts.exudyn is not None:
+        parts.append(
+            f"Exudyn and the right model differ by no more than {quantity(facts.exudyn, 'rad')} up to "
+            f"{quantity(facts.until, 's', 3)}"
+        )
+    return f"The same: {'; '.join(parts)}." if parts else ""
+
+
+def walk_different(facts: Facts) -> str:
+    """What is not."""
+    parts = []
+    if facts.right_still and facts.printed_pitch is not None and facts.printed_pitch > 1e-3:
+        parts.append(f"in the right model no blade pitches at all, in print they reach {quantity(facts.printed_pitch, 'rad')}")
+    if facts.largest is not None and facts.seen_apart != inf:
+        parts.append(f"the printed angles part from the right ones by up to {quantity(facts.largest, 'rad')}")
+    if facts.gain is not None and facts.gain > 1e3:
+        parts.append(f"the printed model makes {prefixed(facts.gain, 'J')} out of nothing")
+    if facts.ended is not None:
+        parts.append(f"it runs away, and ode45 gives up at {quantity(facts.ended, 's', 3)}")
+    return f"Not the same: {'; '.join(parts)}." if parts else "Not the same: nothing that one could see."
+
+
+def torques_same(exudyn: float | None) -> str:
+    """exudyn: rad, from the right model, the largest of all torques."""
+    text = "The same: every torque sets the rotor going from rest"
+    return f"{text}." if exudyn is None else f"{text}; Exudyn and the right model differ by {quantity(exudyn, 'rad')} at most."
+
+
+def torques_different(turned: Mapping[str, Mapping[str, float]]) -> str:
+    """rad that each torque has turned the rotor by the end, by model."""
+    parts = [
+        f"{heading}: " + ", ".join(f"{number(value, 3)} rad at {torque}" for torque, value in by_torque.items())
+        for heading, by_torque in turned.items()
+    ]
+    return (
+        "Not the same: in the right model the blades stay at zero pitch and the rotor turns by τt²/(2·3·m·(c²+d²)), the "
+        f"more the larger the torque. Turned at the end: {'; '.join(parts)}."
+    )
+
+
+def walk_number(what: str, unit: str, published: str, printed: str, right: str) -> str:
+    return f"{what[0].upper()}{what[1:]}: published {published} {unit}; as printed {printed}; right model {right}."
 
 
 def scene_count(count: int) -> str:

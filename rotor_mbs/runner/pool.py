@@ -18,7 +18,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 # One thread per process: the processes are the parallelism, and timings must not depend on a library's threads.
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ def run_tasks(work: Callable[[T], R], tasks: Sequence[T], workers: int, timeout_
     """Results as they come. A task over `timeout_s` has its process ended, as have all on an interrupt."""
     if not tasks:
         return
-    for name in _ONE_THREAD:
+    for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     context = multiprocessing.get_context("spawn")
     pool = ProcessPool(max_workers=min(workers, len(tasks)), context=context)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.load import load_scene
 from rotor_mbs.scenario.reading import read_toml, shown_path
-from rotor_mbs.scenario.resources import scenarios_folder
+from rotor_mbs.scenario.resources import scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.scene import Scene
 
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
@@ -62,7 +62,8 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
 
 def _shipped() -> dict[str, Path]:
     folder = scenarios_folder()
-    names = ((path.relative_to(folder).with_suffix("").as_posix(), path) for path in folder.rglob("*.toml"))
+    paths = (path for path in folder.rglob("*.toml") if path.parent != sweeps_folder())
+    names = ((path.relative_to(folder).with_suffix("").as_posix(), path) for path in paths)
     return dict(sorted(names, key=lambda item: _natural(item[0])))
 
 

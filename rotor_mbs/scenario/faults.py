@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from rotor_mbs.scenario.lines import KeyPath
-from rotor_mbs.scenario.schema import BladeTable, SceneTable
+from rotor_mbs.scenario.schema import SceneTable
 
 _KINDS = {
     "int_type": "no whole number",
@@ -33,14 +33,14 @@ class Fault(NamedTuple):
     text: str
 
 
-def faults_of(error: ValidationError, tables: Mapping[str, Any]) -> list[Fault]:
-    """Every fault that pydantic found in `tables`, in plain words."""
-    return [_fault(details, tables) for details in error.errors(include_url=False)]
+def faults_of(error: ValidationError, tables: Mapping[str, Any], root: type[BaseModel] = SceneTable) -> list[Fault]:
+    """Every fault that pydantic found in `tables` when it held them against `root`, in plain words."""
+    return [_fault(details, tables, root) for details in error.errors(include_url=False)]
 
 
-def _fault(details: ErrorDetails, tables: Mapping[str, Any]) -> Fault:
+def _fault(details: ErrorDetails, tables: Mapping[str, Any], root: type[BaseModel]) -> Fault:
     path, value = _in_file(details["loc"], tables)
-    model, description = _field(details["loc"])
+    model, description = _field(details["loc"], root)
     wrong, allowed = _words(details, model, _shown(value))
     return Fault(path, f"{_shown_key(path)}: {wrong}; allowed: {allowed or description}")
 
@@ -67,27 +67,24 @@ def _unknown_key(key: str, names: list[str]) -> tuple[str, str]:
     return "is no key here" + (f", perhaps {near[0]}" if near else ""), ", ".join(names)
 
 
-def _field(loc: KeyPath) -> tuple[type[BaseModel], str]:
+def _field(loc: KeyPath, root: type[BaseModel]) -> tuple[type[BaseModel], str]:
     """The model that holds the last named key of `loc`, and the description of its field ("" for an unknown key)."""
-    model: type[BaseModel] = SceneTable
+    model = root
     names = [part for part in loc if isinstance(part, str)]
     for name in names[:-1]:
-        model = _TABLES[name]
+        model = _tables_in(model).get(name, model)
     field = model.model_fields.get(names[-1])
     return model, (field.description or "") if field else ""
 
 
-def _table_models() -> dict[str, type[BaseModel]]:
-    """The model of every table, by its key."""
-    models: dict[str, type[BaseModel]] = {"blade": BladeTable}
-    for name, field in SceneTable.model_fields.items():
+def _tables_in(model: type[BaseModel]) -> dict[str, type[BaseModel]]:
+    """The model of every table in a table, by its key."""
+    models: dict[str, type[BaseModel]] = {}
+    for name, field in model.model_fields.items():
         for candidate in (field.annotation, *getattr(field.annotation, "__args__", ())):
             if isinstance(candidate, type) and issubclass(candidate, BaseModel):
                 models[name] = candidate
     return models
-
-
-_TABLES = _table_models()
 
 
 def _in_file(loc: KeyPath, tables: Mapping[str, Any]) -> tuple[KeyPath, object]:

@@ -28,19 +28,24 @@ def shown_path(path: Path) -> str:
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     """The text of the file and its tables; raises InputError with one line for whatever is in the way."""
     text = _read_text(path)
+    return text, parse_toml(text, shown_path(path))
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The tables in a text; raises InputError with one line that begins with `source`."""
     too_long = _LONG_KEY.search(text)
     if too_long:
         line = text.count("\n", 0, too_long.start()) + 1
-        raise InputError(f"{shown_path(path)}:{line}: key of over {_MAX_KEY_PARTS} parts; allowed: keys of a scene")
+        raise InputError(f"{source}:{line}: key of over {_MAX_KEY_PARTS} parts; allowed: keys of a scene")
     try:
-        return text, tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{shown_path(path)}:{_syntax_fault(str(error), text)}; allowed: TOML 1.0") from error
+        raise InputError(f"{source}:{_syntax_fault(str(error), text)}; allowed: TOML 1.0") from error
     except RecursionError as error:
-        raise InputError(f"{shown_path(path)}:1: nested too deep; allowed: tables and arrays of a scene") from error
+        raise InputError(f"{source}:1: nested too deep; allowed: tables and arrays of a scene") from error
     except ValueError as error:
         # What the reader lets through untyped: whole numbers of more digits than Python converts.
-        raise InputError(f"{shown_path(path)}:1: a number is too long; allowed: |x| <= 1e300") from error
+        raise InputError(f"{source}:1: a number is too long; allowed: |x| <= 1e300") from error
 
 
 def _read_text(path: Path) -> str:

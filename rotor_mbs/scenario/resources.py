@@ -14,6 +14,11 @@ def scenarios_folder() -> Path:
     return _folder("scenarios")
 
 
+def sweeps_folder() -> Path:
+    """The shipped sweeps: TOML files that vary a scene, and are none themselves."""
+    return scenarios_folder() / "sweeps"
+
+
 def reference_folder() -> Path:
     """What runs are held against: published numbers, errata, frozen trajectories; raises RotorError as above."""
     return _folder("reference")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rotor_mbs.store import hdf5, layout
+from rotor_mbs.store.digests import write_digests
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.write import put_datasets
 
@@ -12,7 +13,7 @@ _KEPT = ("time", "coordinate", "angles", "rates", "work", "angle_uncertainty", "
 
 
 def freeze(source: Path, target: Path, date: str) -> None:
-    """Angles, rates, uncertainty and growth of every reference in `source` into `target`, atomically.
+    """Angles, rates, uncertainty and growth of every reference in `source` into `target`, atomically; their digests too.
 
     Tip and energies follow from angles and rates. The work is kept only where it does not. Raises StoreError.
     """
@@ -29,3 +30,4 @@ def freeze(source: Path, target: Path, date: str) -> None:
             facts = {name: reference.attributes[name] for name in kept}
             made = f"heyoka {results.attributes['heyoka']}, {date}"
             hdf5.put_attributes(group, {**facts, "frozen_with": made})
+    write_digests(target)

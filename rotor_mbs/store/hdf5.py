@@ -140,3 +140,14 @@ def copy_group(source: Any, target: Any) -> None:
 
 def is_group(item: Any) -> bool:
     return isinstance(item, h5py.Group)
+
+
+def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Quantity) -> Any:
+    """A dataset to be filled slice by slice: chunked by its first dimension where it has others. Scales as in `put`."""
+    chunks = (1, *shape[1:]) if len(shape) > 1 else None
+    dataset = group.create_dataset(name, shape, kind, chunks=chunks)
+    dataset.attrs["units"] = quantity.units
+    dataset.attrs["long_name"] = quantity.long_name
+    for axis, dimension in enumerate(quantity.dimensions):
+        dataset.dims[axis].attach_scale(group[dimension])
+    return dataset

@@ -17,7 +17,7 @@ CONVENTIONS = "CF-1.11"
 REFERENCE = "reference"
 
 # Groups at the top that are not scenes: no scene may take such a name.
-RESERVED = ("bench", "errata")
+RESERVED = ("bench", "errata", "stability")
 
 
 class Quantity(NamedTuple):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.store import hdf5, layout
+from rotor_mbs.store.bench import GROUP, leaves
 from rotor_mbs.store.read import open_results
 
 
@@ -16,7 +17,8 @@ def merge(path: Path, sources: Sequence[Path], versions: Mapping[str, str]) -> N
 
     A later run takes the place of an earlier one of the same scene and method. Runs of a scene whose numbers have
     changed since (another scene_hash than in the last source that has it) belong to another machine and are left
-    out. Groups that are not scenes (bench, errata) come from the last source that has them. Raises StoreError.
+    out. The same holds for the curves of a bench; other groups that are not scenes come from the last source that has
+    them. Raises StoreError.
     """
     runs, others = _plan(sources)
     with hdf5.new_file(path) as file:
@@ -28,6 +30,10 @@ def merge(path: Path, sources: Sequence[Path], versions: Mapping[str, str]) -> N
         for name, source in others.items():
             with open_results(source) as results:
                 hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
+        for source, names in _by_source(_plan_bench(sources)).items():
+            with open_results(source) as results:
+                for name in names:
+                    hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
 
 
 def _plan(sources: Iterable[Path]) -> tuple[dict[str, dict[str, Path]], dict[str, Path]]:
@@ -36,13 +42,26 @@ def _plan(sources: Iterable[Path]) -> tuple[dict[str, dict[str, Path]], dict[str
     others: dict[str, Path] = {}
     for source in sources:
         with open_results(source) as results:
-            others |= {name: source for name in layout.RESERVED if name in results.root}
+            others |= {name: source for name in layout.RESERVED if name in results.root and name != GROUP}
             for scene in results.scenes.values():
                 number = scene.attributes["scene_hash"]
                 known, runs = latest.get(scene.name, (number, {}))
                 kept = runs if known == number else {}
                 latest[scene.name] = (number, {**kept, **dict.fromkeys(scene.runs, source)})
     return {name: runs for name, (_, runs) in latest.items()}, others
+
+
+def _plan_bench(sources: Iterable[Path]) -> dict[str, Path]:
+    """Path of every curve in the file -> the source to take it from."""
+    latest: dict[str, tuple[str, dict[str, Path]]] = {}
+    for source in sources:
+        with open_results(source) as results:
+            for name, curve in leaves(results.root[GROUP]) if GROUP in results.root else ():
+                scene = name.rsplit("/", 2)[0]
+                number = str(curve.attrs.get("scene_hash", ""))
+                known, curves = latest.get(scene, (number, {}))
+                latest[scene] = (number, {**(curves if known == number else {}), f"{GROUP}/{name}": source})
+    return {name: source for _, curves in latest.values() for name, source in curves.items()}
 
 
 def _by_source(runs: Mapping[str, Path]) -> dict[Path, list[str]]:

@@ -71,14 +71,16 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
     springs = sum(
         0.5 * k * angle**2 for k, angle in zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False)
     )
-    kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None else 0.0
-    work = float(np.abs(run.work).max()) if run.work is not None else 0.0
+    kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0
+    work = float(np.abs(run.work).max(initial=0.0)) if run.work is not None else 0.0
     return weights + springs + kinetic + work
 
 
 def compare(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
     """The metrics stored with a run, by the names of the file format; those that do not exist are left out."""
     metrics: Metrics = {}
+    if not len(run.time):
+        return metrics
     energy = energy_error(run)
     if energy is not None:
         scale = energy_scale(scene, run)

@@ -42,13 +42,17 @@ class Trajectory:
 
 @dataclass(slots=True)
 class Integration:
-    """One integration as the engine tells it. A word, not a verdict: see `outcome`."""
+    """One integration as the engine tells it. A word, not a verdict: see `outcome`.
+
+    out_of_time: it was ended by its time limit; what it reached is kept.
+    """
 
     success: bool
     message: str = ""
     time_reached: float = 0.0
     steps: int | None = None
     rhs_evaluations: int | None = None
+    out_of_time: bool = False
 
 
 @dataclass(frozen=True, slots=True)

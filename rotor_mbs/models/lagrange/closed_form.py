@@ -36,29 +36,34 @@ def accelerations(
     moment = torque - form.shaft_damping * spin
     for weight, cos_phase, sin_phase in form.held:
         moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
-    free, ratios = [], []
+    # s and c stand outside: an integrator that works with series pays for every product of two of them.
+    pitches = []
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
         s, c = sin(theta), cos(theta)
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
-        half_slope = blade.half_slope_sc * (s * c) + blade.half_slope_cs * (c * c - s * s)  # ½ ∂a/∂θ
-        coupling_slope = blade.coupling_s * c - blade.coupling_c * s  # ∂b/∂θ
+        s_turn, c_turn = s * (spin * spin), c * (spin * spin)
         ratio = blade.ratio_s * s + blade.ratio_c * c  # b / Jzz
-        lever = blade.lever_ss * (s * s) + blade.lever_cc * (c * c) + blade.lever_sc * (s * c)
-        pitch_moment = half_slope * (spin * spin) - blade.stiffness * theta - blade.damping * rate
+        resistance = blade.stiffness * theta + blade.damping * rate
+        # ½ ∂a/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
+        on_s = blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
+        on_c = blade.half_slope_cs * c_turn - blade.weight_y * sin_phi
+        pitches.append((s, c, on_s, on_c, resistance))
+        # The rotor's moment, pitch eliminated; ½ ∂a/∂θ times drag: Coriolis, and b / Jzz times what turns the pitch.
+        drag = 2.0 * (spin * rate) + (blade.ratio_s * s_turn + blade.ratio_c * c_turn)
+        lever = blade.lever_cc * c + blade.lever_sc * s
+        rotor_c = blade.weight_x * cos_phi + sin_phi * lever - blade.coupling_s * (rate * rate)
+        rotor_c = rotor_c - blade.half_slope_sc * (s * drag) - blade.half_slope_cs * (c * drag)
+        rotor_s = blade.lever_ss * (s * sin_phi) - blade.weight_y * cos_phi + blade.coupling_c * (rate * rate)
+        rotor_s = rotor_s + blade.half_slope_cs * (s * drag)
+        moment = moment + (c * rotor_c + s * rotor_s) + ratio * resistance
         schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
-        moment = (
-            moment
-            + cos_phi * (blade.weight_x * c - blade.weight_y * s)
-            + sin_phi * lever
-            - rate * (2.0 * half_slope * spin + coupling_slope * rate)
-            - ratio * pitch_moment
-        )
-        gravity = sin_phi * (blade.weight_x * s + blade.weight_y * c)
-        free.append((pitch_moment - gravity) / blade.pitch_inertia)
-        ratios.append(ratio)
     rotor = moment / schur
-    return [rotor, *(alone - ratio * rotor for alone, ratio in zip(free, ratios, strict=True))]
+    found = [rotor]
+    for blade, (s, c, on_s, on_c, resistance) in zip(form.blades, pitches, strict=True):
+        driven = s * (on_s - blade.coupling_s * rotor) + c * (on_c - blade.coupling_c * rotor)
+        found.append((driven - resistance) / blade.pitch_inertia)
+    return found
 
 
 def power(rates: Sequence[Number], form: RotorForm, torque: Number) -> Number:

@@ -34,6 +34,11 @@ def is_available() -> bool:
     return True
 
 
+def compile_anew() -> None:
+    """From now on no compiled code is taken from, or left in, the engine's cache on disk: for timing a cold start."""
+    heyoka().llvm_state.set_diskcache_enabled(False)
+
+
 class Parameters:
     """Turns numbers into runtime parameters: equal ones share a parameter, exact zeros vanish from the equations.
 

@@ -4,29 +4,36 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotor_mbs.models import deadline
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange.plain import Advance, Integrator, RightHandSide
 from rotor_mbs.trajectory.record import Array
 
 
 def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: float) -> Integrator:
-    """solve_ivp's method `name`, samples by its own interpolant."""
-    from scipy.integrate import solve_ivp
+    """SciPy's solver `name`, step by step, samples by its own interpolant; asks for the time limit between steps."""
+    import scipy.integrate
+
+    solver_type = getattr(scipy.integrate, name)
 
     def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
-        with np.errstate(all="ignore"):
-            result = solve_ivp(
-                function,
-                (start, end),
-                state,
-                name,
-                dense_output=True,
-                rtol=relative_tolerance,
-                atol=absolute_tolerance,
-            )
-            states = result.sol(times[times <= result.t[-1]]).T
-        message = "" if result.success else f"SciPy: {result.message}"
-        return Advance(states, result.y[:, -1], len(result.t) - 1, result.nfev, message)
+        rows, steps, message = [np.empty((0, len(state)))], 0, ""
+        with np.errstate(all="ignore"), deadline.polled():
+            solver = solver_type(function, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
+            done = 0
+            while solver.status == "running" and not message:
+                said = solver.step()
+                if solver.status == "failed":
+                    message = f"SciPy: {said}"
+                    break
+                steps += 1
+                reached = int(np.searchsorted(times, solver.t, side="right"))
+                if reached > done:
+                    rows.append(solver.dense_output()(times[done:reached]).T)
+                    done = reached
+                if deadline.is_over():
+                    message = deadline.words()
+        return Advance(np.concatenate(rows), solver.y, steps, solver.nfev, message)
 
     return advance
 

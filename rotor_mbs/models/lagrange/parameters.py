@@ -7,6 +7,7 @@ Knows the scene only; no integrator.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -119,12 +120,14 @@ def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Frac
     )
 
 
+@functools.lru_cache(maxsize=256)
 def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
     """ss, cc, sc of a(θ) = Jxx s² + Jyy c² + 2 Jxy s c: the blade's inertia about the shaft."""
     xx, yy, _, xy, _, _ = _inertia_about_hub(blade)
     return xx, yy, 2 * xy
 
 
+@functools.lru_cache(maxsize=256)  # the blades of a rotor are mostly equal, and so are the machines of a sweep
 def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
     """schur_ss ... lever_sc of BladeForm, in its order."""
     xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
@@ -148,6 +151,7 @@ def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
     ]
 
 
+@functools.lru_cache(maxsize=4096)
 def _cosine_of_turn(turn: Fraction) -> Fraction:
     """cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))

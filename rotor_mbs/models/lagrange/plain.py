@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rotor_mbs.models import deadline
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
 from rotor_mbs.models.lagrange.torque import Stretch, stretches
@@ -67,7 +68,7 @@ class PlainSolver:
         finite = np.isfinite(states).all(axis=1)
         self._states = states[: len(finite) if finite.all() else int(np.argmin(finite))]
         reached = float(self._times[max(len(self._states) - 1, 0)])
-        return Integration(not message, message, reached, steps, evaluations)
+        return Integration(not message, message, reached, steps, evaluations, message == deadline.words())
 
     def observe(self) -> Trajectory:
         return samples.trajectory(self._scene, self._times[: len(self._states)], self._states, self._moving)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -31,7 +32,7 @@ class ReferenceSolver:
     def integrate(self) -> Integration:
         best, check = (run.run() for run in self._runs)
         self._rows = min(len(run.states) for run in self._runs)
-        return best if not best.success else Integration(check.success, check.message, best.time_reached, best.steps)
+        return best if not best.success else replace(check, time_reached=best.time_reached, steps=best.steps)
 
     def observe(self) -> Trajectory:
         best, check = (run.states[: self._rows] for run in self._runs)
@@ -76,8 +77,8 @@ def _quad_propagation(scene: Scene, system: System, tolerance: float) -> Propaga
 def error_growth(scene: Scene) -> Array:
     """(samples,) How many times a small error of the initial state may have grown by each sample, at most.
 
-    The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the variational
-    equations of the closed form; infinite once it is past what double precision can hold.
+    The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the
+    variational equations of the closed form; infinite once it is past what double precision can hold.
     """
     engine = heyoka()
     system = build_system(scene)

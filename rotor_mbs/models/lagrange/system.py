@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.models import deadline
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import rotor_form
@@ -102,19 +103,27 @@ class Propagation:
         integrator.state[:] = self._initial
         rows = [self._initial[None, :]]
         steps, message = 0, ""
+        # Asked after every step, it costs a quarter of the run: only where there is a limit.
+        callback = _within_time if deadline.is_set() else None
         for stretch in self._stretches:
             if len(self._stretches) > 1:
                 integrator.pars[self._torque :] = stretch.torque
-            outcome, _, _, taken, _, states = integrator.propagate_grid(stretch.grid)
+            with deadline.polled():
+                outcome, _, _, taken, _, states = integrator.propagate_grid(stretch.grid, callback=callback)
             steps += taken
             rows.append(states[1 : 1 + stretch.samples])
-            message = failure(outcome)
+            message = deadline.words() if deadline.is_over() else failure(outcome)
             if message:
                 break
         states = np.concatenate(rows)
-        finite = np.isfinite(states.astype(float)).all(axis=1)
-        self.states = states[: len(finite) if finite.all() else int(np.argmin(finite))]
-        return Integration(not message, message, float(self._times[max(len(self.states) - 1, 0)]), steps)
+        finite = np.isfinite(states.astype(float))
+        self.states = states if finite.all() else states[: int(np.argmin(finite.all(axis=1)))]
+        reached = float(self._times[max(len(self.states) - 1, 0)])
+        return Integration(not message, message, reached, steps, out_of_time=message == deadline.words())
+
+
+def _within_time(_integrator: Any) -> bool:
+    return not deadline.is_over()
 
 
 class _StretchGrid:

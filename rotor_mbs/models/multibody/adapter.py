@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.models.deadline import OutOfTimeError
+from rotor_mbs.models.deadline import words as out_of_time
 from rotor_mbs.models.multibody.blueprint import Frame, Part, Ref
 from rotor_mbs.models.multibody.schemes import Scheme
 from rotor_mbs.models.multibody.timetable import Leg, steps_and_rows
@@ -111,8 +113,10 @@ class System:
                 return ""
             reason = ""
         except (_engine.ExudynError, RuntimeError, SystemError, _StuckError) as exc:
-            if _caused_by_interrupt(exc):
+            if _caused_by(exc, KeyboardInterrupt):
                 raise KeyboardInterrupt from exc
+            if _caused_by(exc, OutOfTimeError):
+                return out_of_time()
             reason = _one_line(str(exc))
         return reason or _one_line(solver.GetErrorString()) or "the engine gave no reason"
 
@@ -173,12 +177,13 @@ def _count(total: Integration, scheme: Scheme, leg: Leg, it: Any, failure: str) 
     evaluations = tried * scheme.stages if scheme.stages else it.newtonStepsCount + steps
     total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
     total.success, total.message = not failure, failure
+    total.out_of_time = failure == out_of_time()
     total.time_reached = max(leg.start, it.currentTime - it.currentStepSize) if failure else leg.end
 
 
-def _caused_by_interrupt(exc: BaseException | None) -> bool:
+def _caused_by(exc: BaseException | None, kind: type[BaseException]) -> bool:
     while exc is not None:
-        if isinstance(exc, KeyboardInterrupt):
+        if isinstance(exc, kind):
             return True
         exc = exc.__cause__ or exc.__context__
     return False
@@ -204,4 +209,3 @@ _TRANSLATIONS: dict[str, Callable[[Any], object]] = {
     "jointOffsets": _engine.Vector3DList,
     "linkCOMs": _engine.Vector3DList,
 }
-

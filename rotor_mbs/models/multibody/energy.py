@@ -52,7 +52,7 @@ def work_needs_rows(scene: Scene) -> bool:
 def work(scene: Scene, pieces: Sequence[Piece], time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the rotor torque less what the dampers took, from rows of time s, angles rad, rates rad/s."""
     if not work_needs_rows(scene):
-        exact: Array = scene.torque_at(0.0) * (angles[:, 0] - angles[0, 0])
+        exact: Array = scene.torque_at(0.0) * (angles[:, 0] - angles[:1, 0])
         return exact
     losses = _losses(scene, rates)
     out, done = np.zeros(len(time)), 0.0

@@ -26,6 +26,8 @@ def distinct_rows(scene: Scene, time: Array) -> Indices:
 
 def finite_rows(*tables: Array) -> int:
     """How many rows from the first are finite in every table."""
+    if not len(tables[0]):
+        return 0
     finite = np.ones(len(tables[0]), dtype=bool)
     for table in tables:
         finite &= np.isfinite(table.reshape(len(table), -1)).all(axis=1)

@@ -1,0 +1,58 @@
+"""Exact solutions of scenes that have one: the oracle that no model had a hand in. Knows scenes, not results."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.trajectory.record import Array
+
+
+def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
+    """(name, (n,) rad) of the rotor's angle where every pitch stays at zero; None where no exact solution is known.
+
+    One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal blades in balance:
+    gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I).
+    """
+    if not _stays_at_zero_pitch(scene):
+        return None
+    if len(scene.blades) == 1:
+        return _pendulum(scene, time)
+    if any(blade != scene.blades[0] for blade in scene.blades) or not scene.has_constant_torque:
+        return None
+    inertia = scene.hub_inertia + sum(_about_shaft(blade) for blade in scene.blades)
+    torque = scene.torque_at(0.0)
+    angle = scene.initial_angles[0] + scene.initial_rates[0] * time + torque * time**2 / (2.0 * inertia)
+    return ("constant torque" if torque else "uniform rotation" if scene.initial_rates[0] else "rest"), angle
+
+
+def _stays_at_zero_pitch(scene: Scene) -> bool:
+    """Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor."""
+    mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
+    at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
+    return mirrored and at_zero and scene.shaft_damping == 0.0
+
+
+def _about_shaft(blade: Blade) -> float:
+    """kg m²: about the y axis through the hub centre, at zero pitch."""
+    x, _, z = blade.centre_of_mass
+    return blade.inertia[1] + blade.mass * (x * x + z * z)
+
+
+def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
+    from scipy.special import ellipj, ellipk
+
+    blade = scene.blades[0]
+    x, _, z = blade.centre_of_mass
+    arm, lead = math.hypot(x, z), math.atan2(x, z)
+    if scene.has_torque or scene.initial_rates[0] or not scene.gravity or not arm:
+        return None
+    frequency = math.sqrt(blade.mass * scene.gravity * arm / (scene.hub_inertia + _about_shaft(blade)))
+    amplitude = math.pi - (scene.initial_angles[0] + lead)  # from straight down
+    if not -math.pi < amplitude < math.pi:
+        return None
+    modulus = math.sin(amplitude / 2.0)
+    sn = ellipj(ellipk(modulus**2) - frequency * time, modulus**2)[0]
+    return "pendulum", math.pi - 2.0 * np.arcsin(modulus * sn) - lead

@@ -1,0 +1,89 @@
+"""Which method to take for a scene where none is named, and why, in one line. Knows scenes and names; no engine.
+
+The rule is drawn from the stability suite (`rotor-mbs stability`): what holds on which family of scenes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.scenario.scene import Scene
+
+# More than this many radians of the fastest swing, or decay times, in a run: explicit fixed steps at their default
+# lose their digits or the run; the adaptive Taylor method and implicit steps remain.
+_STIFF_STEPS = 100.0
+# A swing this much faster than a default step of the explicit methods (6.7e-4 s) can follow to its digits, rad/s.
+_FASTEST_SWING = 150.0
+# A decay rate, 1/s, times the run, beyond which stability alone, not accuracy, sets an explicit step.
+_DECAYS = 1e4
+
+
+@dataclass(frozen=True)
+class Choice:
+    """methods: in order, the first is the recommended one; reason: one line."""
+
+    methods: tuple[str, ...]
+    reason: str
+
+
+def choose(scene: Scene, defaults: tuple[str, ...]) -> Choice:
+    """The methods for `scene`. Raises MethodRefusal, with the reason, where no motion exists to be followed."""
+    reason = singular_reason(scene)
+    if reason:
+        raise MethodRefusal(f"{scene.name}: refused: {reason}; name a method with -m to see what it makes of it")
+    closed_form = next((name for name in defaults if name.startswith("lagrange")), "lagrange/dop853")
+    swing, decay = fastest_rates(scene)
+    if decay * scene.duration > _DECAYS and decay > 10.0 * swing:
+        methods = (closed_form, "lagrange/radau", "exudyn_chain/generalized_alpha")
+        return Choice(
+            methods, f"overdamped, fastest decay {decay:.2g} /s: implicit methods, and {closed_form} for digits"
+        )
+    if swing > _FASTEST_SWING and swing * scene.duration > _STIFF_STEPS:
+        adaptive = (closed_form, "exudyn_tree/dopri5")
+        return Choice(adaptive, f"stiff, fastest swing {swing:.2g} rad/s: methods that choose their own step")
+    return Choice(defaults, "neither stiff nor singular: the default set, best of each model")
+
+
+def fastest_rates(scene: Scene) -> tuple[float, float]:
+    """(rad/s, 1/s): fastest swing of a pitch (spring, gravity, turning rotor) and fastest decay by a damper."""
+    swing = abs(scene.initial_rates[0])
+    decay = scene.shaft_damping / _rotor_inertia(scene) if scene.shaft_damping else 0.0
+    for i, blade in enumerate(scene.blades):
+        if not blade.has_pitch_inertia:
+            continue
+        x, y, _ = blade.centre_of_mass
+        inertia = blade.inertia[2] + blade.mass * (x * x + y * y)
+        stiffness = scene.bearing_stiffness[i] if scene.bearing_stiffness else 0.0
+        damping = scene.bearing_damping[i] if scene.bearing_damping else 0.0
+        moment = stiffness + blade.mass * scene.gravity * math.hypot(x, y)
+        swing = max(swing, math.sqrt(moment / inertia), abs(scene.initial_rates[1 + i]))
+        decay = max(decay, damping / inertia)
+    return swing, decay
+
+
+def _rotor_inertia(scene: Scene) -> float:
+    arms = (blade.mass * sum(r * r for r in blade.centre_of_mass) for blade in scene.blades)
+    return scene.hub_inertia + sum(arms)
+
+
+def singular_reason(scene: Scene) -> str:
+    """Why the mass matrix is, or must become, singular; "" where it need not. Point-mass blades on a massless hub."""
+    if scene.hub_inertia or not all(blade.is_point_mass and blade.has_pitch_inertia for blade in scene.blades):
+        return ""
+    if all(abs(math.cos(angle)) < 1e-15 for angle in scene.initial_angles[1:]):
+        return "every blade stands at a pitch of ±π/2 on a massless hub: the mass matrix is singular at the start"
+    if len(scene.blades) == 1 and _leaves_zero_pitch(scene):
+        return (
+            "one point-mass blade on a massless hub: its mass matrix is singular at a pitch of ±π/2, where the motion "
+            "ends; give the hub some inertia"
+        )
+    return ""
+
+
+def _leaves_zero_pitch(scene: Scene) -> bool:
+    """Whether the pitch moves, and no spring holds it short of a right angle."""
+    _, y, _ = scene.blades[0].centre_of_mass
+    still = y == 0.0 and scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0
+    return not still and not any(scene.bearing_stiffness)

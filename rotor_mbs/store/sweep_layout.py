@@ -1,0 +1,91 @@
+"""What a sweep keeps of a run, as one row of fixed size, and the names and units of the columns. Knows no file library.
+
+run                  scale; `parameters` (run, parameter), `variant`, `method`, `split` beside it
+status, steps ...    (run) metrics
+angles ...           (run, time, coordinate) trajectories, as asked for; NaN after a run broke off
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.layout import QUANTITIES, SCALES, Quantity
+from rotor_mbs.trajectory.outcome import STATUSES
+
+SWEEP_STATUSES = (*STATUSES, "worker_died")
+MESSAGE_BYTES = 200
+
+METRICS = {
+    "status": Quantity(("run",), "1", "how the run ended"),
+    "steps": Quantity(("run",), "1", "integration steps, -1 where not known"),
+    "rhs_evaluations": Quantity(("run",), "1", "evaluations of the right-hand side, -1 where not known"),
+    "time_reached": Quantity(("run",), "s", "time of the last finite sample"),
+    "energy_drift_max": Quantity(("run",), "1", "largest energy error of the run, of its energy scale"),
+    "rotor_angle_max": Quantity(("run",), "rad", "largest rotor angle, either way"),
+    "rotor_rate_max": Quantity(("run",), "rad/s", "largest rotor rate, either way"),
+    "pitch_max": Quantity(("run",), "rad", "largest pitch angle of any blade, either way"),
+}
+_INTEGERS = {"status": "i1", "steps": "<i8", "rhs_evaluations": "<i8"}
+
+COLUMNS = {
+    "run": Quantity(("run",), "1", "run number, from 0"),
+    "parameter": Quantity(("parameter",), "1", "number of the parameter; its key in the labels"),
+    "parameters": Quantity(("run", "parameter"), "1", "the varied numbers; keys and units in the attributes"),
+    "variant": Quantity(("run",), "1", "row of the design, the same for every method"),
+    "method": Quantity(("run",), "1", "by which method"),
+    "split": Quantity(("run",), "1", "for training or for validation"),
+}
+
+_OF_OUTPUT = {
+    "angles": ("angles",),
+    "rates": ("rates",),
+    "tip": ("tip",),
+    "energy": ("kinetic_energy", "potential_energy", "work", "energy_error"),
+}
+
+
+def trajectories(outputs: Sequence[str]) -> dict[str, Quantity]:
+    """The datasets that `outputs` ask for, with a run in front of their dimensions."""
+    names = [name for output in outputs for name in _OF_OUTPUT[output]]
+    return {name: QUANTITIES[name]._replace(dimensions=("run", *QUANTITIES[name].dimensions)) for name in names}
+
+
+def scales(scene: Scene, outputs: Sequence[str]) -> dict[str, tuple[np.ndarray, Quantity]]:
+    """The scales that the trajectories need, with their values."""
+    blades = len(scene.blades)
+    values = {
+        "time": np.linspace(0.0, scene.duration, scene.samples),
+        "coordinate": np.arange(1 + blades),
+        "blade": np.arange(1, 1 + blades),
+        "axis": np.arange(3),
+    }
+    used = {name for quantity in trajectories(outputs).values() for name in quantity.dimensions}
+    return {name: (value, SCALES[name]) for name, value in values.items() if name in used}
+
+
+def row_type(scene: Scene, outputs: Sequence[str], precision: str) -> np.dtype[np.void]:
+    """One run: its metrics, its message, its trajectories in `precision`."""
+    lengths = {name: len(values) for name, (values, _) in scales(scene, outputs).items()}
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int, ...]]] = [
+        (name, _INTEGERS.get(name, "<f8")) for name in METRICS
+    ]
+    fields.append(("message", f"S{MESSAGE_BYTES}"))
+    kind = {"float64": "<f8", "float32": "<f4"}[precision]
+    fields += [
+        (name, kind, tuple(lengths[dimension] for dimension in quantity.dimensions[1:]))
+        for name, quantity in trajectories(outputs).items()
+    ]
+    return np.dtype(fields)
+
+
+def empty_rows(count: int, row: np.dtype[np.void]) -> np.ndarray:
+    """Rows of runs of which nothing is known yet: NaN, -1 and no text."""
+    rows = np.zeros(count, row)
+    for name in row.names or ():
+        if row[name].base.kind == "f":
+            rows[name] = np.nan
+    rows["steps"], rows["rhs_evaluations"] = -1, -1
+    return rows

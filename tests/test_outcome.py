@@ -1,0 +1,217 @@
+"""The classification: every bound where it stands, and every false success of an engine that was seen, caught.
+
+The bounds are written down here a second time: one that is widened tenfold in the code fails its test here.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import paper
+from test_stability_exact import reference, run, scene
+
+from rotor_mbs.models.base import solve
+from rotor_mbs.models.deadline import OutOfTimeError, time_limit
+from rotor_mbs.models.registry import METHOD_NAMES, find_method
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.trajectory.outcome import energy_conditioning, is_held, judge
+from rotor_mbs.trajectory.record import Integration, Run, Trajectory
+
+BOUNDS = {
+    "lagrange/taylor": (1e-12, 1e-11),
+    "lagrange/dop853": (1e-12, 1e-11),
+    "lagrange/ode45": (1e-4, 1e-4),
+    "lagrange/radau": (1e-8, 1e-7),
+    "exudyn_tree/rk44": (1e-8, 1e-8),
+    "exudyn_tree/rk67": (1e-11, 1e-10),
+    "exudyn_tree/dopri5": (1e-10, 1e-9),
+    "exudyn_tree/generalized_alpha": (1e-5, 1e-5),
+    "exudyn_chain/generalized_alpha": (5e-6, 1e-5),
+    "exudyn_chain/newmark_index2": (5e-6, 1e-5),
+}
+GAPS = {"exudyn_chain/generalized_alpha": 1e-7, "exudyn_chain/newmark_index2": 1e-5}  # of the longest arm
+
+
+def made(
+    method: str, *, angle: float = 0.0, energy: float = 0.0, gap: float | None = None
+) -> tuple[Scene, Run, Trajectory]:
+    """A run with errors of exactly these sizes: rad per unit of growth, of the energy scale, of the longest arm."""
+    one = paper("fig05", duration=1.0, samples=11)
+    time = np.linspace(0.0, 1.0, 11)
+    angles = np.tile(one.initial_angles, (11, 1))
+    rates = np.zeros_like(angles)
+    exact = Trajectory(time, angles, rates, growth=np.ones(11))
+    potential = np.zeros(11)
+    weights = sum(b.mass * one.gravity * float(np.linalg.norm(b.centre_of_mass)) for b in one.blades)
+    potential[5] = energy * weights
+    off = angles.copy()
+    off[:, 0] += angle
+    arm = float(np.linalg.norm(one.blades[0].centre_of_mass))
+    gaps = None if gap is None else np.full(11, gap * arm)
+    trajectory = Trajectory(time, off, rates, None, np.zeros(11), potential, np.zeros(11), constraint_error=gaps)
+    return one, Run(method, trajectory, Integration(True, "", 1.0), {}, 0.0, [0.0], 0.0), exact
+
+
+def test_every_held_method_has_its_bounds_here() -> None:
+    assert set(BOUNDS) == {name for name in METHOD_NAMES if is_held(name)}
+
+
+@pytest.mark.parametrize("method", BOUNDS)
+def test_the_bounds_are_where_they_are_said_to_be(method: str) -> None:
+    angle, energy = BOUNDS[method]
+    assert judge(*made(method, angle=0.5 * angle, energy=0.5 * energy)).status == "ok"
+    assert judge(*made(method, angle=2.0 * angle)).status == "inaccurate"
+    assert judge(*made(method, energy=2.0 * energy)).status == "inaccurate"
+
+
+@pytest.mark.parametrize("method", GAPS)
+def test_an_open_joint_is_caught(method: str) -> None:
+    assert judge(*made(method, gap=0.5 * GAPS[method])).status == "ok"
+    assert judge(*made(method, gap=2.0 * GAPS[method])).status == "inaccurate"
+
+
+def test_the_energy_bound_opens_only_near_a_quarter_turn() -> None:
+    """1/√share: a hub of h on one blade leaves h / (h + m d²) where the blade passes π/2."""
+    for hub, name in ((1e3, "1e3"), (1e-6, "1e-6")):
+        one = scene(f"extreme/passage-{name}")
+        blade = one.blades[0]
+        share = hub / (hub + blade.mass * blade.centre_of_mass[2] ** 2)
+        assert energy_conditioning(one, reference(one.name)) == pytest.approx(np.sqrt(1e-3 / share), rel=1e-3)
+    assert energy_conditioning(paper("fig05"), made("lagrange/taylor")[1].trajectory) == 1.0
+
+
+def test_an_unstable_step_is_caught() -> None:
+    """RK44 at ωh = 3.2 (six steps between two samples), beyond 2.83."""
+    one = scene("stiff/bearing-1e8")
+    verdict = judge(one, run(one, "exudyn_tree/rk44", step=0.02 / 6), reference(one.name))
+    assert verdict.status in ("diverged", "inaccurate")
+    assert verdict.false_success
+
+
+def wrong(one: Scene, method: str, exact: Trajectory | None = None, **settings: object) -> None:
+    """The engine reports success; the judgement must not."""
+    found = solve(method, find_method(method), one, settings)
+    assert found.integration.success
+    verdict = judge(one, found, exact)
+    assert verdict.status != "ok"
+    assert verdict.false_success
+
+
+def test_rk44_on_a_bearing_of_1e12() -> None:
+    wrong(scene("stiff/bearing-1e12"), "exudyn_tree/rk44")
+
+
+def test_rk44_with_a_rate_of_1e200() -> None:
+    wrong(scene("extreme/rate-1e200"), "exudyn_tree/rk44")
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-10])
+def test_dopri5_with_equal_tolerances_at_rates_of_minus_one(tolerance: float) -> None:
+    """Its error scale, absolute + relative · rate, vanishes at -1."""
+    one = replace(scene("extreme/rates-minus-one"), samples=2)
+    whole = reference(one.name)
+    ends = Trajectory(whole.time[[0, -1]], whole.angles[[0, -1]], whole.rates[[0, -1]], growth=np.ones(2))
+    ends = replace_growth(ends, whole)
+    method = "exudyn_tree/dopri5"
+    found = solve(method, find_method(method), one, {"absolute_tolerance": tolerance, "relative_tolerance": tolerance})
+    verdict = judge(one, found, ends)
+    assert verdict.status != "ok"
+    assert found.integration.success is False or verdict.false_success or verdict.status == "inaccurate"
+
+
+def replace_growth(ends: Trajectory, whole: Trajectory) -> Trajectory:
+    assert whole.growth is not None
+    ends.growth = whole.growth[[0, -1]]
+    return ends
+
+
+def test_a_stiffness_that_is_no_number() -> None:
+    wrong(replace(scene("stiff/bearing-1e6"), bearing_stiffness=(np.nan, 0.0, 0.0)), "exudyn_tree/rk44")
+
+
+def test_an_initial_angle_that_is_no_number() -> None:
+    wrong(replace(paper("fig05"), initial_angles=(np.nan, 0.0, 0.0, 0.0)), "exudyn_tree/rk44")
+
+
+def test_an_end_before_the_end() -> None:
+    """A solver stopped by its own time-out returned True: what counts is the last sample."""
+    one, found, exact = made("exudyn_tree/rk67")
+    part = found.trajectory
+    for name in ("time", "angles", "rates", "kinetic_energy", "potential_energy", "work"):
+        setattr(part, name, getattr(part, name)[:-3])
+    verdict = judge(one, found, exact)
+    assert (verdict.status, verdict.false_success) == ("diverged", True)
+
+
+def test_a_body_that_falls_free_of_its_joints() -> None:
+    """Without constraints the engine returned True: the joints open by metres."""
+    verdict = judge(*made("exudyn_chain/generalized_alpha", gap=0.1))
+    assert verdict.status == "inaccurate"
+
+
+def test_rk44_through_the_singular_pitch() -> None:
+    wrong(scene("extreme/singular-one-blade"), "exudyn_tree/rk44", reference("extreme/singular-one-blade"))
+
+
+def test_nobody_gets_through_a_singularity() -> None:
+    """One blade without hub inertia: whatever a method makes of it, it is not ok; the implicit ones step over it."""
+    one = scene("extreme/singular-one-blade")
+    exact = reference(one.name)
+    assert len(exact.time) < one.samples
+    for method in BOUNDS:
+        if method == "exudyn_tree/dopri5":  # has its own test: it does not end
+            continue
+        with time_limit(20.0):
+            found = run(one, method)
+        assert judge(one, found, exact).status not in ("ok", "inaccurate"), method
+
+
+def test_a_start_without_inertia_is_singular_for_all() -> None:
+    one = scene("extreme/singular-start")
+    for method in ("lagrange/taylor", "exudyn_tree/rk67"):
+        assert judge(one, run(one, method), reference(one.name)).status == "singular"
+
+
+@pytest.mark.parametrize("method", ["exudyn_tree/rk44", "exudyn_tree/generalized_alpha"])
+def test_steps_too_long_for_the_motion(method: str) -> None:
+    """Ten steps a second, and a single one: True with NaN or with angles of a million."""
+    for step, samples in ((0.1, 101), (10.0, 2)):
+        one = paper("fig11", samples=samples)
+        found = solve(method, find_method(method), one, {"step": step})
+        verdict = judge(one, found, None)
+        assert verdict.status != "ok"
+        # A tenth of a second costs RK44 digits (energy off by a percent); ten seconds leave nothing of the motion.
+        assert step < 1.0 or verdict.false_success or not found.integration.success
+
+
+def test_a_run_that_hangs_is_ended_with_what_it_reached() -> None:
+    """DOPRI5 at the singular pitch repeats its smallest step for ever, if nobody counts."""
+    one = scene("extreme/singular-one-blade")
+    with time_limit(1.0):
+        found = run(one, "exudyn_tree/dopri5", trial_steps=10**9)
+    assert found.integration.out_of_time
+    verdict = judge(one, found, reference(one.name))
+    assert verdict.status == "timed_out"
+    assert 1 < len(found.trajectory.time) < one.samples
+
+
+@pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853", "exudyn_tree/rk67"])
+def test_a_long_run_keeps_its_samples_when_ended(method: str) -> None:
+    one = replace(scene("extreme/pendulum-million"), duration=5e5, samples=200_001)
+    found_method = find_method(method)
+    solver = found_method.build(one, found_method.DEFAULTS)
+    with time_limit(1.0):
+        integration = solver.integrate()
+    assert integration.out_of_time
+    assert not integration.success
+    trajectory = solver.observe()
+    assert 1 < len(trajectory.time) < one.samples
+    assert np.isfinite(trajectory.angles).all()
+
+
+def test_the_limit_reaches_plain_python() -> None:
+    with pytest.raises(OutOfTimeError), time_limit(0.05):
+        time.sleep(5.0)
