@@ -1,0 +1,130 @@
+"""What a diagram of error against run time says in numbers: Pareto front, time to an accuracy, orders, growth of cost.
+
+Knows curves as arrays; no words and no picture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.store.bench import Curve
+
+Array = NDArray[np.float64]
+
+TARGETS_RAD = (1e-3, 1e-6, 1e-9)
+
+# Below this many roundings of a double of order one an error of exactly zero is drawn and interpolated.
+SMALLEST_ERROR = 1e-17
+# A curve turns into its round-off floor gradually: errors within this factor of the floor carry no order.
+_ABOVE_FLOOR = 20.0
+# Above this error a step is too coarse for its order to show.
+_ASYMPTOTIC_RAD = 0.05
+_FITTED = 4  # points, the finest ones above the floor
+
+
+@dataclass(frozen=True)
+class Reach:
+    """When a curve reaches an error: s of run time, and how many times the fastest curve's."""
+
+    seconds: float
+    ratio: float
+
+
+def succeeded(curve: Curve) -> NDArray[np.bool_]:
+    """(settings,) Which points stand on the curve: run to the end, and not useless."""
+    ok = np.array([status == "ok" for status in curve.statuses])
+    known: NDArray[np.bool_] = np.isfinite(curve.arrays["angle_error_max"]) & np.isfinite(curve.arrays["run_time_s"])
+    return ok & known
+
+
+def failed(curve: Curve) -> NDArray[np.bool_]:
+    """(settings,) Which points are failures: run, and neither on the curve nor left out by the budget."""
+    failures: NDArray[np.bool_] = ~succeeded(curve)
+    failures[[status == "left_out" for status in curve.statuses]] = False
+    return failures
+
+
+def points(curve: Curve, *, with_setup: bool = False) -> tuple[Array, Array]:
+    """(errors in rad, times in s) of the points on the curve; with_setup: what one run costs, building included."""
+    chosen = succeeded(curve)
+    seconds = curve.arrays["run_time_s"][chosen]
+    if with_setup:
+        seconds = seconds + curve.arrays["setup_time_s"][chosen] + curve.arrays["output_time_s"][chosen]
+    return np.maximum(curve.arrays["angle_error_max"][chosen], SMALLEST_ERROR), seconds
+
+
+def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
+    """Indices of the points that no other beats in both, by rising time: errors fall strictly."""
+    front: list[int] = []
+    for i in np.lexsort((errors, seconds)):
+        if not front or errors[i] < errors[front[-1]]:
+            front.append(int(i))
+    return np.array(front, dtype=np.intp)
+
+
+def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
+    """s, on the front, straight in the logarithms between two points; None where no point is as accurate.
+
+    Where already the fastest point is more accurate than asked for, its time: the curve does not say how much less
+    would do.
+    """
+    front = pareto(errors, seconds)
+    if not len(front) or errors[front[-1]] > target:
+        return None
+    e, t = np.log(errors[front]), np.log(seconds[front])
+    return float(np.exp(np.interp(-math.log(target), -e, t)))
+
+
+def reaches(curves: Sequence[Curve], *, with_setup: bool = False) -> dict[str, dict[float, Reach | None]]:
+    """By curve and target."""
+    found: dict[str, dict[float, Reach | None]] = {curve.name: {} for curve in curves}
+    for target in TARGETS_RAD:
+        times = {curve.name: time_to_reach(*points(curve, with_setup=with_setup), target) for curve in curves}
+        fastest = min((time for time in times.values() if time is not None), default=math.inf)
+        for name, time in times.items():
+            found[name][target] = None if time is None else Reach(time, time / fastest)
+    return found
+
+
+def fitted_order(steps: Array, errors: Array) -> float | None:
+    """Slope of log error over log step on the finest points above the round-off floor; None with fewer than two.
+
+    steps     coarse to fine, s
+    errors    rad, > 0
+    """
+    usable = errors < _ASYMPTOTIC_RAD
+    h, e = steps[usable], errors[usable]
+    if len(e) < 2:
+        return None
+    if _reaches_floor(h, e):
+        above = e > _ABOVE_FLOOR * e.min()
+        h, e = h[above], e[above]
+    h, e = h[-_FITTED:], e[-_FITTED:]
+    return float(np.polyfit(np.log(h), np.log(e), 1)[0]) if len(e) >= 2 else None
+
+
+def _reaches_floor(steps: Array, errors: Array) -> bool:
+    """Whether the errors stop falling: an earlier one is the smallest, or the last slope is clearly below the usual."""
+    slopes = np.diff(np.log(errors)) / np.diff(np.log(steps))
+    return int(np.argmin(errors)) < len(errors) - 1 or bool(slopes[-1] < 0.75 * np.median(slopes))
+
+
+def growth_exponent(sizes: Array, seconds: Array) -> float | None:
+    """p of seconds ∝ size^p over the larger half of the sizes, where what is constant has faded; None below two."""
+    start = min(len(sizes) // 2, max(len(sizes) - 3, 0))
+    if len(sizes) < 2:
+        return None
+    return float(np.polyfit(np.log(sizes[start:]), np.log(seconds[start:]), 1)[0])
+
+
+def by_scene(curves: Sequence[Curve]) -> Mapping[str, list[Curve]]:
+    """The curves of each scene, in order."""
+    found: dict[str, list[Curve]] = {}
+    for curve in curves:
+        found.setdefault(curve.scene, []).append(curve)
+    return found

@@ -1,0 +1,119 @@
+"""The diagram of error against run time: curves, front, whiskers, failure rail. Knows no file and no page.
+
+Error on the horizontal axis, falling to the right, so that accuracy grows to the right; time on the vertical one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rotor_mbs.analysis.work_precision import failed, pareto, points, succeeded
+from rotor_mbs.report import bench_texts as texts
+from rotor_mbs.report import canvas
+from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.names import GREY, Look
+from rotor_mbs.report.numbers import power
+from rotor_mbs.store.bench import Curve
+
+FRONT_COLOUR = "#c8c8c8"
+_LOWEST_ERROR, _RAIL_START, _RAIL, _RAIL_END = 1e-16, 3.0, 20.0, 120.0
+
+# Colour and mark tell the method; the line tells its choices.
+_LOOKS = {
+    "lagrange/taylor": ("#0072b2", "o"),
+    "lagrange/dop853": ("#0072b2", "D"),
+    "lagrange/ode45": ("#56b4e9", "v"),
+    "lagrange/radau": ("#56b4e9", "*"),
+    "exudyn_tree/rk67": ("#d55e00", "s"),
+    "exudyn_tree/rk44": ("#e69f00", "P"),
+    "exudyn_tree/dopri5": ("#d55e00", "v"),
+    "exudyn_tree/generalized_alpha": ("#e69f00", "^"),
+    "exudyn_chain/generalized_alpha": ("#009e73", "^"),
+    "exudyn_chain/newmark_index2": ("#cc79a7", "D"),
+}
+_LINES = ("-", "--", "-.", ":")
+
+
+class _Drawn(NamedTuple):
+    errors: Any
+    seconds: Any
+
+
+def look(curve: Curve) -> Look:
+    method = str(curve.attributes["method"])
+    colour, marker = _LOOKS.get(method, (GREY, "o"))
+    choices = curve.name.removeprefix(method)
+    line = ("rho0.7" in choices) + 2 * ("rho1.0" in choices)
+    return Look(colour, _LINES[3 if "rotation" in choices else line], marker)
+
+
+def diagram(curves: Sequence[Curve], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
+    """All curves of a scene; `small` for one of many side by side: front and curves alone."""
+    picture = canvas.panels((height,), texts.ERROR_AXIS)
+    axes = picture.axes[0]
+    drawn = [_Drawn(*points(curve, with_setup=with_setup)) for curve in curves]
+    _front(axes, drawn)
+    for curve, one in zip(curves, drawn, strict=True):
+        style = look(curve)
+        axes.plot(
+            np.maximum(one.errors, _LOWEST_ERROR), one.seconds, color=style.colour, linestyle=style.line,
+            marker=style.marker, markersize=3.0 if small else 4.2, markerfacecolor="white", linewidth=1.0,
+        )  # fmt: skip
+        if not with_setup and not small:
+            _whiskers(axes, curve, style)
+        _rail(axes, curve, style, with_setup)
+    _axes(axes, drawn, curves)
+    axes.set_ylabel(texts.SETUP_TIME_AXIS if with_setup else texts.TIME_AXIS)
+    return picture
+
+
+def has_visible_floor(curves: Sequence[Curve]) -> bool:
+    """Whether the reference's uncertainty lies within the diagram: in quad precision it is far beyond its edge."""
+    return _uncertainty(curves) > _LOWEST_ERROR
+
+
+def _uncertainty(curves: Sequence[Curve]) -> float:
+    return max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
+
+
+def _front(axes: Any, drawn: Sequence[_Drawn]) -> None:
+    errors = np.concatenate([one.errors for one in drawn] or [np.empty(0)])
+    seconds = np.concatenate([one.seconds for one in drawn] or [np.empty(0)])
+    chosen = pareto(errors, seconds)
+    best = np.maximum(errors[chosen], _LOWEST_ERROR)
+    axes.plot(best, seconds[chosen], color=FRONT_COLOUR, linewidth=6.0, solid_capstyle="round", zorder=0.5)
+
+
+def _whiskers(axes: Any, curve: Curve, style: Look) -> None:
+    chosen = succeeded(curve)
+    errors = np.maximum(curve.arrays["angle_error_max"][chosen], _LOWEST_ERROR)
+    low, high = curve.arrays["run_time_q1_s"][chosen], curve.arrays["run_time_q3_s"][chosen]
+    axes.vlines(errors, low, high, color=style.colour, linewidth=2.2, alpha=0.6)
+
+
+def _rail(axes: Any, curve: Curve, style: Look, with_setup: bool) -> None:
+    chosen = failed(curve)
+    seconds = curve.arrays["run_time_s"][chosen]
+    if with_setup:
+        seconds = seconds + np.nan_to_num(curve.arrays["setup_time_s"][chosen])
+    axes.plot(np.full(len(seconds), _RAIL), seconds, linestyle="none", marker="x", markersize=4.0, color=style.colour)
+
+
+def _axes(axes: Any, drawn: Sequence[_Drawn], curves: Sequence[Curve]) -> None:
+    if has_visible_floor(curves):
+        axes.axvspan(_LOWEST_ERROR / 10.0, _uncertainty(curves), color=GREY, alpha=0.2, linewidth=0)
+    axes.axvspan(_RAIL_START, _RAIL_END, color="#f2e3de", linewidth=0, zorder=0)
+    axes.set_xscale("log")
+    axes.set_xlim(_RAIL_END, _LOWEST_ERROR / 2.0)
+    exponents = range(-3, -17, -3)
+    axes.set_xticks([_RAIL, *(10.0**e for e in exponents)], [texts.RAIL, *(power(e) for e in exponents)])
+    axes.set_xticks([], minor=True)
+    times = [*(one.seconds for one in drawn), *(curve.arrays["run_time_s"][failed(curve)] for curve in curves)]
+    known = np.concatenate([np.ravel(time) for time in times] or [np.empty(0)])
+    known = known[np.isfinite(known) & (known > 0.0)]
+    low, high = (known.min(), known.max()) if len(known) else (1e-3, 1.0)
+    canvas.log_axis(axes, 10.0 ** math.floor(math.log10(low)), high)

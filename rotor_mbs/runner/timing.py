@@ -1,0 +1,140 @@
+"""Fair timing: warm-ups, then rounds over all points in turn, as many as a budget allows. Knows no engine, no process.
+
+A point is one method at one setting. Rounds spread a drift of the machine over all points alike; the budget is shared
+out so that the cheap points get all their repeats before a dear one gets its second.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+
+T = TypeVar("T", bound=Hashable)
+
+LONG_RUN_S = 0.5  # runs longer than this are repeated LONG_REPEATS times at most
+LONG_REPEATS = 5
+# Of the budget, what the warm-up runs may take before dear rungs are left out, so that there is time for about two
+# rounds; and what warm-ups and building may take together.
+_WARM_UP_SHARE, _BUILD_SHARE = 0.3, 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Warm:
+    """A warm-up: seconds it took; whether it came back at all, so that it can be repeated."""
+
+    seconds: float
+    returned: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Of run times in s."""
+
+    minimum: float
+    lower_quartile: float
+    median: float
+    upper_quartile: float
+    repeats: int
+
+
+@dataclass
+class Timings(Generic[T]):
+    """What `conduct` found: run times in s by point, warm-ups by point, points that the budget left out."""
+
+    times: dict[T, list[float]] = field(default_factory=dict)
+    warm: dict[T, Warm] = field(default_factory=dict)
+    left_out: dict[T, str] = field(default_factory=dict)
+
+
+def statistics(times: Sequence[float]) -> Statistics:
+    """Quartiles by linear interpolation between the order statistics. Raises ValueError where there is no time."""
+    if not times:
+        raise ValueError("no run was timed")
+    low, middle, high = np.quantile(times, (0.25, 0.5, 0.75))
+    return Statistics(min(times), float(low), float(middle), float(high), len(times))
+
+
+def conduct(
+    ladders: Sequence[Sequence[T]],
+    warm_up: Callable[[T], Warm],
+    repeat: Callable[[T], float],
+    budget_s: float,
+    repeats: int,
+    clock: Callable[[], float],
+) -> Timings[T]:
+    """Warms up every point, the cheapest next rung of any ladder first, then times them in rounds.
+
+    ladders     each coarse to fine
+    warm_up     builds the point and runs it once
+    repeat      runs it once more: seconds
+    budget_s    for all of it, on `clock` (s)
+    """
+    found: Timings[T] = Timings()
+    start = clock()
+
+    def left() -> float:
+        running = sum(warm.seconds for warm in found.warm.values())
+        return min(_WARM_UP_SHARE * budget_s - running, _BUILD_SHARE * budget_s - (clock() - start))
+
+    _warm_all(found, ladders, warm_up, left)
+    alive = {point: max(warm.seconds, 1e-9) for point, warm in found.warm.items() if warm.returned}
+    few = min(repeats, LONG_REPEATS)
+    wanted = {point: repeats if seconds <= LONG_RUN_S else few for point, seconds in alive.items()}
+    allowed = allot(alive, wanted, budget_s - (clock() - start))
+    found.times = {point: [] for point in alive}
+    for round_ in range(max(allowed.values(), default=0)):
+        for point, count in allowed.items():
+            if round_ and clock() - start > budget_s:  # the machine has become slower
+                return found
+            if round_ < count:
+                found.times[point].append(repeat(point))
+    return found
+
+
+def _warm_all(
+    found: Timings[T], ladders: Sequence[Sequence[T]], warm_up: Callable[[T], Warm], left_s: Callable[[], float]
+) -> None:
+    """The rung expected to be cheapest comes next. What is left over when even that one does not fit is left out."""
+    waiting = [(0.0, 0, number) for number, ladder in enumerate(ladders) if ladder]
+    while waiting:
+        expected, rung, number = heapq.heappop(waiting)
+        ladder = ladders[number]
+        if rung and expected > left_s():
+            reason = f"not run: about {expected:.2g} s more were not in the budget"
+            found.left_out.update(dict.fromkeys(ladder[rung:], reason))
+            continue
+        found.warm[ladder[rung]] = warm_up(ladder[rung])
+        if rung + 1 < len(ladder):
+            following = _expected([found.warm[point] for point in ladder[: rung + 1]])
+            heapq.heappush(waiting, (following, rung + 1, number))
+
+
+def _expected(earlier: Sequence[Warm]) -> float:
+    """Of the next rung, in s: the last one's time, grown as from the one before it, at least doubled."""
+    growth = earlier[-1].seconds / earlier[-2].seconds if len(earlier) > 1 and earlier[-2].seconds > 0.0 else 2.0
+    return earlier[-1].seconds * min(max(growth, 2.0), 10.0)
+
+
+def allot(seconds: Mapping[T, float], wanted: Mapping[T, int], budget_s: float) -> dict[T, int]:
+    """Repeats of each point: all it wants or what an equal share of time allows, and one in any case.
+
+    The share is the largest with which the sum stays within the budget: what cheap points leave goes to dear ones.
+    """
+
+    def counts(share: float) -> dict[T, int]:
+        return {point: max(1, min(wanted[point], int(share / one))) for point, one in seconds.items()}
+
+    def cost(share: float) -> float:
+        return sum(count * seconds[point] for point, count in counts(share).items())
+
+    low, high = 0.0, max((wanted[point] * one for point, one in seconds.items()), default=0.0) * (1.0 + 1e-12)
+    if cost(high) <= budget_s:
+        return counts(high)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if cost(middle) <= budget_s else (low, middle)
+    return counts(low)

@@ -1,0 +1,200 @@
+"""What a diagram says in numbers, against values by hand: front, interpolation, orders, exponents, failure rail."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rotor_mbs.analysis.work_precision import (
+    failed,
+    fitted_order,
+    growth_exponent,
+    pareto,
+    reaches,
+    succeeded,
+    time_to_reach,
+)
+from rotor_mbs.report.bench_build import write_bench_report
+from rotor_mbs.report.bench_figures import diagram
+from rotor_mbs.report.bench_tables import csv_text, failure_table, reach_table, summary
+from rotor_mbs.store.bench import STATUSES, Curve, read_curves, write_curves
+from rotor_mbs.store.merge import merge
+
+
+def curve(
+    name: str, errors: list[float], seconds: list[float], statuses: list[str] | None = None, **attributes: object
+) -> Curve:
+    n = len(errors)
+    statuses = statuses or ["ok"] * n
+    arrays: dict[str, NDArray[np.generic]] = {
+        "setting": 0.1 * 0.5 ** np.arange(n),
+        "angle_error_max": np.array(errors),
+        "run_time_s": np.array(seconds),
+        "status": np.array([STATUSES.index(status) for status in statuses]),
+        "false_success": np.array([int(status == "inaccurate") for status in statuses]),
+        "repeats": np.full(n, 20),
+        "steps": np.full(n, 100),
+    }
+    for other in ("angle_error_end", "tip_error_max", "energy_drift_max"):
+        arrays[other] = np.array(errors)
+    for other in ("run_time_min_s", "run_time_q1_s", "run_time_q3_s"):
+        arrays[other] = np.array(seconds)
+    for other in ("setup_time_s", "setup_again_time_s", "output_time_s"):
+        arrays[other] = np.full(n, 0.5)
+    facts = {
+        "method": name, "setting_kind": "step", "horizon_s": 6.0, "duration_s": 10.0, "uncertainty_rad": 1e-15,
+        "samples": 101, "budget_s": 28.0, "load_before": 0.1, "pinned_core": 1, "messages": [""] * n, "scene_hash": "1",
+    }  # fmt: skip
+    return Curve("paper/fig09", name, arrays, {**facts, **attributes})
+
+
+FAST = curve("lagrange/taylor", [1e-2, 1e-6, 1e-10], [1e-3, 2e-3, 4e-3])
+SLOW = curve(
+    "exudyn_tree/rk67",
+    [np.nan, 1e-2, 1e-4, 1e-4, 3.0],
+    [7e-3, 1e-2, 1e-1, 2e-1, 5e-1],
+    ["timed_out", "ok", "ok", "left_out", "inaccurate"],
+    messages=["ended after 10 s", "", "", "not run", "as large as the motion"],
+    order=5.9,
+    order_expected=6.0,
+)
+
+
+def test_the_front_keeps_what_nothing_else_beats() -> None:
+    errors, seconds = np.array([1e-2, 1e-4, 1e-3, 1e-6]), np.array([1.0, 2.0, 3.0, 4.0])
+    assert pareto(errors, seconds).tolist() == [0, 1, 3]
+    assert pareto(np.array([1e-3, 1e-3]), np.array([2.0, 1.0])).tolist() == [1]
+    assert pareto(np.empty(0), np.empty(0)).tolist() == []
+
+
+def test_time_to_reach_is_straight_in_the_logarithms() -> None:
+    """Half way between 1e-2 and 1e-6 (in decades) lies 1e-4; between 1 s and 100 s, 10 s."""
+    errors, seconds = np.array([1e-2, 1e-6]), np.array([1.0, 100.0])
+    assert time_to_reach(errors, seconds, 1e-4) == pytest.approx(10.0)
+    assert time_to_reach(errors, seconds, 1e-6) == pytest.approx(100.0)
+    assert time_to_reach(errors, seconds, 1e-7) is None
+    assert time_to_reach(errors, seconds, 1e-1) == pytest.approx(1.0)
+    assert time_to_reach(np.empty(0), np.empty(0), 1e-3) is None
+
+
+def test_a_dear_point_that_is_less_accurate_does_not_bend_the_curve() -> None:
+    errors, seconds = np.array([1e-2, 1e-1, 1e-6]), np.array([1.0, 50.0, 100.0])
+    assert time_to_reach(errors, seconds, 1e-4) == pytest.approx(10.0)
+
+
+def test_ratios_are_to_the_fastest() -> None:
+    """1e-3 lies a quarter of the way from 1e-2 to 1e-6, and half way from 1e-2 to 1e-4."""
+    found = reaches([FAST, SLOW])
+    fast, slow = found["lagrange/taylor"][1e-3], found["exudyn_tree/rk67"][1e-3]
+    assert fast is not None
+    assert slow is not None
+    assert fast.seconds == pytest.approx(1e-3 * 2**0.25)
+    assert slow.seconds == pytest.approx(1e-2 * 10**0.5)
+    assert (fast.ratio, slow.ratio) == (1.0, pytest.approx(slow.seconds / fast.seconds))
+    assert found["exudyn_tree/rk67"][1e-6] is None
+
+
+def test_a_method_made_twice_slower_moves_up_and_nowhere_else() -> None:
+    slower = curve("lagrange/taylor", [1e-2, 1e-6, 1e-10], [2e-3, 4e-3, 8e-3])
+    for target in (1e-3, 1e-6, 1e-9):
+        before, after = (reaches([one])["lagrange/taylor"][target] for one in (FAST, slower))
+        assert before is not None
+        assert after is not None
+        assert after.seconds == pytest.approx(2.0 * before.seconds)
+
+
+@pytest.mark.parametrize("order", [2, 4, 6])
+def test_orders_are_fitted_above_the_floor(order: int) -> None:
+    steps = 0.1 * 0.5 ** np.arange(10)
+    floor = 1e-14
+    errors = np.maximum((steps / 0.2) ** order, floor * (1.0 + 0.3 * np.arange(10)))
+    assert fitted_order(steps, errors) == pytest.approx(order, abs=0.02)
+    assert fitted_order(steps[:1], errors[:1]) is None
+    assert fitted_order(steps, np.full(10, 1.0)) is None
+
+
+def test_growth_exponent_of_the_larger_sizes() -> None:
+    """3 + n²/100: the constant hides the square at small n, and not at large n."""
+    sizes = np.array([1.0, 2.0, 3.0, 100.0, 200.0, 400.0])
+    assert growth_exponent(sizes, 3.0 + sizes**2 / 100.0) == pytest.approx(2.0, abs=0.05)
+    assert growth_exponent(sizes[:1], sizes[:1]) is None
+
+
+def test_failures_are_points_and_none_is_dropped() -> None:
+    assert succeeded(SLOW).tolist() == [False, True, True, False, False]
+    assert failed(SLOW).tolist() == [True, False, False, False, True]
+    lines = {tuple(line.get_ydata()) for line in diagram([SLOW]).axes[0].lines if line.get_marker() == "x"}
+    assert lines == {(7e-3, 5e-1)}
+    told = [[cell.text for cell in row] for row in failure_table([FAST, SLOW]).rows]
+    assert [row[-1] for row in told] == ["ended after 10 s", "not run", "as large as the motion"]
+    assert [row[4] for row in told] == ["", "", "yes"]
+
+
+def test_the_diagram_draws_what_was_measured() -> None:
+    axes = diagram([FAST, SLOW]).axes[0]
+    drawn = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
+    assert drawn == [[[1e-2, 1e-3], [1e-6, 2e-3], [1e-10, 4e-3]]]
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert axes.get_xlim()[0] > axes.get_xlim()[1]  # falling to the right
+    with_setup = diagram([FAST], with_setup=True).axes[0]
+    drawn = [line.get_ydata().tolist() for line in with_setup.lines if line.get_marker() == "o"]
+    assert drawn == [[1.001, 1.002, 1.004]]
+
+
+def test_words_and_tables_come_from_the_numbers() -> None:
+    words = [sentence.replace("\N{NO-BREAK SPACE}", " ") for sentence in summary("paper/fig09", [FAST, SLOW])]
+    assert words[2] == "paper/fig09, 1×10⁻⁹ rad: closed form, Taylor 3.4 ms."
+    assert "Exudyn tree, RK67 32 ms (27 times)" in words[0]
+    cells = [cell.text.replace("\N{NO-BREAK SPACE}", " ") for cell in reach_table([FAST, SLOW]).rows[1]]
+    assert cells == ["Exudyn tree, RK67", "31.6 ms", "–", "–"]
+
+
+def test_csv_has_every_point_unrounded() -> None:
+    rows = list(csv.DictReader(io.StringIO(csv_text([FAST, SLOW]))))
+    assert len(rows) == 8
+    assert float(rows[1]["angle_error_max"]) == 1e-6
+    assert [row["status"] for row in rows[3:]] == ["timed_out", "ok", "ok", "left_out", "inaccurate"]
+
+
+def test_curves_survive_storing_and_merging_bit_by_bit(tmp_path: Path) -> None:
+    write_curves(tmp_path / "a.h5", [FAST, SLOW])
+    newer = curve("exudyn_tree/rk67", [1e-3], [5.0])
+    write_curves(tmp_path / "b.h5", [newer])
+    merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
+    merge(tmp_path / "all.h5", [tmp_path / "all.h5"], {})
+    found = {one.name: one for one in read_curves(tmp_path / "all.h5")}
+    assert set(found) == {"lagrange/taylor", "exudyn_tree/rk67"}
+    for name, values in FAST.arrays.items():
+        np.testing.assert_array_equal(found["lagrange/taylor"].arrays[name], values)
+    assert found["exudyn_tree/rk67"].arrays["run_time_s"].tolist() == [5.0]
+    with h5py.File(tmp_path / "all.h5") as file:
+        status = file["bench/paper/fig09/lagrange/taylor/status"]
+        assert status.dims[0][0].name.endswith("/setting")
+        assert status.attrs["flag_meanings"].split() == list(STATUSES)
+        assert status.attrs["flag_values"].tolist() == list(range(len(STATUSES)))
+
+
+def test_curves_of_a_scene_with_other_numbers_are_dropped(tmp_path: Path) -> None:
+    write_curves(tmp_path / "a.h5", [FAST, SLOW])
+    write_curves(tmp_path / "b.h5", [curve("exudyn_tree/rk67", [1e-3], [5.0], scene_hash="2")])
+    merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
+    assert [one.name for one in read_curves(tmp_path / "all.h5")] == ["exudyn_tree/rk67"]
+
+
+def test_pages_and_csv_are_written(tmp_path: Path) -> None:
+    write_curves(tmp_path / "a.h5", [FAST, SLOW])
+    index = write_bench_report(tmp_path / "a.h5", tmp_path / "report")
+    names = {path.name for path in index.parent.iterdir()}
+    assert names == {"index.html", "paper-fig09.html", "paper-fig09.csv", "bench.csv"}
+    page = (index.parent / "paper-fig09.html").read_text()
+    assert 'href="paper-fig09.csv"' in page
+    assert "ended after 10 s" in page
+    assert "horizon at 6.00" in page
+    assert page.count("<svg viewBox") >= 2
+    assert 'href="paper-fig09.html"' in index.read_text()
