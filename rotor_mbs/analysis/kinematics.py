@@ -1,0 +1,63 @@
+"""Tip paths and energies by plain rotation of the scene's bodies: worked out once more, so that no model is trusted.
+
+Knows scenes and samples; no results file, no model.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.trajectory.record import Array
+
+
+def tip_paths(scene: Scene, angles: Array) -> Array:
+    """(n, blades, 3) m, base frame, of (n, 1 + blades) rad."""
+    return np.stack([_turned(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)], axis=1)
+
+
+def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
+    """(n,) J: ½ m v² + ½ ω·I ω of every blade, v = ω × r and ω = q̇2 e_y + θ̇ e_z(blade), and of the hub."""
+    total = 0.5 * scene.hub_inertia * rates[:, 0] ** 2
+    for i, blade in enumerate(scene.blades):
+        frames = _frames(scene, angles, i)
+        omega = rates[:, 1 + i, None] * frames[:, :, 2]
+        omega[:, 1] += rates[:, 0]
+        velocity = np.cross(omega, _turned(frames, blade.centre_of_mass))
+        xx, yy, zz, xy, xz, yz = blade.inertia
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        own = np.einsum("nij,ni->nj", frames, omega)  # ω in the blade's frame
+        total = total + 0.5 * blade.mass * (velocity**2).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", own, tensor, own)
+    return total
+
+
+def potential_energy(scene: Scene, angles: Array) -> Array:
+    """(n,) J: of weights, zero at the shaft's height, and of bearing springs (a pitch that cannot move has none)."""
+    total = np.zeros(len(angles))
+    for i, blade in enumerate(scene.blades):
+        total += blade.mass * scene.gravity * _turned(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
+        if scene.bearing_stiffness and blade.has_pitch_inertia:
+            total += 0.5 * scene.bearing_stiffness[i] * angles[:, 1 + i] ** 2
+    return total
+
+
+def work_of_constant_torque(scene: Scene, angles: Array) -> Array | None:
+    """(n,) J; None where the torque changes or something damps: there the work is no function of the angles."""
+    if scene.has_damping or not scene.has_constant_torque:
+        return None
+    return scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
+
+
+def _frames(scene: Scene, angles: Array, blade: int) -> Array:
+    """(n, 3, 3) Ry(q2 + phase) Rz(θ): columns are the blade's axes in the base frame."""
+    azimuth, pitch = angles[:, 0] + scene.phases[blade], angles[:, 1 + blade]
+    s, c, sp, cp = np.sin(azimuth), np.cos(azimuth), np.sin(pitch), np.cos(pitch)
+    zero = np.zeros_like(s)
+    x_axis, y_axis, z_axis = (c * cp, sp, -s * cp), (-c * sp, cp, s * sp), (s, zero, c)
+    return np.stack([np.stack(axis, axis=1) for axis in (x_axis, y_axis, z_axis)], axis=2)
+
+
+def _turned(frames: Array, point: tuple[float, float, float]) -> Array:
+    """(n, 3) m."""
+    turned: Array = frames @ np.array(point)
+    return turned

@@ -1,0 +1,210 @@
+"""Verdicts on a results file: each a number against a bound, with what to look at. Reads the store alone.
+
+All is worked out anew from the stored samples; a metric or status in the file is something to check, not a source.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor_mbs.analysis import kinematics
+from rotor_mbs.analysis.bounds import Bounds
+from rotor_mbs.analysis.claims import claims
+from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.analysis.restore import Restored, restore
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.layout import REFERENCE
+from rotor_mbs.store.read import Results, StoredRun, StoredScene
+from rotor_mbs.trajectory.compare import compare, energy_scale
+from rotor_mbs.trajectory.outcome import energy_slack, is_held, judge
+from rotor_mbs.trajectory.record import Array, Run, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """`value` of `channel` against `bound`, both in `unit`; `look_at` says where a failure would come from."""
+
+    check: str
+    scene: str
+    method: str
+    channel: str
+    value: float
+    bound: float
+    unit: str
+    look_at: str
+
+    @property
+    def passed(self) -> bool:
+        return self.value <= self.bound  # False for NaN
+
+    @property
+    def margin(self) -> float:
+        """How many times the value would fit into the bound; infinite for a value of zero."""
+        if math.isnan(self.value):
+            return 0.0
+        return self.bound / self.value if self.value else math.inf
+
+
+def verdicts(results: Results, frozen: Sequence[Results], bounds: Bounds) -> list[Verdict]:
+    """Every verdict that the file allows, in the order of its scenes. `frozen`: the shipped references.
+
+    Raises InputError where a stored scene is none.
+    """
+    shipped = {name: scene.reference for file in frozen for name, scene in file.scenes.items()}
+    found: list[Verdict] = []
+    with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
+        for scene in results.scenes.values():
+            for run in scene.runs.values():
+                found += _of_run(run, bounds, restore(scene, run), _motion_ends(scene))
+            found += _of_reference(scene, shipped.get(scene.name), bounds)
+        found += _of_paper(results, bounds)
+    return found
+
+
+def _make(check: str, run: StoredRun, channel: str, value: float, bounds: Bounds, unit: str, look_at: str) -> Verdict:
+    """A verdict with the bound that counts for the run's method."""
+    bound = bounds.of(check, run.method).value
+    return Verdict(check, run.scene, run.method, channel, value, bound, unit, look_at)
+
+
+def _motion_ends(scene: StoredScene) -> bool:
+    """Whether the reference itself stops early: the motion does not exist beyond."""
+    reference = scene.reference
+    if reference is None or "time" not in reference:
+        return False
+    return reference.status == "singular"
+
+
+def _of_run(run: StoredRun, bounds: Bounds, restored: Restored, motion_ends: bool) -> Iterator[Verdict]:
+    """A run that stops early and says so is complete where nothing more was to be had of it."""
+    says_so = restored.run is not None and run.status not in ("ok", "inaccurate")
+    excused = says_so and (motion_ends or not is_held(run.method))
+    faults = [] if excused else restored.faults
+    look = "; ".join(faults) or "every channel, row and number is there"
+    if faults and run.status != "ok":
+        look += f"; stored as {run.status}: {run.attributes.get('message', '')}"
+    yield _make("complete", run, "all", float(len(faults)), bounds, "faults", look)
+    if restored.run is None:
+        return
+    yield _status(run, bounds, restored, restored.run)
+    if len(restored.run.trajectory.time):
+        yield from _of_samples(run, bounds, restored.scene, restored.run)
+        if is_held(run.method) and run.method != REFERENCE:
+            yield from _of_right_model(run, bounds, restored, restored.run.trajectory)
+
+
+def _status(run: StoredRun, bounds: Bounds, restored: Restored, recorded: Run) -> Verdict:
+    judged = judge(restored.scene, recorded, restored.reference)
+    claimed = bool(run.attributes.get("false_success", 0))
+    faults = (judged.status != run.status) + (judged.false_success != claimed)
+    look = f"stored {run.status}, its samples say {judged.status} {judged.message}".rstrip()
+    if judged.false_success != claimed:
+        look += "; the engine's claim of success is " + ("false" if judged.false_success else "not false")
+    return _make("status", run, "status", float(faults), bounds, "faults", look)
+
+
+def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Run) -> Iterator[Verdict]:
+    """What the samples say of each other, whatever equations moved them."""
+    trajectory = recorded.trajectory
+    times = np.linspace(0.0, scene.duration, scene.samples)[: len(trajectory.time)]
+    off = float(np.abs(trajectory.time - times).max()) / scene.duration
+    yield _make("times", run, "time", off, bounds, "of duration", "samples are equally spaced, both ends included")
+    if not scene.wants("angles"):
+        return
+    yield _make("start", run, "angles, rates", _start_off(scene, trajectory), bounds, "rad, rad/s", "the initial state")
+    if trajectory.tip is not None:
+        away = np.linalg.norm(trajectory.tip - kinematics.tip_paths(scene, trajectory.angles), axis=2).max()
+        length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
+        look = "the tip point, a phase, or the rotation of a blade"
+        yield _make("tip", run, "tip", float(away) / length, bounds, "of length", look)
+    if scene.wants("rates") and trajectory.kinetic_energy is not None:
+        for name, off in _energies_off(scene, trajectory).items():
+            look = "its own angles and rates give another energy: a mass, an inertia, a spring"
+            yield _make("energies", run, name, off, bounds, "of scale", look)
+
+
+def _start_off(scene: Scene, trajectory: Trajectory) -> float:
+    angles = np.abs(trajectory.angles[0] - scene.initial_angles)
+    # A pitch without inertia is held: its rate is zero, whatever the scene says.
+    given = [scene.initial_rates[0]] + [
+        rate if blade.has_pitch_inertia else 0.0
+        for rate, blade in zip(scene.initial_rates[1:], scene.blades, strict=True)
+    ]
+    rates = np.abs(trajectory.rates[0] - given) if scene.wants("rates") else np.zeros(1)
+    size = max(1.0, *map(abs, scene.initial_angles), *map(abs, given))
+    return max(float(angles.max()), float(rates.max())) / size
+
+
+def _energies_off(scene: Scene, trajectory: Trajectory) -> dict[str, float]:
+    angles, rates = trajectory.angles, trajectory.rates
+    kinetic = kinematics.kinetic_energy(scene, angles, rates)
+    formulas: dict[str, tuple[Array | None, Array | None]] = {
+        "kinetic energy": (trajectory.kinetic_energy, kinetic),
+        "potential energy": (trajectory.potential_energy, kinematics.potential_energy(scene, angles)),
+        "work": (trajectory.work, kinematics.work_of_constant_torque(scene, angles)),
+    }
+    scale = max(energy_scale(scene, trajectory), float(np.abs(kinetic).max())) or 1.0
+    return {
+        name: float(np.abs(stored - own).max()) / scale
+        for name, (stored, own) in formulas.items()
+        if stored is not None and own is not None
+    }
+
+
+def _of_right_model(run: StoredRun, bounds: Bounds, restored: Restored, trajectory: Trajectory) -> Iterator[Verdict]:
+    """What only a model that claims to be right is held to: the reference, the energy balance, exact solutions."""
+    scene = restored.scene
+    metrics = compare(scene, trajectory, restored.reference)
+    if scene.wants("angles") and "angle_error_per_growth" in metrics:
+        look = f"{metrics['angle_error_max']:.1e} rad up to {metrics['horizon_s']:.2f} s: a term, a parameter, the step"
+        yield _make("agreement", run, "angles", metrics["angle_error_per_growth"], bounds, "per growth", look)
+    if "energy_drift_max" in metrics:
+        drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
+        look = "a force without its potential, a wrong mass matrix, or too long a step"
+        yield _make("energy", run, "balance", drift, bounds, "of scale", look)
+    if trajectory.constraint_error is not None:
+        arm = max(math.hypot(*blade.centre_of_mass) for blade in scene.blades)
+        gap = metrics["constraint_error_max"] / arm
+        yield _make("gap", run, "joints", gap, bounds, "of arm", "a joint of the chain that is not held, or its marker")
+    exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
+    if exact is not None:
+        name, angle = exact
+        off = float(np.abs(trajectory.angles[:, 0] - angle).max())
+        yield _make("exact", run, "rotor angle", off, bounds, "rad", f"{name}, solved by hand")
+
+
+def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Verdict]:
+    """The reference in the file against the shipped one of the same scene; a file without one cannot be judged."""
+    stored = scene.reference
+    look = "a touched reference, or a changed scene or closed form"
+    if stored is None:
+        bound = bounds.of("reference", REFERENCE).value
+        look = "the file has no reference: nothing to hold the runs to"
+        yield Verdict("reference", scene.name, REFERENCE, "all", math.nan, bound, "rad", look)
+    elif shipped is not None:
+        for name in ("angles", "rates"):
+            if name in stored:
+                off = _distance(shipped.array(name), stored.array(name))
+                yield _make("reference", stored, name, off, bounds, "rad, rad/s", look)
+
+
+def _distance(first: Array, second: Array) -> float:
+    if first.shape != second.shape or second.dtype.kind != "f":
+        return math.nan
+    return float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max()) if first.size else 0.0
+
+
+def _of_paper(results: Results, bounds: Bounds) -> Iterator[Verdict]:
+    """The paper's numbers, in units of their last printed digit."""
+    for claim in claims(results.scenes):
+        item, value = claim.published, claim.printed.value
+        if item.of is None or value is None:
+            continue
+        off = abs(round(value, item.decimals) - item.value) * 10**item.decimals
+        bound = bounds.of("published", "printed/ode45").value
+        look = f"the paper prints {item.value}, the run gives {value:.6f}: the printed entries, g, ode45"
+        yield Verdict("published", item.of.scene, "printed/ode45", item.id, off, bound, "last digits", look)

@@ -1,0 +1,113 @@
+"""The printed equations against the paper's own derivation of them, and that one, mended, against the closed form.
+
+At random states: an identity holds for all of them or is none. Whether the print is right is not asked here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.printed import literal
+from rotor_mbs.models.printed.derivation import DerivedRotor
+from rotor_mbs.models.printed.entries import Entries, derived_entries, printed_entries, right_entries
+from rotor_mbs.models.printed.errata import random_states
+from rotor_mbs.models.printed.matrices import AS_PRINTED, MENDED, Errata
+from rotor_mbs.scenario.scene import Blade, Scene
+
+_SEED, _STATES = 2020, 5
+_TORQUE = 1.7  # N m, with masses and lengths of order one
+
+
+def differences() -> Iterator[tuple[str, float, str]]:
+    """(channel, largest relative difference, what to look at) of every identity."""
+    states = random_states(_SEED, _STATES)
+    pairs = [(printed_entries(s.names), derived_entries(s, AS_PRINTED)) for s in states]
+    yield "entries as printed", *_worst(pairs)
+    yield "entries mended", *_worst([(derived_entries(s, MENDED), right_entries(s)) for s in states])
+    for blades in (1, 3):
+        yield f"accelerations of {blades}", _accelerations(blades), "(33) or (39)-(56) against (24)-(38), errata in"
+        yield f"accelerations of {blades}, mended", _mended(blades), "(24)-(38) without errata against the closed form"
+    yield "held pitch", _held(), "(33) with c = 0 against the closed form"
+
+
+def _worst(pairs: list[tuple[Entries, Entries]]) -> tuple[float, str]:
+    worst, where = 0.0, "every entry is what it was derived to be"
+    for first, second in pairs:
+        for key in {**first, **second}:
+            a, b = float(first.get(key, 0.0)), float(second.get(key, 0.0))
+            off = abs(a - b) / max(1.0, abs(a), abs(b))
+            if not off <= worst:
+                worst, where = off, f"{key[0]} {key[1]}: {a:.9g} against {b:.9g}"
+    return worst, where
+
+
+def _random(blades: int) -> list[tuple[list[float], list[float], tuple[float, float, float, float]]]:
+    """(angles, rates, (m, c, d, g)) of order one."""
+    rng = np.random.default_rng(_SEED + blades)
+    return [
+        (
+            rng.uniform(-math.pi, math.pi, 1 + blades).tolist(),
+            rng.uniform(-2.0, 2.0, 1 + blades).tolist(),
+            tuple(rng.uniform(0.5, 2.0, 4).tolist()),
+        )
+        for _ in range(_STATES)
+    ]
+
+
+def _phases(blades: int) -> list[float]:
+    return [2.0 * math.pi * i / blades for i in range(blades)]
+
+
+def _accelerations(blades: int) -> float:
+    text = literal.one_blade_accelerations if blades == 1 else literal.three_blade_accelerations
+    worst = 0.0
+    for angles, rates, constants in _random(blades):
+        for gravity in (constants[3], 0.0):
+            own = (*constants[:3], gravity)
+            derived = DerivedRotor(*own, _phases(blades), AS_PRINTED).accelerations(_TORQUE, angles, rates)
+            worst = _larger(worst, _off(text(*own, _TORQUE, [*angles, *rates]), derived))
+    return worst
+
+
+def _mended(blades: int) -> float:
+    """Each erratum that changes nothing by itself is left in: E3 where E2 is mended."""
+    worst = 0.0
+    for angles, rates, (m, c, d, g) in _random(blades):
+        form = rotor_form(_scene(blades, m, c, d, g))
+        right = closed_form.accelerations(angles, rates, form, _TORQUE, math.sin, math.cos)
+        for errata in (MENDED, Errata(e1=False, e2=False, e3=True)):
+            derived = DerivedRotor(m, c, d, g, _phases(blades), errata).accelerations(_TORQUE, angles, rates)
+            worst = _larger(worst, _off(derived, right))
+    return worst
+
+
+def _held() -> float:
+    worst = 0.0
+    for angles, rates, (m, _, d, g) in _random(3):
+        for gravity in (g, 0.0):
+            form = rotor_form(_scene(1, m, 0.0, d, gravity))
+            right = closed_form.accelerations(angles[:1], rates[:1], form, _TORQUE, math.sin, math.cos)
+            found = literal.held_pitch_acceleration(m, d, gravity, _TORQUE, angles[0] - 0.7, [0.7])
+            worst = _larger(worst, _off([found], right))
+    return worst
+
+
+def _scene(blades: int, m: float, c: float, d: float, g: float) -> Scene:
+    blade = Blade(m, (c, 0.0, d), (0.0,) * 6, (c, 0.0, d))
+    zero = (0.0,) * (1 + blades)
+    return Scene("random", "", (), g, 1.0, 2, ("angles",), (blade,) * blades, 0.0, zero, zero)
+
+
+def _off(found: object, expected: object) -> float:
+    a, b = np.array(found, dtype=float), np.array(expected, dtype=float)
+    return float(np.abs(a - b).max() / max(1.0, float(np.abs(b).max())))
+
+
+def _larger(worst: float, off: float) -> float:
+    """The larger; not a number where either is none."""
+    return off if not off <= worst else worst

@@ -1,0 +1,94 @@
+"""Verdicts for a person, a script, a CI server and a pull request. Decides nothing.
+
+Names and messages come from files that anybody may have made: what is not printable is shown as an escape.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
+from rotor_mbs.analysis.verdicts import Verdict
+
+
+def line(verdict: Verdict) -> str:
+    """One line: outcome, what was checked where, the value, the bound, the margin, what to look at."""
+    word = "pass" if verdict.passed else "FAIL"
+    margin = "inf" if math.isinf(verdict.margin) else f"{verdict.margin:.3g}"
+    unit = f" {verdict.unit}" if verdict.unit else ""
+    return printable(
+        f"{word} {verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}: {verdict.value:.2e}, "
+        f"bound {verdict.bound:.2e}{unit}, margin {margin}; {verdict.look_at}"
+    )
+
+
+def github(verdict: Verdict) -> str:
+    """A workflow command that GitHub shows as an error annotation."""
+    title = f"rotor-mbs {verdict.check} {verdict.scene} {verdict.method}"
+    return f"::error title={_property(title)}::{_data(line(verdict))}"
+
+
+def _data(text: str) -> str:
+    """As GitHub's own toolkit escapes the text of a command."""
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    """As GitHub's own toolkit escapes a property of a command."""
+    return _data(printable(text)).replace(":", "%3A").replace(",", "%2C")
+
+
+def as_json(verdicts: Sequence[Verdict]) -> str:
+    """A list of objects; numbers that JSON cannot hold (NaN, infinity) become null."""
+    rows = [
+        {
+            "check": v.check,
+            "scene": v.scene,
+            "method": v.method,
+            "channel": v.channel,
+            "value": _number(v.value),
+            "bound": _number(v.bound),
+            "unit": v.unit,
+            "margin": _number(v.margin),
+            "passed": v.passed,
+            "look_at": v.look_at,
+        }
+        for v in verdicts
+    ]
+    return json.dumps(rows, indent=1)
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def junit(verdicts: Sequence[Verdict]) -> bytes:
+    """JUnit XML as GitHub's and GitLab's viewers read it: a suite per scene, a case per verdict."""
+    root = ElementTree.Element("testsuites", {"name": "rotor-mbs check", **_counts(verdicts)})
+    for scene in dict.fromkeys(v.scene for v in verdicts):
+        _add_suite(root, scene, [v for v in verdicts if v.scene == scene])
+    ElementTree.indent(root)
+    text: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text
+
+
+def _counts(verdicts: Sequence[Verdict]) -> dict[str, str]:
+    failed = sum(not verdict.passed for verdict in verdicts)
+    return {"tests": str(len(verdicts)), "failures": str(failed), "errors": "0"}
+
+
+def _add_suite(root: ElementTree.Element, scene: str, mine: Sequence[Verdict]) -> None:
+    suite = ElementTree.SubElement(root, "testsuite", {"name": printable(scene), **_counts(mine)})
+    for v in mine:
+        name, group = printable(f"{v.check} {v.method} {v.channel}"), printable(f"rotor_mbs.{scene}")
+        case = ElementTree.SubElement(suite, "testcase", classname=group, name=name, time="0")
+        if not v.passed:
+            failure = ElementTree.SubElement(case, "failure", message=line(v), type=v.check)
+            failure.text = line(v)
+
+
+def printable(text: str) -> str:
+    """One line with nothing in it that steers a terminal or that XML forbids: control characters, lone surrogates."""
+    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
