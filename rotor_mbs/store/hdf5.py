@@ -131,7 +131,8 @@ def copy_group(source: Any, target: Any) -> None:
     for name, item in datasets.items():
         for axis, dimension in enumerate(item.dims):
             if len(dimension):
-                target[name].dims[axis].attach_scale(target[dimension[0].name.rpartition("/")[2]])
+                # By the name that the scale itself tells: the library would look for its path through the whole file.
+                target[name].dims[axis].attach_scale(target[dimension.keys()[0]])
     target.attrs.update(source.attrs)
     for name, item in source.items():
         if is_group(item):

@@ -120,7 +120,7 @@ class Journal:
             mark, first, number, checksum = _RECORD.unpack(_read(self._file, end, _RECORD.size))
             length = number * self._row.itemsize
             start = first - self._first
-            fits = end + _RECORD.size + length <= size and 0 <= start and start + number <= len(self._places)
+            fits = end + _RECORD.size + length <= size and start >= 0 and start + number <= len(self._places)
             if mark != _MARK or not fits:
                 break
             rows = np.frombuffer(_read(self._file, end + _RECORD.size, length), self._row)

@@ -19,17 +19,25 @@ from rotor_mbs.store.sweep_file import Plan, identity_of, statuses_of, write_dat
 
 _MISSING = -1
 
+# The library keeps an index of a file's chunks in memory while it writes, 1.2 kB a run.
+_MOST_RUNS = 100_000
+
+
+def runs_per_file(file_bytes: int, row_bytes: int) -> int:
+    """As many as fit, one at least, and no more than can be written in bounded memory."""
+    return min(max(file_bytes // row_bytes, 1), _MOST_RUNS)
+
 
 class SweepStore:
     """The runs first ... last - 1 of a sweep under `output`; a context manager that holds its lock.
 
-    With more runs than fit into one file of `file_bytes`, the files are output-0001.h5, output-0002.h5, ...
+    More runs than fit into one file of `file_bytes` (100,000 at most) go to output-0001.h5, output-0002.h5, ...
     Raises InputError where the output is another's, StoreError where it cannot be read or written.
     """
 
     def __init__(self, output: Path, plan: Plan, first: int, last: int, file_bytes: int) -> None:
         self._output, self._plan, self._first, self._last = output, plan, first, last
-        self._per_file = max(file_bytes // plan.row.itemsize, 1)
+        self._per_file = runs_per_file(file_bytes, plan.row.itemsize)
         self._folder = output.with_name(output.name + ".parts")
         self._statuses = np.full(last - first, _MISSING, np.int8)
         self._journals: dict[int, Journal] = {}
@@ -80,6 +88,11 @@ class SweepStore:
                 self._note(first, rows)
             self._finish_if_complete(part)
 
+    def complete(self) -> None:
+        """Writes the files whose runs were all there already when this was opened. Raises StoreError."""
+        for part in list(self._journals):
+            self._finish_if_complete(part)
+
     def _part(self, run: int) -> int:
         return (run - self._first) // self._per_file
 
@@ -110,7 +123,6 @@ class SweepStore:
         elif self._journal_path(part).exists():
             for first, rows in self._journal(part).stored():
                 self._note(first, rows)
-            self._finish_if_complete(part)
 
     def _take_finished(self, path: Path, start: int, end: int) -> None:
         found = statuses_of(path) if identity_of(path) == self._plan.identity else np.empty(0, np.int8)

@@ -54,7 +54,7 @@ class _Machine:
 
 
 def lanes() -> int:
-    """Runs side by side: one vector register. Two registers are a fifth slower and take three times as long to compile."""
+    """Runs side by side: one vector register's. Two are a fifth slower, and take three times as long to compile."""
     return int(heyoka().recommended_simd_size())
 
 
@@ -63,7 +63,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
 
     Raises MethodRefusal where heyoka is not installed. A run that breaks off is in the result, cut and with its reason.
     """
-    machines = [_machine(_without_start(scene)) for scene in scenes]
+    machines = _machines(scenes)
     block = ensemble_samples.empty_block(scenes)
     for numbers in _groups(machines):
         group, first = [scenes[i] for i in numbers], machines[numbers[0]]
@@ -76,6 +76,19 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
         forms = [machines[i].form for i in numbers]
         ensemble_samples.put_states(block, numbers, group, forms, first.moving, states, words)
     return block
+
+
+def _machines(scenes: Sequence[Scene]) -> list[_Machine]:
+    """Of every scene; scenes that differ in their starts alone share one, and are seen to do so without much ado."""
+    found: dict[tuple[object, ...], _Machine] = {}
+    machines = []
+    for scene in scenes:
+        key = (id(scene.blades), scene.gravity, scene.hub_inertia, scene.rotor_torque,
+               scene.bearing_stiffness, scene.bearing_damping, scene.shaft_damping)  # fmt: skip
+        if key not in found:
+            found[key] = _machine(_without_start(scene))
+        machines.append(found[key])
+    return machines
 
 
 def _without_start(scene: Scene) -> Scene:
@@ -134,15 +147,16 @@ def _propagate(
     """States (runs, samples, variables), NaN after a run broke off, and the engine's word on each run."""
     integrator = _compiled(machine.structure, tolerance, _without_start(scenes[0]))
     initial = _initial(scenes, machine.moving, integrator.state.shape[0])
+    times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), scenes[0].samples)
     states = np.empty((len(scenes), scenes[0].samples, len(initial)))
     words: list[Integration] = []
     width = integrator.state.shape[1]
     for first in range(0, len(scenes), width):
         runs = list(range(first, min(first + width, len(scenes))))
-        batch = _batch(integrator, scenes, parameters, initial, runs)
+        batch = _batch(integrator, times, parameters, initial, runs)
         if any(word.message for word in batch[1]):
             # One lane's failure ends all lanes: each runs again with itself alone in every lane.
-            alone = [_batch(integrator, scenes, parameters, initial, [run]) for run in runs]
+            alone = [_batch(integrator, times, parameters, initial, [run]) for run in runs]
             batch = np.concatenate([part[0] for part in alone]), [part[1][0] for part in alone]
         states[runs] = batch[0]
         words += batch[1]
@@ -150,16 +164,15 @@ def _propagate(
 
 
 def _batch(
-    integrator: Any, scenes: Sequence[Scene], parameters: Array, initial: Array, runs: Sequence[int]
+    integrator: Any, times: Array, parameters: Array, initial: Array, runs: Sequence[int]
 ) -> tuple[Array, list[Integration]]:
     """One integration of up to as many runs as there are lanes; spare lanes repeat the last one."""
     width = integrator.state.shape[1]
     padded = [*runs, *[runs[-1]] * (width - len(runs))]
-    times = np.linspace(0.0, np.array([scenes[i].duration for i in padded]), scenes[0].samples)
     integrator.set_time(np.zeros(width))
     integrator.state[:] = initial[:, padded]
     set_parameters(integrator, parameters[:, padded])
-    states = np.ascontiguousarray(integrator.propagate_grid(times)[1].transpose(2, 0, 1)[: len(runs)])
+    states = np.ascontiguousarray(integrator.propagate_grid(times[:, padded])[1].transpose(2, 0, 1)[: len(runs)])
     words = []
     for result in integrator.propagate_res[: len(runs)]:
         message = failure(result[0])
@@ -171,8 +184,8 @@ def _batch(
 
 
 def _first_not_finite(states: Array) -> int:
-    finite = np.isfinite(states).all(axis=1)
-    return len(finite) if finite.all() else int(np.argmin(finite))
+    broken = np.flatnonzero(~np.isfinite(states).all(axis=1))
+    return int(broken[0]) if len(broken) else len(states)
 
 
 def _initial(scenes: Sequence[Scene], moving: tuple[int, ...], variables: int) -> Array:

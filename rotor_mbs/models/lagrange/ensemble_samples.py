@@ -36,21 +36,24 @@ class Block:
     def trajectory(self, i: int) -> Trajectory:
         """Run i alone, cut where it broke off."""
         n = self.samples[i]
-        optional = (self.tip, self.kinetic_energy, self.potential_energy, self.work)
-        return Trajectory(
-            self.time[i, :n], self.angles[i, :n], self.rates[i, :n], *(a if a is None else a[i, :n] for a in optional)
-        )
+        found = Trajectory(self.time[i, :n], self.angles[i, :n], self.rates[i, :n])
+        for name in ("tip", "kinetic_energy", "potential_energy", "work"):
+            values = getattr(self, name)
+            if values is not None:
+                setattr(found, name, values[i, :n])
+        return found
 
 
 def empty_block(scenes: Sequence[Scene]) -> Block:
     first, runs = scenes[0], len(scenes)
     shape = (runs, first.samples)
     columns = 1 + len(first.blades)
-    time = np.stack([np.linspace(0.0, scene.duration, first.samples) for scene in scenes])
+    time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
     tip = np.full((*shape, len(first.blades), 3), np.nan) if first.wants("tip") else None
-    energies = [np.full(shape, np.nan) if first.wants("energy") else None for _ in range(3)]
+    kinetic, potential, work = (np.full(shape, np.nan) if first.wants("energy") else None for _ in range(3))
     angles, rates = np.full((*shape, columns), np.nan), np.full((*shape, columns), np.nan)
-    return Block(time, angles, rates, tip, *energies, [Integration(False)] * runs, [0] * runs)
+    words = [Integration(False)] * runs
+    return Block(time, angles, rates, tip, kinetic, potential, work, words, [0] * runs)
 
 
 def put_single(block: Block, i: int, run: Run) -> None:

@@ -1,0 +1,90 @@
+"""How fast nearby starts part: the spread over time, and the largest Lyapunov exponent with its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.store.sweep_read import StoredSweep
+
+Array = NDArray[np.float64]
+
+_PAIRS_AT_ONCE = 256
+_BLOCKS = 8
+# The growth is exponential after the first tenfold, in which the separation turns to the fastest direction, and while
+# a separation is small against a radian.
+_TURNED, _SMALL = 10.0, 0.1
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Separations of runs 2i and 2i + 1 (root of the summed squares of the angles' differences).
+
+    time               (n,) s
+    low, median, high  (n,) rad: tenth, fiftieth and ninetieth percentile over the pairs
+    growth             (n,) rad: geometric mean over the pairs
+    exponent           1/s: slope of log(growth) between `start` and `end` (s), the window of exponential growth
+    uncertainty        1/s: its standard error, from how the rate differs between parts of the window
+    """
+
+    time: Array
+    low: Array
+    median: Array
+    high: Array
+    growth: Array
+    exponent: float
+    uncertainty: float
+    start: float
+    end: float
+    pairs: int
+
+
+def spread_of(sweep: StoredSweep) -> Spread:
+    """From the runs that ended well. Raises StoreError without angles, InputError where nothing grows."""
+    time = sweep.scale("time")
+    separations = _separations(sweep)
+    low, median, high = np.percentile(separations, [10.0, 50.0, 90.0], axis=0)
+    growth = np.exp(np.log(np.maximum(separations, np.finfo(float).tiny)).mean(axis=0))
+    exponent, uncertainty, start, end = lyapunov_exponent(time, growth)
+    return Spread(time, low, median, high, growth, exponent, uncertainty, start, end, len(separations))
+
+
+def lyapunov_exponent(time: Array, growth: Array) -> tuple[float, float, float, float]:
+    """Exponent and standard error in 1/s, start and end of the window in s. Raises InputError where nothing grows.
+
+    The mean rate over the window, as the mean over equal blocks of it; the blocks' scatter gives the standard error.
+    A finite-time exponent, of the stretch of motion that was run. Source: Wolf et al., Physica D 16, 1985, 285-317.
+    """
+    turned = np.flatnonzero(growth >= _TURNED * growth[0])
+    grown = np.flatnonzero(growth >= _SMALL)
+    first = int(turned[0]) if len(turned) else len(growth)
+    last = int(grown[0]) if len(grown) else len(growth) - 1
+    if last - first < 2 * _BLOCKS:
+        raise InputError(
+            f"spread: the growth from {growth[0]:.1e} rad has {max(last - first, 0)} samples of exponential growth; "
+            f"allowed: at least {2 * _BLOCKS}, from {_TURNED:g} times the start to {_SMALL:g} rad"
+        )
+    ends = np.linspace(first, last, _BLOCKS + 1).round().astype(int)
+    rates = np.diff(np.log(growth[ends])) / np.diff(time[ends])
+    lengths = np.diff(time[ends])
+    mean = float(np.average(rates, weights=lengths))
+    return mean, float(rates.std(ddof=1) / np.sqrt(_BLOCKS)), float(time[first]), float(time[last])
+
+
+def _separations(sweep: StoredSweep) -> Array:
+    """(pairs, n) rad."""
+    well = sweep.column("status") == 0
+    found = []
+    first = 0
+    for angles in sweep.pieces("angles", 2 * _PAIRS_AT_ONCE):
+        pairs = len(angles) // 2
+        both = well[first : first + 2 * pairs].reshape(pairs, 2).all(axis=1)
+        difference = angles[1 : 2 * pairs : 2].astype(float) - angles[0 : 2 * pairs : 2]
+        found.append(np.sqrt((difference[both] ** 2).sum(axis=2)))
+        first += len(angles)
+    if not sum(map(len, found)):
+        raise InputError("spread: no pair of runs ended well; allowed: a sweep with two or more such runs")
+    return np.concatenate(found)

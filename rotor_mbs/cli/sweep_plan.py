@@ -1,0 +1,183 @@
+"""From a sweep file and the command line to what is to be done: runs, chunks, the dataset's facts, an estimate."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.cli.sweep_work import ENSEMBLE_METHOD, Chunk, perform
+from rotor_mbs.errors import InputError
+from rotor_mbs.models.registry import check_names, find_method
+from rotor_mbs.runner.engines import Engine
+from rotor_mbs.runner.environment import machine, numerics_fingerprint, versions
+from rotor_mbs.scenario.design import validation_rows
+from rotor_mbs.scenario.load import scene_hash
+from rotor_mbs.scenario.sweep import Sweep
+from rotor_mbs.scenario.variants import Variants
+from rotor_mbs.store.sweep_file import Plan
+
+# Runs handed to a worker at once by the fast path: eight full batches, a twentieth of a second of work.
+_ENSEMBLE_RUNS = 64
+_LEAST_RUNS = 8
+_CHUNK_BYTES = 1 << 23
+
+_FORMAT = 1  # of rows and columns: a sweep begun by another version is not gone on with
+
+
+@dataclass(frozen=True)
+class Work:
+    """A sweep, or one part of several, by its methods.
+
+    first, last   of its runs; run r is row r mod rows of the design, by method r div rows
+    """
+
+    sweep: Sweep
+    methods: tuple[str, ...]
+    first: int
+    last: int
+    time_limit_s: float
+
+    @property
+    def rows(self) -> int:
+        return self.sweep.design.count
+
+    @property
+    def plan(self) -> Plan:
+        sweep = self.sweep
+        splits = validation_rows(self.rows, sweep.validation, sweep.design.seed) if sweep.validation else None
+        return Plan(
+            self._identity(),
+            self._attributes(),
+            sweep.base,
+            sweep.outputs,
+            sweep.precision,
+            sweep.keys,
+            sweep.units,
+            self.methods,
+            self.rows,
+            self.values,
+            splits,
+        )
+
+    def values(self, first: int, last: int) -> NDArray[np.float64]:
+        """(last - first, keys) of these runs."""
+        pieces = [
+            self.sweep.design.rows(start % self.rows, start % self.rows + end - start)
+            for start, end in self._by_method(first, last)
+        ]
+        return np.concatenate(pieces)
+
+    def chunks(self, gaps: Sequence[tuple[int, int]]) -> Iterator[Chunk]:
+        """The runs of `gaps`, cut into what a worker does at once."""
+        variants, row = self.sweep.variants(), self.plan.row
+        for gap in gaps:
+            for first, last in self._by_method(*gap):
+                method = self.methods[first // self.rows]
+                size = self._chunk_size(method, row.itemsize)
+                for start in range(first, last, size):
+                    end = min(start + size, last)
+                    yield self._chunk(variants, method, row, start, end)
+
+    def _chunk(self, variants: Variants, method: str, row: np.dtype[np.void], start: int, end: int) -> Chunk:
+        known = find_method(method).DEFAULTS
+        settings = {key: value for key, value in self.sweep.settings.items() if key in known}
+        return Chunk(variants, method, settings, row, start, self.values(start, end), self.time_limit_s)
+
+    @staticmethod
+    def _chunk_size(method: str, row_bytes: int) -> int:
+        if method != ENSEMBLE_METHOD:
+            return 1
+        return min(max(_CHUNK_BYTES // row_bytes, _LEAST_RUNS), _ENSEMBLE_RUNS)
+
+    def _by_method(self, first: int, last: int) -> Iterator[tuple[int, int]]:
+        """Spans of runs cut where the method changes."""
+        while first < last:
+            end = min(last, (first // self.rows + 1) * self.rows)
+            yield first, end
+            first = end
+
+    def _identity(self) -> str:
+        sweep = self.sweep
+        digest = hashlib.sha256()
+        content = [
+            _FORMAT,
+            scene_hash(sweep.base),
+            sweep.keys,
+            sweep.design.combine,
+            [axis.is_drawn for axis in sweep.design.axes],
+            self.methods,
+            dict(sweep.settings),
+            sweep.outputs,
+            sweep.precision,
+            sweep.validation,
+            sweep.design.seed,
+            [self.first, self.last],
+            versions(),
+            numerics_fingerprint(),
+        ]
+        digest.update(json.dumps(content, sort_keys=True).encode())
+        for values in sweep.design.values:
+            digest.update(values.tobytes())
+        return digest.hexdigest()
+
+    def _attributes(self) -> dict[str, object]:
+        sweep = self.sweep
+        return {
+            "title": sweep.title,
+            "sweep_toml": sweep.text,
+            "base_scene": sweep.base.name,
+            "scene_toml": sweep.base.text,
+            "scene_hash": scene_hash(sweep.base),
+            "combine": sweep.design.combine,
+            "shape": json.dumps(sweep.design.shape),
+            "seed": sweep.design.seed,
+            "validation_share": sweep.validation,
+            "settings": json.dumps(dict(sweep.settings), sort_keys=True),
+            "runs_of_all_parts": self.rows * len(self.methods),
+            **versions(),
+            **machine(),
+        }
+
+
+def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> Work:
+    """The runs of part k of n (1, 1 for all). Raises InputError, MethodRefusal where a method cannot do them."""
+    chosen = check_names(methods or sweep.methods)
+    known = {key for method in chosen for key in find_method(method).DEFAULTS}
+    unknown = sorted(set(sweep.settings) - known)
+    if unknown:
+        raise InputError(f"settings: {', '.join(unknown)}: no setting of {', '.join(chosen)}; allowed: {sorted(known)}")
+    for method in chosen:
+        find_method(method).items(sweep.base)
+    total = sweep.design.count * len(chosen)
+    number, parts = part
+    return Work(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)
+
+
+def estimate_seconds(work: Work, engine: Engine) -> float:
+    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time."""
+    seconds = 0.0
+    for k in range(len(work.methods)):
+        runs = max(min(work.last, (k + 1) * work.rows) - max(work.first, k * work.rows), 0)
+        if runs:
+            seconds += runs * _seconds_per_run(work, k * work.rows, engine) / engine.workers
+    return seconds
+
+
+def _seconds_per_run(work: Work, first: int, engine: Engine) -> float:
+    chunk = next(work.chunks([(first, first + min(work.rows, _ENSEMBLE_RUNS))]))
+    try:
+        # The first one loads and compiles, which all others find done.
+        engine.submit(perform, chunk.part(0, 1), work.time_limit_s).result()
+        start = time.perf_counter()
+        engine.submit(perform, chunk, work.time_limit_s).result()
+    except Exception as error:
+        if engine.cause(error) == "error":
+            raise
+        return float("inf")
+    return (time.perf_counter() - start) / len(chunk.values)

@@ -1,0 +1,126 @@
+"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped. Knows numbers; no scene and no file.
+
+A grid runs through its axes like the digits of a number, the last axis fastest; all random axes together are one
+digit, the draw. Every row follows from its number alone, so that any part of a sweep can be made on any machine.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One parameter.
+
+    kind     values, linear, log, uniform, normal or sobol
+    numbers  the values; start and end; low and high; or mean and standard deviation
+    count    how many values; of a random axis, how many draws
+    """
+
+    key: str
+    kind: str
+    numbers: tuple[float, ...]
+    count: int
+
+    @property
+    def is_drawn(self) -> bool:
+        return self.kind in ("uniform", "normal", "sobol")
+
+
+@dataclass(frozen=True)
+class Design:
+    """All rows of a sweep: axes, how they are combined ("grid" or "zip"), and the seed of every draw."""
+
+    axes: tuple[Axis, ...]
+    combine: str
+    seed: int
+    _digits: list[list[int]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_digits", self._group_axes())
+
+    def _group_axes(self) -> list[list[int]]:
+        """Axes that move together, as lists of axis numbers, slowest first."""
+        if self.combine == "zip":
+            return [list(range(len(self.axes)))]
+        drawn = [i for i, axis in enumerate(self.axes) if axis.is_drawn]
+        digits: list[list[int]] = []
+        for i in range(len(self.axes)):
+            if i not in drawn:
+                digits.append([i])
+            elif i == drawn[0]:
+                digits.append(drawn)
+        return digits
+
+    @property
+    def count(self) -> int:
+        """Rows in all, counted without making one."""
+        return math.prod(self.axes[digit[0]].count for digit in self._digits)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values along every digit of a grid, slowest first."""
+        return tuple(self.axes[digit[0]].count for digit in self._digits)
+
+    def rows(self, first: int, last: int) -> Array:
+        """(last - first, axes) the rows of these numbers."""
+        numbers = np.arange(first, last)
+        table = np.empty((len(numbers), len(self.axes)))
+        for digit in reversed(self._digits):
+            count = self.axes[digit[0]].count
+            for i in digit:
+                table[:, i] = self.values[i][numbers % count]
+            numbers = numbers // count
+        return table
+
+    @functools.cached_property
+    def values(self) -> list[Array]:
+        """(count,) of every axis."""
+        sobol = _sobol(self.axes, self.seed)
+        return [_values(axis, i, self.seed, sobol) for i, axis in enumerate(self.axes)]
+
+
+def _values(axis: Axis, number: int, seed: int, sobol: dict[str, Array]) -> Array:
+    if axis.kind == "values":
+        return np.array(axis.numbers)
+    first, second = axis.numbers
+    if axis.kind == "linear":
+        return np.linspace(first, second, axis.count)
+    if axis.kind == "log":
+        return np.geomspace(first, second, axis.count)
+    if axis.kind == "sobol":
+        return first + (second - first) * sobol[axis.key]
+    generator = np.random.default_rng([seed, number])
+    if axis.kind == "uniform":
+        return generator.uniform(first, second, axis.count)
+    return generator.normal(first, second, axis.count)
+
+
+def _sobol(axes: Sequence[Axis], seed: int) -> dict[str, Array]:
+    """One scrambled sequence over all Sobol axes: points in the unit cube, by key."""
+    chosen = [axis for axis in axes if axis.kind == "sobol"]
+    if not chosen:
+        return {}
+    from scipy.stats import qmc  # late: 0.5 s
+
+    sampler = qmc.Sobol(len(chosen), seed=np.random.default_rng(seed))
+    # The balance of the sequence belongs to powers of two: its beginning is taken of the next one.
+    points = sampler.random_base2((chosen[0].count - 1).bit_length())[: chosen[0].count]
+    return {axis.key: points[:, i] for i, axis in enumerate(chosen)}
+
+
+def validation_rows(count: int, share: float, seed: int) -> NDArray[np.int8]:
+    """(count,) 1 for the rows set aside for validation, `share` of them to the nearest one, drawn by `seed`."""
+    chosen = np.random.default_rng([seed, 2**32]).permutation(count)[: round(share * count)]
+    marks = np.zeros(count, np.int8)
+    marks[chosen] = 1
+    return marks

@@ -1,0 +1,64 @@
+"""Runs by the hundred, judged like single ones: what is clearly well is seen at once, the rest goes to `outcome.judge`.
+
+Knows arrays only; no engine, no file, no bound of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.trajectory.compare import energy_scale
+from rotor_mbs.trajectory.outcome import bound_of, rotor_inertia_shares
+from rotor_mbs.trajectory.record import Array, Integration, Trajectory
+
+# Of the rotor's inertia at the start: above it, no start is singular.
+_CLEAR_SHARE = 1e-6
+
+
+def energy_errors(kinetic: Array, potential: Array, work: Array) -> Array:
+    """(k, n) J: total energy less work, less its value at the start of each run."""
+    total = kinetic + potential - work
+    errors: Array = total - total[:, :1]
+    return errors
+
+
+def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
+    """(k,) largest energy error of each run, of its scale (J where that is zero); NaN samples do not count."""
+    most_work = np.abs(work).max(axis=1, initial=0.0, where=np.isfinite(work))
+    scales = [_scale(scene, float(kinetic[i, 0]), float(most_work[i])) for i, scene in enumerate(scenes)]
+    largest = np.abs(errors).max(axis=1, initial=0.0, where=np.isfinite(errors))
+    drifts: Array = largest / np.array([scale or 1.0 for scale in scales])
+    return drifts
+
+
+def _scale(scene: Scene, kinetic: float, work: float) -> float:
+    angles = np.zeros((1, len(scene.initial_angles)))
+    start = Trajectory(np.zeros(1), angles, angles, kinetic_energy=np.array([kinetic]), work=np.array([work]))
+    return energy_scale(scene, start)
+
+
+def clearly_ok(
+    scenes: Sequence[Scene], method: str, words: Sequence[Integration], samples: Sequence[int], drifts: Array
+) -> NDArray[np.bool_]:
+    """(k,) whether `outcome.judge`, without a reference, would certainly call each run ok."""
+    bound = bound_of(method)
+    complete = np.array([word.success and n == scenes[0].samples for word, n in zip(words, samples, strict=True)])
+    if bound is None:
+        return complete
+    return complete & (drifts <= bound.energy) & (_start_shares(scenes) > _CLEAR_SHARE)
+
+
+def _start_shares(scenes: Sequence[Scene]) -> Array:
+    """(k,) the rotor's inertia at the start with every pitch free, of the whole; all runs of a machine at once."""
+    shares = np.empty(len(scenes))
+    machines: dict[tuple[object, ...], list[int]] = {}
+    for i, scene in enumerate(scenes):
+        machines.setdefault((id(scene.blades), scene.hub_inertia), []).append(i)
+    for numbers in machines.values():
+        angles = np.array([scenes[i].initial_angles for i in numbers])
+        shares[numbers] = rotor_inertia_shares(scenes[numbers[0]], angles)
+    return shares

@@ -1,0 +1,82 @@
+"""A sweep on a real dask cluster on this machine: a scheduler, two worker processes, one of them killed on the way."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from rotor_mbs.cli import main
+
+pytest.importorskip("distributed")
+pytestmark = pytest.mark.slow
+
+_SWEEP = """
+title = "starts"
+scene = "paper/fig11"
+methods = ["lagrange/dop853"]
+samples = 21
+outputs = ["angles"]
+change = { duration = 3.0 }
+draws = 60
+
+[[axis]]
+key = "initial.angles[1]"
+uniform = [0.5, 1.0]
+"""
+
+
+@pytest.fixture
+def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address, and the two workers: without nannies, so that a killed one stays away."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    dask = [sys.executable, "-m", "distributed.cli"]
+    commands = [[f"{dask[2]}.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]]
+    commands += [[f"{dask[2]}.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]] * 2
+    with ExitStack() as stack:
+        processes = [
+            stack.enter_context(
+                subprocess.Popen([*dask[:2], *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            )
+            for command in commands
+        ]
+        _wait_for_workers(address)
+        yield address, processes[1:]
+        for process in processes:
+            process.kill()
+
+
+def _wait_for_workers(address: str) -> None:
+    from distributed import Client
+
+    with Client(address, timeout=30, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=60)
+
+
+def test_a_killed_worker_of_a_cluster_loses_nothing(
+    tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    address, workers = cluster
+    path, local, remote = tmp_path / "s.toml", tmp_path / "local.h5", tmp_path / "dask.h5"
+    path.write_text(_SWEEP)
+    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(remote), "--engine", f"dask:{address}"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as sweep:
+        journal = tmp_path / "dask.h5.parts" / "0001.journal"
+        while sweep.poll() is None and not (journal.exists() and journal.stat().st_size > 5000):
+            time.sleep(0.01)
+        assert sweep.poll() is None, sweep.communicate()
+        workers[0].kill()
+        output, errors = sweep.communicate(timeout=120)
+    assert sweep.returncode == 0, (output, errors)
+    assert b"60 runs: 60 ok" in output
+    assert main(["sweep", str(path), "-o", str(local)]) == 0
+    assert remote.read_bytes() == local.read_bytes()

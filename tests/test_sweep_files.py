@@ -1,0 +1,193 @@
+"""Sweep files: what the rows of a design are, and that every fault is told with file, line, key and what is allowed."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.catalogue import list_scenes
+from rotor_mbs.scenario.design import Axis, Design, validation_rows
+from rotor_mbs.scenario.keys import parse_key, put, unit_of
+from rotor_mbs.scenario.resources import sweeps_folder
+from rotor_mbs.scenario.sweep import Sweep, load_sweep
+from rotor_mbs.scenario.variants import Variants
+
+_HEAD = 'title = "t"\nscene = "paper/fig11"\n'
+
+
+def _load(folder: Path, text: str) -> Sweep:
+    path = folder / "s.toml"
+    path.write_text(_HEAD + text)
+    return load_sweep(path)
+
+
+def test_a_grid_runs_through_its_axes_the_last_one_fastest() -> None:
+    axes = (Axis("a", "values", (1.0, 2.0), 2), Axis("b", "linear", (0.0, 1.0), 3), Axis("c", "log", (1.0, 100.0), 3))
+    design = Design(axes, "grid", 0)
+    expected = list(itertools.product([1.0, 2.0], [0.0, 0.5, 1.0], [1.0, 10.0, 100.0]))
+    assert design.count == 18
+    # log goes through a power: equal to round-off
+    np.testing.assert_allclose(design.rows(0, 18), expected, rtol=1e-15)
+    np.testing.assert_array_equal(design.rows(7, 11), design.rows(0, 18)[7:11])
+
+
+def test_zip_takes_one_value_of_every_axis() -> None:
+    design = Design((Axis("a", "values", (1.0, 2.0), 2), Axis("b", "values", (3.0, 4.0), 2)), "zip", 0)
+    np.testing.assert_array_equal(design.rows(0, 2), [[1.0, 3.0], [2.0, 4.0]])
+
+
+def test_random_axes_are_drawn_together_and_combined_with_the_others() -> None:
+    axes = (Axis("a", "values", (1.0, 2.0), 2), Axis("b", "normal", (0.0, 1.0), 4), Axis("c", "uniform", (5.0, 6.0), 4))
+    rows = Design(axes, "grid", 7).rows(0, 8)
+    assert rows[:, 0].tolist() == [1.0] * 4 + [2.0] * 4
+    np.testing.assert_array_equal(rows[:4, 1:], rows[4:, 1:])
+    assert len(np.unique(rows[:4, 1])) == 4
+
+
+def test_a_seed_repeats_its_draws_and_another_one_does_not() -> None:
+    axes = (Axis("a", "normal", (0.0, 1.0), 50), Axis("b", "sobol", (-1.0, 1.0), 50))
+    first = Design(axes, "grid", 1).rows(0, 50)
+    np.testing.assert_array_equal(first, Design(axes, "grid", 1).rows(0, 50))
+    assert not np.isin(first, Design(axes, "grid", 2).rows(0, 50)).any()
+
+
+def test_draws_have_the_distribution_that_was_asked_for() -> None:
+    axes = tuple(Axis(kind, kind, (2.0, 3.0), 4096) for kind in ("uniform", "normal", "sobol"))
+    uniform, normal, sobol = Design(axes, "grid", 0).rows(0, 4096).T
+    for values in (uniform, sobol):
+        assert 2.0 <= values.min() < 2.01 < 2.99 < values.max() < 3.0
+    # five standard errors of a mean of 4096 draws
+    assert abs(uniform.mean() - 2.5) < 5.0 / math.sqrt(12.0 * 4096)
+    assert abs(normal.mean() - 2.0) < 5.0 * 3.0 / 64.0
+    assert abs(normal.std() - 3.0) < 5.0 * 3.0 / math.sqrt(2.0 * 4096)
+    # a power of two of a Sobol sequence has exactly one point in each of as many equal intervals
+    assert np.histogram(sobol, 4096, (2.0, 3.0))[0].tolist() == [1] * 4096
+
+
+def test_the_share_for_validation_is_exact_and_drawn() -> None:
+    marks = validation_rows(1000, 0.2, 3)
+    assert marks.sum() == 200
+    assert not marks[:200].all()
+    assert (marks != validation_rows(1000, 0.2, 4)).any()
+
+
+@pytest.mark.parametrize(
+    ("key", "unit"),
+    [
+        ("initial.angles[1]", "rad"),
+        ("blade[2].mass", "kg"),
+        ("bearing.stiffness", "N m/rad"),
+        ("torque.rotor[1][0]", "s"),
+        ("torque.rotor[1][1]", "N m"),
+        ("gravity", "m/s^2"),
+    ],
+)
+def test_units_of_keys(key: str, unit: str) -> None:
+    assert unit_of(parse_key(key)) == unit
+
+
+def test_one_blade_of_all_can_be_varied() -> None:
+    tables = {"blades": 3, "blade": {"mass": 1.0}}
+    put(tables, parse_key("blade[1].mass"), 2.0)
+    put(tables, parse_key("bearing.stiffness[2]"), 5.0)
+    assert tables["blade"] == [{"mass": 1.0}, {"mass": 2.0}, {"mass": 1.0}]
+    assert tables["bearing"] == {"stiffness": [0.0, 0.0, 5.0]}
+
+
+def test_a_row_is_the_scene_with_its_numbers_in_place(tmp_path: Path) -> None:
+    sweep = _load(
+        tmp_path,
+        'outputs = ["angles"]\nsamples = 11\nchange = {"gravity" = 1.5}\n'
+        '[[axis]]\nkey = "bearing.stiffness"\nvalues = ["2*pi", 3]\n[[axis]]\n'
+        'key = "initial.rates[0]"\nvalues = [0.5]\n'
+        '[[axis]]\nkey = "blade[1].mass"\nvalues = [7]\n',
+    )
+    scene = sweep.variants().scene(sweep.design.rows(0, 1)[0].tolist())
+    assert scene.bearing_stiffness == (2 * math.pi,) * 3
+    assert (scene.initial_rates[0], scene.blades[1].mass, scene.blades[0].mass) == (0.5, 7.0, 15000.0)
+    assert (scene.gravity, scene.samples, sweep.base.gravity) == (1.5, 11, 1.5)
+    assert scene.initial_angles == sweep.base.initial_angles
+    assert sweep.units == ("N m/rad", "rad/s", "kg")
+
+
+def test_initial_states_put_in_alone_make_the_same_scene_as_the_whole_file_would(tmp_path: Path) -> None:
+    sweep = _load(tmp_path, '[[axis]]\nkey = "initial.angles[2]"\nvalues = [0.1, 0.2]\n')
+    variants = Variants("s", sweep.tables, sweep.keys)
+    variants.scene([0.1])
+    tables = {**sweep.tables, "initial": {**sweep.tables["initial"], "angles": ["pi/6", "pi/4", 0.2, "pi/2"]}}
+    assert variants.scene([0.2]) == Variants("s", tables, ()).scene(())
+
+
+_BAD = {
+    "an unknown key": (
+        '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1]',
+        4,
+        "angels: is no key here, perhaps angles",
+    ),
+    "an index too high": ('[[axis]]\nkey = "initial.angles[4]"\nvalues = [1]', 4, r"initial.angles\[3\]"),
+    "an unknown table": ('[[axis]]\nkey = "bering.stiffness"\nvalues = [1]', 4, "bering: is no key here, perhaps bear"),
+    "no number there": ('[[axis]]\nkey = "title"\nvalues = [1]', 4, "is no text"),
+    "a table there": ('[[axis]]\nkey = "initial"\nvalues = [1]', 4, "is no number but a table"),
+    "no path": ('[[axis]]\nkey = "initial..x"\nvalues = [1]', 4, "is no path of a key; allowed"),
+    "another shape": ('[[axis]]\nkey = "blades"\nvalues = [1, 2]', 4, "share one blades; allowed"),
+    "values that are no list": ('[[axis]]\nkey = "gravity"\nvalues = 3', 5, "is no list; allowed: a list of numbers"),
+    "a value that is no number": ('[[axis]]\nkey = "gravity"\nvalues = [1, true]', 5, "true is no number"),
+    "an empty list": ('[[axis]]\nkey = "gravity"\nvalues = []', 5, "0 entries; allowed: a list of numbers"),
+    "no values": ('[[axis]]\nkey = "gravity"', 3, "has no values; allowed: exactly one of values"),
+    "values twice": ('[[axis]]\nkey = "gravity"\nvalues = [1]\nuniform = [1, 2]', 3, "has values and uniform"),
+    "random without draws": ('[[axis]]\nkey = "gravity"\nuniform = [1, 2]', 3, "draws is missing"),
+    "draws without random": ('draws = 3\n[[axis]]\nkey = "gravity"\nvalues = [1]', 4, "no axis is random"),
+    "a range upside down": ('draws = 3\n[[axis]]\nkey = "gravity"\nuniform = [2, 1]', 6, "not below the second"),
+    "log to zero": ('[[axis]]\nkey = "gravity"\nlog = {start = 0, end = 1, count = 3}', 5, "reaches 0 or less"),
+    "a key twice": (
+        '[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]',
+        3,
+        "more than one",
+    ),
+    "a value out of range": ('[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}', 4, "above 0"),
+    "numbers that do not fit": ('[[axis]]\nkey = "blade.inertia[0]"\nvalues = [0, 1]', 4, "no rigid body"),
+    "unequal lists zipped": (
+        'combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
+        3,
+        "gravity has 1, hub.inertia has 2; allowed with zip",
+    ),
+    "1e12 runs": (
+        '[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}',
+        3,
+        "1,000,000,000,000 runs; allowed: at most",
+    ),
+    "a change of no key": (
+        'change = {"gravty" = 1}\n[[axis]]\nkey = "hub.inertia"\nvalues = [1]',
+        3,
+        "perhaps gravity",
+    ),
+    "an unknown word": ('axes = 1\n[[axis]]\nkey = "gravity"\nvalues = [1]', 3, "axes: is no key here, perhaps axis"),
+}
+
+
+@pytest.mark.parametrize(("text", "line", "words"), _BAD.values(), ids=list(_BAD))
+def test_faults_name_file_line_key_and_what_is_allowed(tmp_path: Path, text: str, line: int, words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        _load(tmp_path, text)
+    for problem in caught.value.problems:
+        assert problem.startswith(f"{tmp_path / 's.toml'}:")
+        assert "\n" not in problem
+        assert "allowed" in problem
+    assert int(caught.value.problems[0].removeprefix(f"{tmp_path / 's.toml'}:").split(":")[0]) == line
+
+
+def test_all_faults_at_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        _load(tmp_path, 'precision = "half"\n[[axis]]\nkey = "gravity"\nvalues = ["x"]\nlog = {start = 1, count = 1}\n')
+    assert len(caught.value.problems) == 4  # precision, values, log.end, log.count
+
+
+@pytest.mark.parametrize("path", sorted(sweeps_folder().glob("*.toml")), ids=lambda path: path.stem)
+def test_shipped_sweeps_load_and_are_no_scenes(path: Path) -> None:
+    assert load_sweep(Path("sweeps") / path.stem).design.count >= 100
+    assert f"sweeps/{path.stem}" not in dict(list_scenes())
