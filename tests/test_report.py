@@ -14,9 +14,9 @@ import pytest
 from scenes import paper
 from stored import Made, rotor, store
 
-from rotor_mbs.report.build import write_report
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import figures, numbers, vector
+from rotor_mbs.report.build import write_report
 from rotor_mbs.report.canvas import panels, svg_text
 from rotor_mbs.report.files import page_names
 from rotor_mbs.report.names import Look
@@ -164,12 +164,12 @@ def test_svg_is_made_small_without_moving_a_point_or_touching_a_label() -> None:
 
 def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> None:
     found = page(report)
-    assert found.sections == ["said", "motion", "difference", "energy", "paths", "metrics", "file"]
+    assert found.sections == ["said", "paths", "motion", "difference", "energy", "metrics", "file"]
     headings = [tag for tag in found.tags if re.fullmatch(r"h\d", tag)]
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
     assert found.tags.count("figcaption") == found.tags.count("figure") == 3 + 1 + 3 + 2
     images = [value for name, value in found.attributes if name == "role" and value == "img"]
-    assert len(images) == found.tags.count("figure")
+    assert len(images) == found.tags.count("figure") + found.tags.count("canvas")
 
 
 def test_the_index_tells_the_finding(report: Path) -> None:
@@ -230,7 +230,9 @@ def test_pages_need_nothing_from_outside(report: Path) -> None:
         assert "@import" not in text
         assert not re.search(r"url\((?!#)", text)
         found = Page(text)
-        assert not {"script", "link", "img", "iframe"} & set(found.tags)
+        assert not {"link", "img", "iframe", "object"} & set(found.tags)
+        assert "src" not in dict(found.attributes)
+        assert "default-src 'none'" in text
         links = [value for name, value in found.attributes if name in ("href", "src")]
         targets = {value.split("#")[0] for value in links} - {""}
         assert all((report / target).is_file() for target in targets)

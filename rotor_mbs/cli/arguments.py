@@ -43,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     reproduce.add_argument("-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help=_default("DIR"))
     _add_batch_options(reproduce)
+    _add_language(reproduce)
 
     run = _command(commands, "run", "a batch of scenes into one results file", "runs:run")
     run.add_argument("scenes", nargs="+", metavar="SCENE", help="a name (paper/fig05), a folder (paper), a TOML file")
@@ -99,12 +100,53 @@ def _parser() -> argparse.ArgumentParser:
     report = _command(commands, "report", "HTML pages from a results file", "reports:report")
     report.add_argument("file", type=Path, metavar="FILE")
     report.add_argument("-o", "--output", type=Path, default=Path("report"), metavar="DIR", help=_default("DIR"))
+    _add_language(report)
+
+    _add_pictures(commands)
     return parser
+
+
+def _add_pictures(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    figures = _command(
+        commands, "figures", "the paper's figures as files for a manuscript, from a results file", "figures:figures"
+    )
+    figures.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help=_default("DIR"))
+    figures.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
+    figures.add_argument("--figure", action="append", metavar="N", help="this one alone; may be repeated")
+    _add_results(figures)
+    _add_language(figures)
+
+    animate = _command(commands, "animate", "a scene moving, from a results file", "animate:animate")
+    animate.add_argument("scene", metavar="SCENE")
+    animate.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE",
+        help="FILE.webp, FILE.gif, or FILE.mp4 where ffmpeg is installed",
+    )  # fmt: skip
+    animate.add_argument(
+        "--offset", type=_positive(float, "a number more than 0"), default=40.0, metavar="TIMES",
+        help="how many times the tip's distance from its pitch axis is drawn (default: %(default)g)",
+    )  # fmt: skip
+    _add_results(animate)
+
+
+def _add_results(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--results",
+        dest="file",
+        type=Path,
+        default=_DEFAULT_FOLDER / "results.h5",
+        metavar="FILE",
+        help=_default("FILE"),
+    )
+
+
+def _add_language(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--lang", choices=("en", "es"), default="en", help="of the texts (default: %(default)s)")
 
 
 def _add_sweep(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     sweep = _command(commands, "sweep", "a parameter study into one dataset", "sweep:sweep")
-    sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one, such as sweeps/fig11-spread")
+    sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
     sweep.add_argument(
         "-m", "--method", action="append", metavar="METHOD", help="in place of the file's; may be repeated"
     )

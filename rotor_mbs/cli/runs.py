@@ -53,7 +53,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
     report = execute(Batch(scenes, methods, results, arguments.jobs, arguments.timeout))
     _add_errata(results)
     status = _tell(report, results)
-    index = render_if_changed(results, arguments.output / "report", arguments.jobs)
+    index = render_if_changed(results, arguments.output / "report", arguments.jobs, arguments.lang)
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rotor_mbs.analysis import errata as errata_analysis
@@ -99,7 +99,7 @@ def _prepared(opened: Results) -> tuple[list[SceneTask | FigureTask], dict[str, 
     said_of = claims(scenes)
     conditions = published.conditions() if said_of else {}
     entries = errata_analysis.entries(opened)
-    errata = published.errata() if entries or _speaks_of_errata(scenes) else ()
+    errata = _spoken_errata() if entries or _speaks_of_errata(scenes) else ()
     figures = paper_set.available(scenes)
     index = index_page(opened, scenes, files, said_of, conditions, errata, has_walk=bool(figures))
     pages = {INDEX: render("index", index)}
@@ -108,6 +108,19 @@ def _prepared(opened: Results) -> tuple[list[SceneTask | FigureTask], dict[str, 
     tasks: list[SceneTask | FigureTask] = list(_tasks(files, said_of, conditions, has_errata=bool(errata)))
     tasks += [FigureTask(one.number, tuple(said_of), files) for one in figures]
     return tasks, files, pages
+
+
+def _spoken_errata() -> tuple[published.Erratum, ...]:
+    """In the language of the report."""
+    return tuple(
+        replace(
+            one,
+            printed=texts.erratum(one.id, "printed", one.printed),
+            right=texts.erratum(one.id, "right", one.right),
+            reason=texts.erratum(one.id, "reason", one.reason),
+        )
+        for one in published.errata()
+    )
 
 
 def _speaks_of_errata(scenes: Mapping[str, StoredScene]) -> bool:
@@ -152,7 +165,7 @@ def _scene_page(scene: StoredScene, task: SceneTask) -> ScenePage:
 
     return ScenePage(
         name=scene.name,
-        title=scene.title,
+        title=texts.scene_title(scene.name, scene.title),
         figures=texts.figures(str(scene.attributes.get("figures", ""))),
         lead=lead(scene),
         failures=metrics.failures(scene),

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,12 +31,13 @@ _STYLE: Any = {
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9.5,
     "axes.labelsize": 9.5,
+    "axes.titlesize": 9.5,
     "xtick.labelsize": 9.5,
     "ytick.labelsize": 9.5,
     "axes.linewidth": 0.7,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "axes.formatter.limits": (-2, 4),
+    "axes.formatter.limits": (-3, 4),
     "axes.unicode_minus": True,
     "axes.xmargin": 0.01,
     "grid.color": "#e4e4e4",
@@ -106,9 +108,21 @@ def grid(rows: int, columns: int, height: float, *, for_print: bool = False) -> 
         whole = float(figure.get_figheight())
         figure.subplots_adjust(
             left=0.8 / width, right=1.0 - 0.12 / width, bottom=bottom / whole, top=1.0 - top / whole,
-            hspace=0.22 / height, wspace=0.24,
+            hspace=0.26 / height, wspace=0.34,
         )  # fmt: skip
     return Panels(figure, list(made.flat))
+
+
+@contextmanager
+def style(*, for_print: bool = False) -> Iterator[None]:
+    """Whatever is drawn inside is drawn in the style of the pages, or in that for manuscripts."""
+    with matplotlib.rc_context(PRINT_STYLE if for_print else _STYLE):
+        yield
+
+
+def font_file() -> Path:
+    """The font of all figures."""
+    return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 
 
 def flat_space(axes: Any, across: float, up: float) -> None:

@@ -60,7 +60,7 @@ def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) 
         found = effects(scene)
         if found:
             cells = [cell for erratum in ALONE for cell in _effect_cells(found.get(erratum))]
-            rows.append([Cell(name, href=files[name], note=scene.title), *cells])
+            rows.append([Cell(name, href=files[name], note=texts.scene_title(name, scene.title)), *cells])
     table = Table(texts.EFFECTS, head, rows, numeric=range(1, len(head)))
     return without_empty_columns(table) if rows else table
 

@@ -73,7 +73,7 @@ def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> 
 def _scene_row(scene: StoredScene, file: str, right: Sequence[str]) -> list[Cell]:
     printed = scene.methods.get(methods.PRINTED)
     cells = [
-        Cell(scene.name, href=file, note=scene.title),
+        Cell(scene.name, href=file, note=texts.scene_title(scene.name, scene.title)),
         Cell(str(scene.attributes.get("figures", ""))),
         Cell(quantity(metrics.horizon(scene), "s", 3)),
         *_printed_cells(printed),

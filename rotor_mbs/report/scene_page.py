@@ -19,8 +19,8 @@ from rotor_mbs.report import canvas, figures, metrics, said, vector
 from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import GREY, Look, coordinate_look, looks, name_of
 from rotor_mbs.report.parts import Picture, Sample, Section, line_sample, mark_sample, run_sample
-from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.report.viewer import viewer
+from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]
@@ -273,7 +273,7 @@ def paths(drawn: Drawn) -> Section:
         replace(line_sample(texts.SHAFT, GREY, "-"), width=4.0),
     ]
     table = metrics.path_table({_heading(drawn, run): run for run in runs})
-    name = drawn.scene.title
+    name = texts.scene_title(drawn.scene.name, drawn.scene.title)
     moving = viewer(drawn.scene, {name_of(run.method): run for run in drawn.sides}, texts.viewer_described(name))
     heading = texts.PATHS if moving is None else texts.MOVING
     return Section("paths", heading, pictures, legend, [table], [texts.PATHS_NOTE], moving)

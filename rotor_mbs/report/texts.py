@@ -66,17 +66,18 @@ WALK, FIGURES, FIGURE_TITLES = "The paper's figures, one by one", "Figures", {
     "motion": "position and velocity", "paths": "paths of the tips", "torques": "a constant torque on the rotor",
 }  # fmt: skip
 WALK_LEAD = (
-    "Each figure of the paper in its own layout: the equations as printed, integrated by ode45 as the paper did, beside "
-    "the right model and Exudyn. Every picture has its own scales."
+    "Each figure of the paper in its own layout: the equations as printed, integrated by ode45 as the paper did, "
+    "beside the right model and Exudyn. Every picture has its own scales, and what runs away from them is cut off; the "
+    "same means within 0.05 rad."
 )
 EXUDYN_COLUMN = "Exudyn"
 PART_A, PART_B = "(a) position", "(b) angular velocity"
 FIGURE_NOTES = {
     "6": "The caption prints π/10 rad/s, the running text 1/10; drawn is the caption's.",
-    "13": "The text takes panel (b) for the run of Fig. 12 (blade 1 at π/5 rad/s), the caption prints π/8; drawn is the "
-    "caption's.",
-    "14": "As read from the PDF, the caption gives three pairs of conditions for four panels: which pair belongs to which "
-    "panel is not certain, and the condition of panel (d) is not known. Nothing is drawn for it.",
+    "13": "The text takes panel (b) for the run of Fig. 12 (blade 1 at π/5 rad/s), the caption prints π/8; drawn is "
+    "the caption's.",
+    "14": "As read from the PDF, the caption gives three pairs of conditions for four panels: which pair belongs to "
+    "which panel is not certain, and the condition of panel (d) is not known. Nothing is drawn for it.",
     "15": "1 and 100 kN·m are printed in the caption of Fig. 16; the paper's other torques are not known, 10 and "
     "50 kN·m were chosen.",
 }
@@ -180,6 +181,34 @@ OFF_PLANE = "off the plane"
 RANGE = "{} to {}"
 
 
+def scene_title(name: str, title: str) -> str:
+    """Of the scene `name`, whose file says `title`."""
+    del name
+    return title
+
+
+def condition(key: str, text: str) -> str:
+    """What had to be found out about `key`, as reference/published.toml says in `text`."""
+    del key
+    return text
+
+
+def erratum(id_of: str, field: str, text: str) -> str:
+    """A field of an erratum ("printed", "right", "reason"), as reference/errata.toml says in `text`."""
+    del id_of, field
+    return text
+
+
+def statement(text: str, quote: str) -> str:
+    """What a claim says, and the paper's own words for it."""
+    del quote
+    return text
+
+
+def statement_note(quote: str) -> str:
+    return f"«{quote}»"
+
+
 def angle_column(side: str) -> str:
     return f"{side}: angle (rad)"
 
@@ -216,7 +245,10 @@ def walk_picture(figure: str, heading: str) -> str:
 def conditions(angles: str, rates: str, torque: float | None, gravity: float, duration: float) -> str:
     """Of a start; torque in N m, None where it changes over time."""
     parts = [f"q(0) = [{angles}] rad", f"dq/dt(0) = [{rates}] rad/s"]
-    parts.append("torque changing over time" if torque is None else f"rotor torque {prefixed(torque, 'N·m')}")
+    if torque is None:
+        parts.append("a torque that changes over time")
+    elif torque:
+        parts.append(f"rotor torque {prefixed(torque, 'N·m')}")
     return f"{', '.join(parts)}, g = {number(gravity, 3)} m/s², {quantity(duration, 's', 4)}."
 
 
@@ -238,7 +270,9 @@ def walk_different(facts: Facts) -> str:
     """What is not."""
     parts = []
     if facts.right_still and facts.printed_pitch is not None and facts.printed_pitch > 1e-3:
-        parts.append(f"in the right model no blade pitches at all, in print they reach {quantity(facts.printed_pitch, 'rad')}")
+        parts.append(
+            f"in the right model no blade pitches at all, in print they reach {quantity(facts.printed_pitch, 'rad')}"
+        )
     if facts.largest is not None and facts.seen_apart != inf:
         parts.append(f"the printed angles part from the right ones by up to {quantity(facts.largest, 'rad')}")
     if facts.gain is not None and facts.gain > 1e3:
@@ -251,7 +285,11 @@ def walk_different(facts: Facts) -> str:
 def torques_same(exudyn: float | None) -> str:
     """exudyn: rad, from the right model, the largest of all torques."""
     text = "The same: every torque sets the rotor going from rest"
-    return f"{text}." if exudyn is None else f"{text}; Exudyn and the right model differ by {quantity(exudyn, 'rad')} at most."
+    return (
+        f"{text}."
+        if exudyn is None
+        else f"{text}; Exudyn and the right model differ by {quantity(exudyn, 'rad')} at most."
+    )
 
 
 def torques_different(turned: Mapping[str, Mapping[str, float]]) -> str:
@@ -261,8 +299,8 @@ def torques_different(turned: Mapping[str, Mapping[str, float]]) -> str:
         for heading, by_torque in turned.items()
     ]
     return (
-        "Not the same: in the right model the blades stay at zero pitch and the rotor turns by τt²/(2·3·m·(c²+d²)), the "
-        f"more the larger the torque. Turned at the end: {'; '.join(parts)}."
+        "Not the same: in the right model the blades stay at zero pitch and the rotor turns by τt²/(2·3·m·(c²+d²)), "
+        f"the more the larger the torque. Turned at the end: {'; '.join(parts)}."
     )
 
 

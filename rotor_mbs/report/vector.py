@@ -6,7 +6,9 @@ A pure text transformation of what matplotlib writes. Knows no figure.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from html import escape
+from itertools import count
 
 _NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
 _TAG = re.compile(r"<[^>]*>")
@@ -14,6 +16,8 @@ _PATH = re.compile(r' d="([^"]*)"')
 _SEGMENT = re.compile(r"([MLCQz])([^MLCQz]*)")
 _USES = re.compile(r"(?:\s*<use [^>]*/>)+")
 _USE = re.compile(r'<use xlink:href="(#[^"]+)" x="([^"]+)" y="([^"]+)" style="([^"]*)"\s*/>')
+_LONG_NAME = re.compile(r"(?<=[\"#])[a-z][0-9a-f]{10}(?=[\")])")
+_NO_LINE = re.compile(r'<path d="M[^l"]*"[^>]*stroke-width[^>]*/>')  # a mark that stands alone comes with one
 _DROPPED = (
     re.compile(r"^.*?(?=<svg)", re.S),
     re.compile(r"<!--.*?-->", re.S),
@@ -29,11 +33,14 @@ def embedded(svg: str, name: str, title: str, description: str) -> str:
     who cannot see it."""
     for pattern in _DROPPED:
         svg = pattern.sub("", svg)
-    svg = _USES.sub(lambda found: _grouped(found[0]), svg)
+    svg = _named_briefly(svg)
+    numbers = count()
+    svg = _USES.sub(lambda found: _marked(found[0], numbers), svg)
     svg = _PATH.sub(lambda found: f' d="{_path(found[1])}"', svg)
     svg = _TAG.sub(lambda found: _lean(found[0]), svg)
     svg = svg.replace("xlink:href=", "href=")
     svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+    svg = _NO_LINE.sub("", svg)
     svg = re.sub(r">\s+<", "><", re.sub(r"<g>\s*</g>", "", svg))
     head = re.search(r"<svg[^>]*>", svg)
     assert head is not None  # matplotlib wrote it
@@ -49,19 +56,34 @@ def embedded(svg: str, name: str, title: str, description: str) -> str:
 def _lean(tag: str) -> str:
     """A tag without white space, digits and defaults that say nothing; texts get their font from the style sheet."""
     tag = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", tag)
+    tag = re.sub(r"font-family: [^;\"]*(?:; )?", "", tag)
+    tag = re.sub(r' transform="rotate\(-?0 [^"]*"', "", tag)
     tag = re.sub(r"(?:; )?stroke-linecap: (?:square|butt)", "", tag)
+    tag = re.sub(r"#(.)\1(.)\2(.)\3(?![0-9a-f])", r"#\1\2\3", tag)
     tag = tag.replace('style="; ', 'style="').replace(' style=""', "").replace(": ", ":").replace("; ", ";")
     return _NUMBER.sub(lambda found: _short(float(found[0]), 2), tag)
 
 
-def _grouped(uses: str) -> str:
-    """Marks of one style in one group that has it."""
+def _named_briefly(svg: str) -> str:
+    """Inner names of a letter and a number in place of matplotlib's long ones."""
+    names: dict[str, str] = {}
+    return _LONG_NAME.sub(lambda found: names.setdefault(found[0], f"{found[0][0]}{len(names)}"), svg)
+
+
+def _marked(uses: str, numbers: Iterator[int]) -> str:
+    """Many marks of one style as one invisible line that has the mark at every corner."""
     found = _USE.findall(uses)
-    if not found or len({(mark, style) for mark, _, _, style in found}) > 1 or len(found) < 2:
+    if len({(mark, style) for mark, _, _, style in found}) > 1 or len(found) < 3:
         return uses
     mark, style = found[0][0], found[0][3]
-    places = "".join(f'<use xlink:href="{mark}" x="{x}" y="{y}"/>' for _, x, y, _ in found)
-    return f'<g style="{style}">{places}</g>'
+    name = f"k{next(numbers)}"
+    corners = " ".join(f"{'L' if i else 'M'} {x} {y}" for i, (_, x, y, _) in enumerate(found))
+    everywhere = ";".join(f"marker-{place}:url(#{name})" for place in ("start", "mid", "end"))
+    return (
+        f'<marker id="{name}" overflow="visible" markerUnits="userSpaceOnUse">'
+        f'<use xlink:href="{mark}" style="{style}"/></marker>'
+        f'<path d="{corners}" style="fill:none;stroke:none;{everywhere}"/>'
+    )
 
 
 def _path(d: str) -> str:

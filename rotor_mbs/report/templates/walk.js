@@ -5,7 +5,6 @@
 
   const drawing = (figure) => {
     const copy = figure.querySelector("svg").cloneNode(true), box = copy.viewBox.baseVal;
-    copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
     copy.setAttribute("width", `${WIDTH_MM}mm`);
     copy.setAttribute("height", `${(WIDTH_MM * box.height) / box.width}mm`);
     copy.setAttribute("style", "font-family:'DejaVu Sans',Verdana,Arial,sans-serif;stroke-linejoin:round;background:#fff");

@@ -1,0 +1,143 @@
+"""A scene as an animated WebP or GIF, or as MP4 where ffmpeg is found: printed and right model side by side.
+
+The only file that knows Pillow and ffmpeg.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from rotor_mbs.analysis import methods
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.report.canvas import font_file
+from rotor_mbs.report.frames import Wires, wires
+from rotor_mbs.report.names import GREY, coordinate_look, name_of
+from rotor_mbs.report.viewer import has_offset, scene_of
+from rotor_mbs.store.read import StoredRun, StoredScene, open_results
+
+Array = NDArray[Any]
+SUFFIXES = (".webp", ".gif", ".mp4")
+RATE = 20  # frames a second, in real time
+_LONGEST = 600  # frames: a longer scene is shown faster
+_SIDE, _TOP, _FINE = 420, 40, 2  # pixels of a square, of the line of text above; drawn twice as large, then made small
+_PATH_POINTS = 4  # along a path, from one frame to the next
+_INK, _FAINT = "#1b1f24", "#d5dae0"
+
+
+def write_animation(results: Path, name: str, output: Path, magnified: float) -> Path:
+    """`magnified`: how many times the tip's distance from the pitch axis is drawn; it is told in the picture.
+
+    Raises InputError for a scene that the file does not have or a suffix that cannot be made here, StoreError.
+    """
+    kind = output.suffix.lower()
+    if kind not in SUFFIXES:
+        raise InputError(f"{output}: unknown kind of file {kind or '(none)'}; allowed: {', '.join(SUFFIXES)}")
+    if kind == ".mp4" and shutil.which("ffmpeg") is None:
+        raise InputError(
+            f"{output}: MP4 needs ffmpeg, which is not found here; allowed: .webp, .gif, or install ffmpeg"
+        )
+    with open_results(results) as opened:
+        if name not in opened.scenes:
+            raise InputError(f"{results}: {name!r}: no such scene in it; allowed: {', '.join(opened.scenes) or 'none'}")
+        pictures, step = frames(opened.scenes[name], magnified)
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        if kind == ".mp4":
+            _film(pictures, step, output)
+        else:
+            _animated(pictures, step, output)
+    except OSError as exc:
+        raise StoreError(f"{output}: cannot be written: {exc.strerror or exc}") from exc
+    return output
+
+
+def frames(stored: StoredScene, magnified: float) -> tuple[Iterator[Image.Image], float]:
+    """The pictures and the seconds each is shown. Raises InputError where nothing can be drawn."""
+    scene = scene_of(stored)
+    runs = {
+        name_of(run.method): run
+        for run in (methods.printed_run(stored), methods.right_run(stored))
+        if run is not None and "angles" in run
+    }
+    if scene is None or not runs:
+        raise InputError(f"{stored.name}: nothing to draw: no angles, or its scene file is not known")
+    end = max(float(run.array("time")[-1]) for run in runs.values())
+    count = max(2, min(round(end * RATE) + 1, _LONGEST))
+    at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
+    factor = magnified if has_offset(scene) else 1.0
+    drawn = {name: wires(scene, run.array("time"), _finite(run), at, factor) for name, run in runs.items()}
+    return (_picture(drawn, i, float(at[i]), factor) for i in range(0, len(at), _PATH_POINTS)), 1.0 / RATE
+
+
+def _finite(run: StoredRun) -> Array:
+    found: Array = np.nan_to_num(run.array("angles"), posinf=0.0, neginf=0.0)
+    return found
+
+
+def _picture(drawn: Mapping[str, Wires], frame: int, time: float, magnified: float) -> Image.Image:
+    size = (_SIDE * len(drawn), _SIDE + _TOP)
+    image = Image.new("RGB", (_FINE * size[0], _FINE * size[1]), "white")
+    pen = ImageDraw.Draw(image)
+    font = ImageFont.truetype(str(font_file()), 12 * _FINE)
+    for place, (name, wire) in enumerate(drawn.items()):
+        left = _FINE * place * _SIDE
+        last = min(frame, wire.ended - 1)
+        over = f", ended at {time * last / frame:.2f} s" if frame > last else ""
+        pen.text((left + 12 * _FINE, 4 * _FINE), f"{name}{over}", _INK, font)
+        _rotor(pen, wire, last, (left + _FINE * _SIDE / 2, _FINE * (_TOP + _SIDE / 2)))
+    told = f"t = {time:.2f} s" + (f", offset drawn ×{magnified:g}" if magnified != 1.0 else "")
+    pen.text((12 * _FINE, 22 * _FINE), told, GREY, font)
+    return image.resize(size, Image.Resampling.LANCZOS)
+
+
+def _rotor(pen: ImageDraw.ImageDraw, wire: Wires, frame: int, centre: tuple[float, float]) -> None:
+    """Paths up to the frame, then the blades upon them."""
+    scale = 0.5 * _FINE * _SIDE / (1.08 * wire.reach)
+
+    def at(point: Array) -> tuple[float, float]:
+        return centre[0] + scale * float(point[0]), centre[1] - scale * float(point[1])
+
+    for blade in range(wire.edge.shape[1]):
+        colour, _ = coordinate_look(blade + 1)
+        path = [at(point) for point in wire.edge[: frame + 1, blade]]
+        if len(path) > 1:
+            pen.line(path, fill=colour, width=_FINE)
+    for blade in range(wire.edge.shape[1]):
+        colour, _ = coordinate_look(blade + 1)
+        axis, edge, root = (at(points[frame, blade]) for points in (wire.axis, wire.edge, wire.root))
+        pen.polygon([centre, axis, edge, root], fill=_FAINT)
+        pen.line([centre, axis, edge, root, centre], fill=colour, width=3 * _FINE, joint="curve")
+    dot = 6 * _FINE
+    pen.ellipse((centre[0] - dot, centre[1] - dot, centre[0] + dot, centre[1] + dot), fill=_INK)
+
+
+def _animated(pictures: Iterator[Image.Image], step: float, output: Path) -> None:
+    first = next(pictures)
+    options = {"quality": 50, "method": 0} if output.suffix.lower() == ".webp" else {"optimize": False}
+    first.save(output, save_all=True, append_images=pictures, duration=round(1000 * step), loop=0, **options)
+
+
+def _film(pictures: Iterator[Image.Image], step: float, output: Path) -> None:
+    first = next(pictures)
+    size = f"{first.width}x{first.height}"
+    command = [
+        "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", f"{1 / step:g}",
+        "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(output.absolute()),
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
+        assert ffmpeg.stdin is not None
+        assert ffmpeg.stderr is not None
+        for picture in (first, *pictures):
+            ffmpeg.stdin.write(picture.tobytes())
+        ffmpeg.stdin.close()
+        told = ffmpeg.stderr.read().decode(errors="replace").strip()
+    if ffmpeg.returncode:
+        raise StoreError(f"{output}: ffmpeg could not make it: {told.splitlines()[-1] if told else 'no reason given'}")

@@ -1,0 +1,224 @@
+"""Every page of a report in a headless Chromium: no error, no request, no sideways scrolling, axe-core content.
+
+Run with -m browser. Needs Chromium, and npm for axe-core. The report is a small one made here, or the folder that the
+environment variable ROTOR_MBS_REPORT names.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import tarfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from devtools import PROGRAM, Page
+from scenes import paper
+from stored import Made, rotor, store
+
+from rotor_mbs.report.build import write_report
+
+pytestmark = [pytest.mark.browser, pytest.mark.skipif(not PROGRAM, reason="no Chromium here")]
+SIZES = (390, 1440)
+SWING = rotor(lambda t: 0.5 + 0.2 * t, lambda t: np.sin(3.0 * t), np.cos, np.sin)
+AXE_RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice"]
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    named = os.environ.get("ROTOR_MBS_REPORT")
+    if named:
+        return Path(named)
+    folder = tmp_path_factory.mktemp("report")
+    runs = []
+    for name in ("fig11", "fig14c", "fig03"):
+        scene = paper(name, samples=201)
+        curve = SWING if len(scene.blades) == 3 else lambda t: np.stack([np.sin(t), 0.1 * t], axis=1)
+        runs += [Made(scene, "reference", curve), Made(scene, "exudyn_tree/rk67", curve)]
+        runs.append(Made(scene, "printed/ode45", lambda t, c=curve: 1.1 * c(t), until=0.7, gain=1e6))
+    results = store(folder / "r.h5", runs)
+    return write_report(results, folder / "out").parent
+
+
+@pytest.fixture(scope="session")
+def pages(report: Path) -> list[Path]:
+    return sorted(report.glob("*.html"))
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    opened = Page()
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="session")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """axe-core's text, as npm has it."""
+    if not shutil.which("npm"):
+        pytest.skip("no npm to get axe-core with")
+    folder = tmp_path_factory.mktemp("axe")
+    done = subprocess.run(["npm", "pack", "axe-core@4"], cwd=folder, capture_output=True, text=True, check=False)
+    archive = next(folder.glob("axe-core-*.tgz"), None)
+    if done.returncode or archive is None:
+        pytest.skip(f"npm could not get axe-core: {done.stderr.strip()[-200:]}")
+    with tarfile.open(archive) as packed:
+        member = packed.extractfile("package/axe.min.js")
+        assert member is not None
+        return member.read().decode()
+
+
+@pytest.mark.parametrize("width", SIZES)
+def test_no_error_no_request_no_sideways_scrolling(page: Page, pages: list[Path], width: int) -> None:
+    for path in pages:
+        seconds = page.open(path, width)
+        assert page.faults == [], path.name
+        assert page.run("document.documentElement.scrollWidth") <= width, path.name
+        assert seconds < 5.0, path.name  # a machine in use; alone it is a fraction of a second
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", SIZES)
+def test_axe_finds_nothing(page: Page, pages: list[Path], axe: str, width: int, scheme: str) -> None:
+    found = []
+    for path in pages:
+        page.open(path, width, scheme=scheme)
+        page.run(f"{axe}; 0")
+        options = {"runOnly": {"type": "tag", "values": AXE_RULES}, "resultTypes": ["violations"]}
+        violations = page.run(
+            f"axe.run({json.dumps(options)}).then(r => r.violations.map(v => [v.id, v.nodes.length, "
+            "v.nodes[0].target.join(' '), v.nodes[0].failureSummary]))"
+        )
+        found += [(path.name, *violation) for violation in violations]
+    assert found == []
+
+
+def _scene(pages: list[Path]) -> Path:
+    return next(path for path in pages if path.name == "paper-fig11.html")
+
+
+@pytest.mark.parametrize("width", SIZES)
+def test_the_viewer_moves_and_stops(page: Page, pages: list[Path], width: int) -> None:
+    page.open(_scene(pages), width)
+    page.run("document.querySelector('.viewer').scrollIntoView()")
+    time.sleep(0.3)
+    still = page.picture()
+    time.sleep(0.3)
+    assert page.picture() == still  # nothing moves before one asks
+    page.run("document.querySelector('[data-part=play]').click()")
+    time.sleep(0.6)
+    moving = page.picture()
+    assert moving != still
+    page.run("document.querySelector('[data-part=play]').click()")
+    time.sleep(0.3)
+    stopped = page.picture()
+    time.sleep(0.3)
+    assert page.picture() == stopped != moving
+    assert page.faults == []
+
+
+def test_the_viewer_obeys_the_keyboard(page: Page, pages: list[Path]) -> None:
+    page.open(_scene(pages), 1440)
+    page.run("document.querySelector('.viewer').scrollIntoView(); document.querySelector('.viewer canvas').focus()")
+    clock = "document.querySelector('[data-part=clock]').textContent"
+    seen = [page.picture()]
+    for key, number in (("ArrowLeft", 37), ("ArrowUp", 38), ("End", 35)):
+        page.key(key, number=number)
+        time.sleep(0.2)
+        seen.append(page.picture())
+    assert len(set(seen)) == len(seen)
+    assert page.run(clock) == "10.00 s"
+    page.key("Home", number=36)
+    page.key(".", "Period", 190)
+    time.sleep(0.2)
+    assert page.run(clock) == "0.03 s"  # one frame of 10 s / 360
+
+
+@pytest.mark.parametrize("how", ["mouse", "touch"])
+def test_the_view_turns_by_dragging(page: Page, pages: list[Path], how: str) -> None:
+    page.open(_scene(pages), 390)
+    page.run("document.querySelector('.viewer').scrollIntoView()")
+    time.sleep(0.3)
+    still = page.picture()
+    x, y = page.run("(() => { const b = document.querySelector('.viewer canvas').getBoundingClientRect();"
+                    "return [b.left + 150, b.top + 120]; })()")  # fmt: skip
+    if how == "mouse":
+        for kind, at in (
+            ("mousePressed", x),
+            ("mouseMoved", x + 40),
+            ("mouseMoved", x + 90),
+            ("mouseReleased", x + 90),
+        ):
+            page.call("Input.dispatchMouseEvent", type=kind, x=at, y=y, button="left", buttons=1, clickCount=1)
+    else:
+        page.call("Emulation.setTouchEmulationEnabled", enabled=True)
+        for kind, points in (("touchStart", [x]), ("touchMove", [x + 40]), ("touchMove", [x + 90]), ("touchEnd", [])):
+            page.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": at, "y": y} for at in points])
+        page.call("Emulation.setTouchEmulationEnabled", enabled=False)
+    time.sleep(0.3)
+    assert page.picture() != still
+
+
+def test_overlaid_and_magnified_pictures_differ(page: Page, pages: list[Path]) -> None:
+    page.open(_scene(pages), 1440)
+    page.run("document.querySelector('.viewer').scrollIntoView()")
+    time.sleep(0.3)
+    seen = [page.picture()]
+    for part, value in (("mode", "over"), ("offset", "5"), ("time", "500")):
+        page.run(
+            f"(() => {{ const e = document.querySelector('[data-part={part}]'); e.value = '{value}';"
+            "e.dispatchEvent(new Event('input')); })()"
+        )
+        time.sleep(0.3)
+        seen.append(page.picture())
+    assert len(set(seen)) == len(seen)
+    assert page.run("document.querySelector('[data-part=times]').textContent") == "×5"
+
+
+def test_every_control_is_reached_by_the_tab_key(page: Page, pages: list[Path]) -> None:
+    page.open(_scene(pages), 1440)
+    reached = set()
+    for _ in range(60):
+        page.key("Tab", number=9)
+        reached.add(page.run("document.activeElement.dataset.part || document.activeElement.tagName"))
+    assert {"play", "time", "speed", "mode", "offset", "CANVAS", "BUTTON"} <= reached
+
+
+def test_without_scripts_and_in_print_the_still_picture_stands(page: Page, pages: list[Path]) -> None:
+    page.call("Emulation.setScriptExecutionDisabled", value=True)
+    page.open(_scene(pages), 390)
+    page.call("Emulation.setScriptExecutionDisabled", value=False)
+    assert page.run("document.querySelector('.viewer').offsetHeight") == 0
+    assert page.run("document.querySelector('#paths figure svg').getBoundingClientRect().height") > 100
+    page.open(_scene(pages), 1440)
+    assert page.run("document.querySelector('.viewer').offsetHeight") > 100
+    page.call("Emulation.setEmulatedMedia", media="print")
+    assert page.run("document.querySelector('.viewer').offsetHeight") == 0
+    assert page.run("document.querySelector('#paths figure svg').getBoundingClientRect().height") > 100
+    page.call("Emulation.setEmulatedMedia", media="")
+
+
+def test_a_picture_can_be_saved_at_print_size(page: Page, pages: list[Path]) -> None:
+    page.open(next(path for path in pages if path.name == "figures.html"), 1440)
+    page.run(
+        "window.saved = []; URL.createObjectURL = (blob) => { saved.push(blob); return 'blob:none'; };"
+        "HTMLAnchorElement.prototype.click = function () { saved.push(this.download); }; 0"
+    )
+    for kind in ("svg", "png"):
+        page.run(f"document.querySelector('.downloads [data-kind={kind}]').click()")
+    until = time.monotonic() + 20.0
+    while page.run("saved.length") < 4 and time.monotonic() < until:
+        time.sleep(0.1)
+    text = page.run("saved[0].text()")
+    assert text.startswith("<svg")
+    assert 'width="132.08mm"' in text
+    assert page.run("saved[2].type") == "image/png"
+    # 132.08 mm at 600 dots an inch: the width stands in bytes 16 to 19 of a PNG.
+    assert page.run("saved[2].arrayBuffer().then(b => new DataView(b).getUint32(16))") == 3120
+    assert page.run("[saved[1], saved[3]].join()").endswith(".png")
+    assert page.faults == []
