@@ -377,6 +377,7 @@ _KNOWN = [
     ],
     ("tip", "check/held", "lagrange/dop853", 1e-6),
     ("tip", "check/held", "exudyn_chain/generalized_alpha", 1e-6),
+    ("tip", "check/held", "exudyn_chain/newmark_index2", 1e-2),
     ("energies", "check/held", "lagrange/dop853", 1e-6),
     ("energies", "check/held", "exudyn_chain/generalized_alpha", 1e-2),
     ("start", "check/held", "lagrange/dop853", 1e-6),

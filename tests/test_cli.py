@@ -134,7 +134,8 @@ def test_interrupt_ends_with_130_and_keeps_what_is_finished(tmp_path: Path) -> N
 
 def test_a_run_over_its_time_limit_is_recorded_and_the_rest_goes_on(tmp_path: Path, quick: Path) -> None:
     ended = rotor_mbs(
-        "run", "paper/fig11", quick, "-m", "exudyn_chain/generalized_alpha", "--timeout", "0.6", "-o", "r.h5", cwd=tmp_path
+        "run", "paper/fig11", quick, "-m", "exudyn_chain/generalized_alpha", "--timeout", "0.6", "-o", "r.h5",
+        cwd=tmp_path,
     )  # fmt: skip
     assert ended.returncode == 1
     with open_results(tmp_path / "r.h5") as results:

@@ -1,4 +1,4 @@
-"""Each model runs without the others' engines, the report without any, and importing the package costs next to nothing."""
+"""Each model runs without the others' engines, the report without any, and importing the package costs little."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ def python(code: str) -> subprocess.CompletedProcess[str]:
         ("printed/ode45", ["heyoka", "scipy", "exudyn"]),
     ],
 )
-def test_a_model_runs_without_the_other_engines(method: str, blocked: list[str], request: pytest.FixtureRequest) -> None:
+def test_a_model_runs_without_the_other_engines(
+    method: str, blocked: list[str], request: pytest.FixtureRequest
+) -> None:
     if method == "lagrange/taylor":
         pytest.importorskip("heyoka")
     others = [m for m in ("printed", "lagrange", "multibody") if m != _package(method)]

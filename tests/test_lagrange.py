@@ -203,8 +203,6 @@ def test_blades_may_change_places() -> None:
     assert np.abs(one.angles[:until, 1:] - other.angles[:until][:, [2, 3, 1]]).max() <= 1e-10
 
 
-
-
 def test_error_growth_is_that_of_neighbouring_runs() -> None:
     """The largest singular value bounds what any perturbation does, and some direction comes near it."""
     scene = paper("fig11", duration=3.0, samples=31)

@@ -125,9 +125,7 @@ def test_shaft_damping_slows_the_rotor_exponentially(name) -> None:
 def test_a_balanced_blade_is_a_damped_torsion_oscillator(name, start) -> None:
     # com on the pitch axis and Jxx = Jyy: the rotor does not feel the pitch, nor the pitch the rotor
     k, d, J = 40.0, 3.0, 7.0
-    scene = make_scene(
-        [0.1, start], [1.0, 0.5], (AXIAL,), gravity=0.0, bearing_stiffness=(k,), bearing_damping=(d,)
-    )
+    scene = make_scene([0.1, start], [1.0, 0.5], (AXIAL,), gravity=0.0, bearing_stiffness=(k,), bearing_damping=(d,))
     got = run(name, scene)
     decay, w = d / (2 * J), np.sqrt(k / J - (d / (2 * J)) ** 2)
     a, b = start, (0.5 + decay * start) / w

@@ -64,8 +64,12 @@ def test_unlike_blades_hub_springs_dampers_and_torque_follow_the_closed_form(nam
 @pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
 def test_any_number_of_blades(name, count) -> None:
     scene = make_scene(
-        [0.4, *np.linspace(-0.5, 0.6, count)], [0.3, *np.linspace(0.2, -0.4, count)],
-        tuple((STOUT, SLIM)[i % 2] for i in range(count)), duration=0.5, samples=51, hub_inertia=20.0,
+        [0.4, *np.linspace(-0.5, 0.6, count)],
+        [0.3, *np.linspace(0.2, -0.4, count)],
+        tuple((STOUT, SLIM)[i % 2] for i in range(count)),
+        duration=0.5,
+        samples=51,
+        hub_inertia=20.0,
     )
     assert angle_error(run(name, scene), closed_form(scene)) < (1e-11 if name in TREE else 1e-5)
 
@@ -160,7 +164,9 @@ def test_rotation_vector_nodes_move_the_same(name) -> None:
 def test_turning_the_rotor_by_a_third_and_renaming_blades_changes_nothing(name) -> None:
     scene = make_scene([0.2, 0.3, -0.6, 0.9], [0.5, 0.1, 0.2, -0.3], (STOUT, SLIM, PAPER), duration=0.3, samples=31)
     turned = replace(
-        scene, blades=(SLIM, PAPER, STOUT), initial_angles=(0.2 + 2 * pi / 3, -0.6, 0.9, 0.3),
+        scene,
+        blades=(SLIM, PAPER, STOUT),
+        initial_angles=(0.2 + 2 * pi / 3, -0.6, 0.9, 0.3),
         initial_rates=(0.5, 0.2, -0.3, 0.1),
     )
     one, other = run(name, scene), run(name, turned)

@@ -28,17 +28,33 @@ ALL = ("angles", "rates", "tip", "energy")
 def make_scene(angles, rates, blades=None, gravity=9.8, duration=1.0, samples=101, outputs=ALL, **more) -> Scene:
     """A scene with as many of the paper's blades as there are pitch angles, unless told otherwise."""
     return Scene(
-        name="test", title="test", figures=(), gravity=gravity, duration=duration, samples=samples, outputs=outputs,
-        blades=blades or (PAPER,) * (len(angles) - 1), hub_inertia=more.pop("hub_inertia", 0.0),
-        initial_angles=tuple(map(float, angles)), initial_rates=tuple(map(float, rates)), **more,
+        name="test",
+        title="test",
+        figures=(),
+        gravity=gravity,
+        duration=duration,
+        samples=samples,
+        outputs=outputs,
+        blades=blades or (PAPER,) * (len(angles) - 1),
+        hub_inertia=more.pop("hub_inertia", 0.0),
+        initial_angles=tuple(map(float, angles)),
+        initial_rates=tuple(map(float, rates)),
+        **more,
     )
 
 
 FIG08 = make_scene([0, pi / 4, 0, 0], [0] * 4, duration=10.0, samples=1001)
 FIG11 = make_scene([pi / 6, pi / 4, pi / 6, pi / 2], [pi / 10, 0, 0, 0], duration=10.0, samples=1001)
 MIXED = make_scene(
-    [0.3, 0.4, -0.2, 1.0], [1.0, 0.5, -0.3, 0.2], (STOUT, SLIM, STOUT), duration=1.6, samples=161, hub_inertia=500.0,
-    bearing_stiffness=(2000.0, 3000.0, 100.0), bearing_damping=(5.0, 8.0, 1.0), shaft_damping=200.0,
+    [0.3, 0.4, -0.2, 1.0],
+    [1.0, 0.5, -0.3, 0.2],
+    (STOUT, SLIM, STOUT),
+    duration=1.6,
+    samples=161,
+    hub_inertia=500.0,
+    bearing_stiffness=(2000.0, 3000.0, 100.0),
+    bearing_damping=(5.0, 8.0, 1.0),
+    shaft_damping=200.0,
     rotor_torque=((0.1234, 0.0), (0.777, 2000.0), (0.777, -1000.0), (1.5, -1000.0), (1.5, 500.0)),
 )
 
@@ -86,7 +102,13 @@ def closed_form(scene: Scene, duration: float | None = None):
         wanted = times[(times > start + 1e-12) & (times <= stop + 1e-12)].clip(max=stop)
         last = wanted if len(wanted) and wanted[-1] == stop else np.append(wanted, stop)
         run = solve_ivp(
-            lambda t, y, held=held: acceleration(held, t, y), (start, stop), y, "DOP853", last, rtol=1e-13, atol=1e-14,
+            lambda t, y, held=held: acceleration(held, t, y),
+            (start, stop),
+            y,
+            "DOP853",
+            last,
+            rtol=1e-13,
+            atol=1e-14,
         )
         rows += list(run.y.T[: len(wanted)])
         y = run.y[:, -1]

@@ -25,6 +25,7 @@ from rotor_mbs.scenario.scene import Scene
 
 # Mutants that no verdict can tell from the original, by module.function and what is changed, and why.
 EXPLAINED = {
+    r"closed_form\.energies .*(0\.0 \* sin_q|sin_q -> cos_q at column 22)": "a zero of the right kind of number",
     r"literal\.held_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine)": (
         "multiplies c, which is 0 where this function is used"
     ),

@@ -11,10 +11,10 @@ from scipy.special import ellipj, ellipk
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.models.base import solve
+from rotor_mbs.models.ode45 import ode45
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.method import METHODS, right_hand_side
-from rotor_mbs.models.ode45 import ode45
 from rotor_mbs.scenario.scene import Blade, Scene
 
 PI = math.pi

@@ -44,7 +44,7 @@ def test_every_scene_by_every_model_and_all_right_ones_ok(reproduced: Path) -> N
 
 
 def test_the_printed_model_makes_energy_and_the_right_ones_do_not(reproduced: Path) -> None:
-    """In most of the paper's figures, more than a thousandth of all energy there is; the right models a 1e-9 at most."""
+    """In most of the paper's figures, more than a thousandth of all energy; the right models at most 1e-9."""
     with open_results(reproduced / "results.h5") as results:
         made = [scene.runs["printed/ode45"].attributes["energy_drift_max"] for scene in results.scenes.values()]
         kept = [

@@ -174,7 +174,7 @@ def _command_line(pid: int) -> bytes:
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
 def test_killed_and_terminated_a_sweep_goes_on_and_ends_with_the_same_bytes(tmp_path: Path) -> None:
-    path = _file(tmp_path, draws=40, duration=1.0)
+    path = _file(tmp_path, draws=30, duration=0.5)
     whole, output = tmp_path / "whole.h5", tmp_path / "o.h5"
     subprocess.run(_command(path, whole), check=True, capture_output=True)
     size = 0
@@ -197,7 +197,7 @@ def test_killed_and_terminated_a_sweep_goes_on_and_ends_with_the_same_bytes(tmp_
         size = _journal_size(output)
     ended = subprocess.run(_command(path, output, "--json"), check=True, capture_output=True)
     made = json.loads(ended.stdout.splitlines()[-1])["made"]
-    assert made < 80
+    assert made < 60
     assert output.read_bytes() == whole.read_bytes()
 
 

@@ -13,7 +13,7 @@ _KEPT = ("time", "coordinate", "angles", "rates", "work", "angle_uncertainty", "
 
 
 def freeze(source: Path, target: Path, date: str) -> None:
-    """Angles, rates, uncertainty and growth of every reference in `source` into `target`, atomically; their digests too.
+    """Angles, rates, uncertainty and growth of every reference in `source` into `target`, atomically; digests too.
 
     Tip and energies follow from angles and rates. The work is kept only where it does not. Raises StoreError.
     """

@@ -126,6 +126,4 @@ def _energy_sensors(link: int, body: Body) -> list[Part]:
 
 
 def _link_sensor(name: str, quantity: str, link: int, point: Array) -> Part:
-    return sensor(
-        name, "SensorKinematicTree", quantity, objectNumber=_TREE, linkNumber=link, localPosition=list(point)
-    )
+    return sensor(name, "SensorKinematicTree", quantity, objectNumber=_TREE, linkNumber=link, localPosition=list(point))
