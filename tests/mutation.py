@@ -50,7 +50,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change: "line 12: s2 -> c2" of a module's function; `make` gives the module's text with it."""
+    """One change: "line 12:30: s2 -> c2" of a module's function; `make` gives the module's text with it."""
 
     group: str
     module: str
@@ -167,7 +167,7 @@ def mutants(target: Target) -> list[Mutant]:
         if function.name in target.functions or target.functions == ("*",):
             for number, (node, parents) in enumerate(_walk(function)):
                 for what, change in _changes(node, parents, function, target):
-                    where = f"line {getattr(node, 'lineno', function.lineno)}: {what}"
+                    where = f"line {getattr(node, 'lineno', 0)}:{getattr(node, 'col_offset', 0)}: {what}"
                     source = functools.partial(_changed, tree, function, number, change)
                     found.append(Mutant(target.group, target.module, function.name, where, source))
     return found
@@ -294,7 +294,7 @@ def _sine_for_cosine(node: ast.Name, function: ast.FunctionDef, target: Target) 
         return
     other = {"s": "c", "c": "s"}[match[1]] + match[2].replace("in_", "#").replace("os_", "in_").replace("#", "os_")
     if other in known:
-        yield f"{node.id} -> {other} at column {node.col_offset}", lambda _: ast.Name(other, ast.Load())
+        yield f"{node.id} -> {other}", lambda _: ast.Name(other, ast.Load())
 
 
 def _constant(node: ast.Constant, parents: Sequence[ast.AST], target: Target) -> Iterator[tuple[str, Change]]:
@@ -306,8 +306,8 @@ def _constant(node: ast.Constant, parents: Sequence[ast.AST], target: Target) ->
         return
     if isinstance(value, int) and target.group != "printed":
         return
-    new = value * (1.0 + target.share) if value else 1e-3
-    yield f"{value} -> {new!r} at column {node.col_offset}", lambda _: ast.Constant(new)
+    new = value * (1.0 + target.share) if value else 1e3 * target.share  # of units of order one
+    yield f"{value} -> {new!r}", lambda _: ast.Constant(new)
 
 
 _OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,

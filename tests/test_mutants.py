@@ -25,14 +25,40 @@ from rotor_mbs.scenario.scene import Scene
 
 # Mutants that no verdict can tell from the original, by module.function and what is changed, and why.
 EXPLAINED = {
-    r"closed_form\.energies .*(0\.0 \* sin_q|sin_q -> cos_q at column 22)": "a zero of the right kind of number",
-    r"literal\.held_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine)": (
-        "multiplies c, which is 0 where this function is used"
+    r"closed_form\.energies .*(0\.0 \* sin_q|:22: sin_q -> cos_q)": "a zero of the right kind of number",
+    r"parameters\._cosine_of_turn .*sign in \(?turn \+ Fraction": "the same angle but for a whole turn",
+    r"samples\.trajectory .*2 \* count scaled": "a count of columns: what it is compared with is whole",
+    r"geometry\._turn .*2 \* rest scaled": "compares whole numbers",
+    r"geometry\._cos_sin .*1\.0 / 3\.0": (
+        "the last bit of sin 30°, which makes balanced blades balance exactly; `test_multibody_parts` sees it"
+    ),
+    r"geometry\.hub_body .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
+    r"geometry\._joined .*part\.com - com scaled": "about the common centre of mass: of second order, 1e-12",
+    r"geometry\._joined .*r @ r \* np\.eye": "held blades lie in the rotor's plane: about y the product is zero",
+    r"tree\._tree .*without detail": "words of a listing",
+    r"energy\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack)": "a tolerance in matching times",
+    r"energy\.work .*last - first": "a run that stopped before this stretch of the torque: none here does",
+    r"energy\.cumulative_integral .*(points // 2|np\.arange|points \+ 1|abscissae)": (
+        "a quadrature with orders to spare: what is left of them is still below the energy's bound"
+    ),
+    r"chain\._rotor_torque .*0\.0 -> ": "a torque across the shaft: its bearing takes it",
+    r"readings\._joint_motion .*_dot\(hub_omega, z\)": "the hub turns about y, and a pitch axis has no y: zero identically",
+    r"readings\._dot ": "a pitch is read off twice, across and along the shaft; either alone tells it",
+    r"observe\.unwrap .*(rates\[1:\]|predicted|scaled)": (
+        "rounded to whole turns; the prediction is needed above half a turn between rows, 3000 rad/s"
+    ),
+    r"timetable\.legs .*(piece\.start|scene\.samples - 1|place - near)": (
+        "between which two samples a kink lies, and whether it is on one: either way the engine stops there"
+    ),
+    r"timetable\.legs .*t0 \+ t1": "any instant inside the leg tells its piece",
+    r"timetable\.legs .*end - start scaled": "rounded to a whole number of intervals",
+    r"literal\.held_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:49: .* q2 \+ phase)": (
+        "the cosine multiplies c, which is 0 where this function is used"
     ),
     r"literal\.three_blade_accelerations .*c[345] -> s[345]": (
         "goes into the first row of (56) alone, whose place `rotor_gravity` takes"
     ),
-    r"matrices\.a3 .*-> (0\.001|1\.000001) at column": "the last row of a transformation matrix: nothing reads it",
+    r"matrices\.a3 .*-> (0\.001|1\.000001)$": "the last row of a transformation matrix: nothing reads it",
     r"derivation\.blade_terms .*[sc]3 -> [sc]3": (
         "the matrix's last column, which is all that a point mass in the frame's origin takes of it, does not have it"
     ),

@@ -146,6 +146,7 @@ def _energies_off(scene: Scene, trajectory: Trajectory) -> dict[str, float]:
         "kinetic energy": (trajectory.kinetic_energy, kinetic),
         "potential energy": (trajectory.potential_energy, kinematics.potential_energy(scene, angles)),
         "work": (trajectory.work, kinematics.work_of_constant_torque(scene, angles)),
+        "work at the start": (None if trajectory.work is None else trajectory.work[:1], np.zeros(1)),
     }
     scale = max(energy_scale(scene, trajectory), float(np.abs(kinetic).max())) or 1.0
     return {

@@ -6,7 +6,7 @@ import functools
 import hashlib
 import json
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,8 @@ from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
 from rotor_mbs.trajectory.outcome import is_held
 
+_SLOW_MODELS = ("exudyn_chain", "printed", "exudyn_tree")
+
 
 @dataclass(frozen=True)
 class Batch:
@@ -30,6 +32,7 @@ class Batch:
 
     methods        by scene name
     use_frozen     whether a shipped reference may stand for a computed one
+    also           writes a results file with what belongs into the output beside the runs
     """
 
     scenes: Sequence[Scene]
@@ -38,6 +41,7 @@ class Batch:
     workers: int
     timeout_s: float
     use_frozen: bool = True
+    also: Callable[[Path], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,9 @@ def execute(batch: Batch) -> Report:
     ]
     _refuse_losses(batch, [*references, *runs])
     made: list[tuple[Task, Summary]] = []
-    missing = [[task for task in wave if not _is_there(task, there)] for wave in (references, runs)]
+    missing = [
+        sorted((task for task in wave if not _is_there(task, there)), key=_slowest_first) for wave in (references, runs)
+    ]
     progress = Progress(sum(map(len, missing)))
     for wave in missing:
         for finished in run_tasks(perform, wave, batch.workers, _hard_limit(batch.timeout_s)):
@@ -83,11 +89,18 @@ def execute(batch: Batch) -> Report:
             made.append((finished.task, summary))
             progress.tell(_line(finished.task, summary), keep=summary.status != "ok")
     progress.close()
+    if batch.also is not None:
+        batch.also(parts / "also.h5")
     if made or not batch.output.exists() or any(parts.iterdir()):
         sources = [batch.output] if batch.output.exists() else []
         merge(batch.output, [*sources, *sorted(parts.glob("*.h5"))], {**versions(), **machine()})
     shutil.rmtree(parts)
     return Report(made, len(references) + len(runs) - len(made))
+
+
+def _slowest_first(task: Task) -> int:
+    """So that no long run starts last and keeps one process busy while the others wait."""
+    return _SLOW_MODELS.index(model) if (model := task.method.split("/")[0]) in _SLOW_MODELS else len(_SLOW_MODELS)
 
 
 def _hard_limit(timeout_s: float) -> float:

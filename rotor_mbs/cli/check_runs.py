@@ -207,7 +207,7 @@ def _calibration() -> float:
 
 _SPEED_RUNS = 15
 # Medians of three `rotor-mbs check --speed` on the machine named in the README.
-SPEED_RATIOS = {"lagrange/taylor": 0.4, "exudyn_tree/rk67": 20.0}
+SPEED_RATIOS = {"lagrange/taylor": 0.42, "exudyn_tree/rk67": 24.0}
 
 
 @functools.cache

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,11 +15,10 @@ from rotor_mbs.cli.batch import Batch, Report, default_methods, execute
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.models.choice import choose
 from rotor_mbs.models.registry import ERRATA_METHODS, available_defaults, check_names
-from rotor_mbs.runner.environment import machine, numerics_fingerprint, versions
+from rotor_mbs.runner.environment import numerics_fingerprint
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.errata import errata_fingerprint, write_errata
-from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
 
 
@@ -50,26 +49,28 @@ def reproduce(arguments: argparse.Namespace) -> int:
     scenes = find_scenes(["paper"])
     methods, _ = _methods(scenes, (*available_defaults(), *ERRATA_METHODS))
     results = arguments.output / "results.h5"
-    report = execute(Batch(scenes, methods, results, arguments.jobs, arguments.timeout))
-    _add_errata(results)
+    errata = _errata_unless_in(results)
+    report = execute(Batch(scenes, methods, results, arguments.jobs, arguments.timeout, also=errata))
     status = _tell(report, results)
     index = render_if_changed(results, arguments.output / "report", arguments.jobs, arguments.lang)
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
 
 
-def _add_errata(path: Path) -> None:
-    """The check of every printed entry, into the results, unless the same code's is there already."""
+def _errata_unless_in(path: Path) -> Callable[[Path], None] | None:
+    """Writes the check of every printed entry; None where the results at `path` have that of the same code already."""
     from rotor_mbs.models.printed.errata import check_errata
 
-    with open_results(path) as results:
-        if errata_fingerprint(results) == numerics_fingerprint():
-            return
-    piece = path.with_name(f"{path.name}.errata")
-    checks = [asdict(check) | {"explained_by": ", ".join(check.explained_by)} for check in check_errata()]
-    write_errata(piece, checks, numerics_fingerprint())
-    merge(path, [path, piece], {**versions(), **machine()})
-    piece.unlink()
+    if path.exists():
+        with open_results(path) as results:
+            if errata_fingerprint(results) == numerics_fingerprint():
+                return None
+
+    def write(piece: Path) -> None:
+        checks = [asdict(check) | {"explained_by": ", ".join(check.explained_by)} for check in check_errata()]
+        write_errata(piece, checks, numerics_fingerprint())
+
+    return write
 
 
 def freeze(arguments: argparse.Namespace) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -30,13 +29,15 @@ def new_file(path: Path) -> Iterator[Any]:
     It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
     where the file cannot be written; what stood at `path` before then still stands.
     """
-    image = io.BytesIO()
-    with h5py.File(image, "w", libver=("earliest", "v108"), track_order=True) as file:
+    memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
+    with h5py.File(path.name, "w", libver=("earliest", "v108"), track_order=True, **memory) as file:
         file.attrs["Conventions"] = CONVENTIONS
         file.attrs["format"] = FORMAT
         file.attrs["format_version"] = FORMAT_VERSION
         yield file
-    replace_file(path, image.getbuffer())
+        file.flush()
+        image = file.id.get_file_image()
+    replace_file(path, image)
 
 
 def replace_file(path: Path, content: Buffer) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,16 +18,22 @@ from rotor_mbs.store import hdf5, layout
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A run (or the reference) in an open file.
+    """A run (or the reference) in an open file; what is asked for is read when it is asked for, attributes once.
 
     scene, method    "paper/fig05", "lagrange/taylor" (or "reference")
-    attributes       status, message, metrics, times ... as plain values
     """
 
     scene: str
     method: str
-    attributes: dict[str, Any]
     _group: Any
+
+    @functools.cached_property
+    def attributes(self) -> dict[str, Any]:
+        """Status, message, metrics, times ... as plain values. Raises StoreError where they are damaged."""
+        try:
+            return hdf5.attributes_of(self._group)
+        except (KeyError, OSError, RuntimeError) as exc:
+            raise StoreError(f"{self._group.file.filename}: {self._group.name}: damaged attributes ({exc})") from exc
 
     @property
     def status(self) -> str:
@@ -120,7 +127,7 @@ def _scenes(group: Any, name: str) -> Iterator[StoredScene]:
 def _runs(group: Any, scene: str) -> Iterator[StoredRun]:
     for model, item in group.items():
         if model == layout.REFERENCE:
-            yield StoredRun(scene, model, hdf5.attributes_of(item), item)
+            yield StoredRun(scene, model, item)
         elif hdf5.is_group(item):
             for integrator, run in item.items():
-                yield StoredRun(scene, f"{model}/{integrator}", hdf5.attributes_of(run), run)
+                yield StoredRun(scene, f"{model}/{integrator}", run)
