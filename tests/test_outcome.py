@@ -14,7 +14,7 @@ from scenes import paper
 from test_stability_exact import reference, run, scene
 
 from rotor_mbs.models.base import solve
-from rotor_mbs.models.deadline import OutOfTimeError, time_limit
+from rotor_mbs.models.deadline import OutOfTimeError, is_over, polled, time_limit
 from rotor_mbs.models.registry import METHOD_NAMES, find_method
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.outcome import energy_conditioning, is_held, judge
@@ -215,3 +215,13 @@ def test_a_long_run_keeps_its_samples_when_ended(method: str) -> None:
 def test_the_limit_reaches_plain_python() -> None:
     with pytest.raises(OutOfTimeError), time_limit(0.05):
         time.sleep(5.0)
+
+
+def test_who_knows_that_time_is_up_is_not_interrupted_and_the_next_run_starts_afresh() -> None:
+    """The signal may come a moment after the clock was read: samples on their way out must not be lost to it."""
+    with time_limit(0.05):
+        with polled():
+            while not is_over():
+                pass
+        time.sleep(0.1)  # here the signal arrives, outside `polled`
+    assert not is_over()

@@ -22,6 +22,7 @@ class OutOfTimeError(Exception):
 class _State:
     end = math.inf
     polled = False
+    told = False
 
 
 @contextmanager
@@ -31,21 +32,21 @@ def time_limit(seconds: float) -> Iterator[None]:
     if math.isinf(seconds):
         yield
         return
-    _State.end = time.monotonic() + seconds
+    _State.end, _State.told = time.monotonic() + seconds, False
     if usable:
         before = signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
-        _State.end = math.inf
         if usable:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, before)
+        _State.end, _State.told = math.inf, False
 
 
 def _interrupt(_number: int, _frame: object) -> None:
-    if not _State.polled:
+    if not (_State.polled or _State.told):
         raise OutOfTimeError(words())
 
 
@@ -65,7 +66,9 @@ def is_set() -> bool:
 
 
 def is_over() -> bool:
-    return time.monotonic() > _State.end
+    """Whether the limit is reached; who has been told so is not interrupted any more by a signal that comes late."""
+    _State.told = _State.told or time.monotonic() > _State.end
+    return _State.told
 
 
 def words() -> str:
