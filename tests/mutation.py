@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-_TIME_LIMIT_S = 20
+_TIME_LIMIT_S = 10
 # What is imported anew: what a mutant may be in, and what may have bound names of it.
 _ANEW = {"rules": ("rotor_mbs.trajectory", "rotor_mbs.analysis", "rotor_mbs.cli", "checking")}
 _ANEW_ELSE = ("rotor_mbs.models", "rotor_mbs.cli", "checking")

@@ -42,8 +42,9 @@ EXPLAINED = {
         "a quadrature with orders to spare: what is left of them is still below the energy's bound"
     ),
     r"chain\._rotor_torque .*0\.0 -> ": "a torque across the shaft: its bearing takes it",
-    r"readings\._joint_motion .*_dot\(hub_omega, z\)": "the hub turns about y, and a pitch axis has no y: zero identically",
+    r"readings\._joint_motion .*_dot\(hub_omega, z\)": "the hub turns about y, a pitch axis has no y: always zero",
     r"readings\._dot ": "a pitch is read off twice, across and along the shaft; either alone tells it",
+    r"observe\.unwrap .*right side of start - wrapped\[0\] lost": "rounded to turns, and less than half of one",
     r"observe\.unwrap .*(rates\[1:\]|predicted|scaled)": (
         "rounded to whole turns; the prediction is needed above half a turn between rows, 3000 rad/s"
     ),
