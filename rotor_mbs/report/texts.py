@@ -384,7 +384,7 @@ def _agreement(found: tuple[Agreement, ...]) -> str:
     models = len({model_of(agreement.method) for agreement in known})
     subject = counted[models]
     errors = _listed(f"{quantity(a.angle_error, 'rad')} ({name_of(a.method)})" for a in known)
-    text = f"{subject} that share nothing but the raw data" if models > 1 else subject
+    text = f"{subject} that are given nothing but the same raw data" if models > 1 else subject
     text += (
         f" {'keep' if models > 1 else 'keeps'} to the quad-precision reference within {errors} up to each scene's "
         "horizon, where any error has grown up to 100 000-fold"

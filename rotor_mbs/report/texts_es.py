@@ -445,7 +445,7 @@ def _agreement(found: tuple[Agreement, ...]) -> str:
     many = models > 1
     text = {1: "Un modelo correcto", 2: "Dos modelos correctos", 3: "Tres modelos correctos"}[models]
     if many:
-        text += " que solo comparten los datos de partida"
+        text += " que solo reciben los mismos datos de partida"
     errors = _listed(f"{quantity(a.angle_error, 'rad')} ({name_of(a.method)})" for a in known)
     text += (
         f" {'siguen' if many else 'sigue'} la referencia en precisión cuádruple dentro de {errors} hasta el horizonte "
