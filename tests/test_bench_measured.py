@@ -217,6 +217,7 @@ def test_two_benches_tell_the_same(tmp_path: Path) -> None:
     first, second = curves(tmp_path, "a.h5"), curves(tmp_path, "b.h5")
     assert set(first) == set(second)
     idle = max(curve.attributes["load_after"] for curve in (*first.values(), *second.values())) < 1.3
+    changes = {}
     for name, one in first.items():
         other = second[name]
         both = np.array([a != "left_out" != b for a, b in zip(one.statuses, other.statuses, strict=True)])
@@ -225,7 +226,11 @@ def test_two_benches_tell_the_same(tmp_path: Path) -> None:
         np.testing.assert_array_equal(one.arrays["status"][both], other.arrays["status"][both])
         a, b = one.arrays["run_time_s"][both], other.arrays["run_time_s"][both]
         long = a > 1e-3
-        assert not idle or np.all(np.abs(b[long] / a[long] - 1.0) < 0.15)
+        changes[name] = np.abs(b[long] / a[long] - 1.0)
+    print("largest change of a median:", {name: f"{found.max(initial=0.0):.1%}" for name, found in changes.items()})
+    if not idle:
+        pytest.skip("the machine was busy: the medians were not judged")
+    assert all(np.all(found < 0.15) for found in changes.values())
 
 
 Runner = Callable[[float], tuple[Callable[[], object], Callable[[], float]]]

@@ -155,13 +155,17 @@ def test_a_run_over_its_time_limit_is_recorded_and_the_rest_goes_on(tmp_path: Pa
         (["report", "missing.h5"], "no such file"),
         (["report", "."], "is a folder"),
         (["frobnicate"], "invalid choice"),
+        (["bench", "--budget", "0"], "allowed: seconds, more than 0"),
+        (["bench", "--no-such-option"], "--no-such-option"),
         ([], "required"),
     ],
 )
 def test_bad_usage_ends_with_2_and_one_clear_line(arguments: list[str], says: str, tmp_path: Path) -> None:
     done = rotor_mbs(*arguments, cwd=tmp_path)
     assert done.returncode == 2
-    assert says in done.stderr.splitlines()[-1]
+    assert done.stdout == ""
+    assert says in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_the_printed_model_refuses_what_it_cannot_represent(tmp_path: Path, quick: Path) -> None:

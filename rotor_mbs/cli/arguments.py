@@ -7,6 +7,7 @@ import importlib
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import rotor_mbs
 
@@ -17,13 +18,20 @@ _SUITE_TIMEOUT_S = 8.0
 _DEFAULT_BUDGET_S = 28.0  # the paper's seventeen scenes in eight minutes
 
 
+class _Parser(argparse.ArgumentParser):
+    """Bad usage is one clear line, as all bad input is, without the usage above it."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """The arguments, with `command` set to the function that carries them out. Ends with status 2 on bad usage."""
     return _parser().parse_args(argv)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="rotor-mbs",
         description="Every scene of a rotor by independent models, compared, and held against a published paper.",
         epilog="exit status: 0 all well; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
