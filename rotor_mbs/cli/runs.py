@@ -98,7 +98,7 @@ def _chosen(scenes: Sequence[Scene]) -> tuple[dict[str, Sequence[str]], list[str
             told.append(str(exc))
             continue
         methods[scene.name], left_out = default_methods(scene, choice.methods)
-        told += [f"{scene.name}: {choice.methods[0]}: {choice.reason}", *left_out]
+        told += [f"{scene.name}: {choice.reason}: {', '.join(methods[scene.name])}", *left_out]
     return methods, told
 
 

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.scenario.scene import Scene
 
-# More than this many radians of the fastest swing, or decay times, in a run: explicit fixed steps at their default
-# lose their digits or the run; the adaptive Taylor method and implicit steps remain.
-_STIFF_STEPS = 100.0
-# A swing this much faster than a default step of the explicit methods (6.7e-4 s) can follow to its digits, rad/s.
-_FASTEST_SWING = 150.0
+# Explicit fixed steps at their default (1e-3 s and below) follow a swing up to this rate, rad/s, within their bounds.
+_FASTEST_SWING = 90.0
 # A decay rate, 1/s, times the run, beyond which stability alone, not accuracy, sets an explicit step.
 _DECAYS = 1e4
+# Radians of the fastest swing in a run beyond which fixed steps take minutes, and the error of each has added up.
+_LONG = 3e4
+# Share of the rotor's inertia that a quarter turn of the pitch leaves, below which rates jump there.
+_NEARLY_SINGULAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -36,28 +37,35 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> Choice:
     closed_form = next((name for name in defaults if name.startswith("lagrange")), "lagrange/dop853")
     swing, decay = fastest_rates(scene)
     if decay * scene.duration > _DECAYS and decay > 10.0 * swing:
-        methods = (closed_form, "lagrange/radau", "exudyn_chain/generalized_alpha")
         return Choice(
-            methods, f"overdamped, fastest decay {decay:.2g} /s: implicit methods, and {closed_form} for digits"
+            (closed_form, "lagrange/radau"), f"overdamped, fastest decay {decay:.2g} /s: an implicit method beside it"
         )
-    if swing > _FASTEST_SWING and swing * scene.duration > _STIFF_STEPS:
-        adaptive = (closed_form, "exudyn_tree/dopri5")
-        return Choice(adaptive, f"stiff, fastest swing {swing:.2g} rad/s: methods that choose their own step")
-    return Choice(defaults, "neither stiff nor singular: the default set, best of each model")
+    if _is_nearly_singular(scene):
+        return Choice(
+            (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
+        )
+    if swing > _FASTEST_SWING:
+        reason = f"stiff or fast, fastest swing {swing:.2g} rad/s: methods that choose their own step"
+        return Choice((closed_form, "exudyn_tree/dopri5"), reason)
+    if swing * scene.duration > _LONG:
+        return Choice((closed_form,), f"long, {swing * scene.duration:.2g} rad of the fastest swing: no fixed step")
+    others = (name for name in defaults if name != closed_form)
+    return Choice((closed_form, *others), "neither stiff, singular nor long: the default set, best of each model")
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:
-    """(rad/s, 1/s): fastest swing of a pitch (spring, gravity, turning rotor) and fastest decay by a damper."""
+    """(rad/s, 1/s): fastest swing of a pitch (spring, gravity, turning and driven rotor), fastest decay by a damper."""
     swing = abs(scene.initial_rates[0])
+    driven = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0) / _rotor_inertia(scene)
     decay = scene.shaft_damping / _rotor_inertia(scene) if scene.shaft_damping else 0.0
     for i, blade in enumerate(scene.blades):
         if not blade.has_pitch_inertia:
             continue
-        x, y, _ = blade.centre_of_mass
+        x, y, z = blade.centre_of_mass
         inertia = blade.inertia[2] + blade.mass * (x * x + y * y)
         stiffness = scene.bearing_stiffness[i] if scene.bearing_stiffness else 0.0
         damping = scene.bearing_damping[i] if scene.bearing_damping else 0.0
-        moment = stiffness + blade.mass * scene.gravity * math.hypot(x, y)
+        moment = stiffness + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
         swing = max(swing, math.sqrt(moment / inertia), abs(scene.initial_rates[1 + i]))
         decay = max(decay, damping / inertia)
     return swing, decay
@@ -80,6 +88,13 @@ def singular_reason(scene: Scene) -> str:
             "ends; give the hub some inertia"
         )
     return ""
+
+
+def _is_nearly_singular(scene: Scene) -> bool:
+    """One point-mass blade that may come to a quarter turn of its pitch, on a hub that is light beside it."""
+    if len(scene.blades) > 1 or not scene.blades[0].is_point_mass or not _leaves_zero_pitch(scene):
+        return False
+    return scene.hub_inertia < _NEARLY_SINGULAR * _rotor_inertia(scene)
 
 
 def _leaves_zero_pitch(scene: Scene) -> bool:
