@@ -71,7 +71,7 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
     command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(remote), "--engine", f"dask:{address}"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as sweep:
         journal = tmp_path / "dask.h5.parts" / "0001.journal"
-        while sweep.poll() is None and not (journal.exists() and journal.stat().st_size > 5000):
+        while sweep.poll() is None and not (journal.exists() and journal.stat().st_size > 400):
             time.sleep(0.01)
         assert sweep.poll() is None, sweep.communicate()
         workers[0].kill()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -21,8 +23,8 @@ from rotor_mbs.cli.sweep_work import Chunk, perform
 from rotor_mbs.runner.engines import open_engine
 from rotor_mbs.runner.meter import Meter
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.store.journal import Rows
 from rotor_mbs.store.sweep_layout import SWEEP_STATUSES
+from rotor_mbs.store.sweep_rows import Receipt, Rows
 from rotor_mbs.store.sweep_store import SweepStore
 
 _SWEEP = """
@@ -102,7 +104,7 @@ def test_parts_of_a_job_array_are_the_slices_of_the_whole(tmp_path: Path) -> Non
             np.testing.assert_array_equal(np.concatenate(parts), whole[name][()], err_msg=name)
 
 
-def _poisoned(chunk: Chunk) -> Rows:
+def _poisoned(chunk: Chunk) -> Rows | Receipt:
     """Run 5 kills its process, wherever it is tried, and leaves a mark each time."""
     if chunk.first <= 5 < chunk.first + len(chunk.values):
         with Path(os.environ["ROTOR_TEST_MARKS"]).open("a") as marks:
@@ -132,7 +134,7 @@ def test_a_run_that_kills_its_worker_is_found_and_the_rest_goes_on(
         assert "run 5: its process died" in file.attrs["messages"][0]
 
 
-def _hanging(chunk: Chunk) -> Rows:
+def _hanging(chunk: Chunk) -> Rows | Receipt:
     if chunk.first == 2:
         time.sleep(600.0)
     return perform(chunk)
@@ -184,7 +186,7 @@ def test_killed_and_terminated_a_sweep_goes_on_and_ends_with_the_same_bytes(tmp_
             assert process.poll() is None, process.communicate()
             if victim == "worker":
                 os.kill(_workers_of(process)[0], signal.SIGKILL)
-                _wait_for_growth(process, output, _journal_size(output) + 2000)
+                _wait_for_growth(process, output, _journal_size(output) + 100)
                 process.kill()
             elif victim == "parent":
                 process.kill()
@@ -199,6 +201,68 @@ def test_killed_and_terminated_a_sweep_goes_on_and_ends_with_the_same_bytes(tmp_
     made = json.loads(ended.stdout.splitlines()[-1])["made"]
     assert made < 60
     assert output.read_bytes() == whole.read_bytes()
+
+
+def _small_files() -> None:
+    """As a full disk does, this stops a file from growing, in workers too."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
+
+
+def test_a_full_disk_is_one_line_and_the_sweep_goes_on_after_it(tmp_path: Path) -> None:
+    path, whole, output = _file(tmp_path, draws=6), tmp_path / "whole.h5", tmp_path / "o.h5"
+    full = subprocess.run(_command(path, output), capture_output=True, text=True, preexec_fn=_small_files)
+    assert full.returncode == 1
+    assert full.stderr.count("\n") == 1
+    assert "cannot be written: File too large; nothing stored before is lost" in full.stderr
+    for name in (output, whole):
+        assert main(["sweep", str(path), "-o", str(name)]) == 0
+    assert output.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
+def test_killed_at_random_moments_the_fast_path_loses_nothing(tmp_path: Path) -> None:
+    """500 runs in three files; 20 kills of the parent or a worker, each at another moment."""
+    path = tmp_path / "s.toml"
+    path.write_text(_FAST)
+    subprocess.run(_command(path, tmp_path / "whole.h5"), check=True, capture_output=True)
+    whole = [(tmp_path / f"whole-{i}.h5").read_bytes() for i in ("0001", "0002", "0003")]
+    rng = np.random.default_rng(3)
+    size, ended = 0, 0
+    for number in range(20):
+        output = tmp_path / f"{ended}.h5"
+        with subprocess.Popen(_command(path, output), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            _sleep(process, rng.uniform(0.3, 2.0))
+            workers = _workers_of(process) if number % 2 and process.poll() is None else []
+            if workers:
+                os.kill(workers[0], signal.SIGKILL)
+                _sleep(process, rng.uniform(0.0, 1.0))
+            process.kill()
+        found = sorted(tmp_path.glob(f"{ended}-*.h5"))
+        assert [file.read_bytes() for file in found] == whole[: len(found)]
+        stored = _journal_size(output) + sum(file.stat().st_size for file in found)
+        assert stored >= size, "finished runs were lost"
+        ended, size = (ended + 1, 0) if len(found) == 3 else (ended, stored)
+    subprocess.run(_command(path, tmp_path / f"{ended}.h5"), check=True, capture_output=True)
+    assert [(tmp_path / f"{ended}-{i}.h5").read_bytes() for i in ("0001", "0002", "0003")] == whole
+
+
+_FAST = """
+title = "starts"
+scene = "paper/fig11"
+samples = 101
+draws = 500
+file_bytes = 3.5e6
+
+[[axis]]
+key = "initial.angles[1]"
+normal = ["pi/4", 1e-3]
+"""
+
+
+def _sleep(process: subprocess.Popen[bytes], seconds: float) -> None:
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(seconds)
 
 
 def test_a_second_sweep_on_one_output_is_refused_with_one_line(tmp_path: Path) -> None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import resource
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pytest
@@ -16,8 +19,9 @@ from scenes import paper
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.store.journal import Journal
 from rotor_mbs.store.lock import FolderLock
-from rotor_mbs.store.sweep_file import Plan
-from rotor_mbs.store.sweep_layout import empty_rows
+from rotor_mbs.store.sweep_layout import Plan, empty_rows
+from rotor_mbs.store.sweep_memory import SparseFile
+from rotor_mbs.store.sweep_rows import Receipt, Rows, write_at
 from rotor_mbs.store.sweep_store import SweepStore
 
 _RUNS = 23
@@ -40,62 +44,95 @@ def _plan(**changes: object) -> Plan:
     return Plan(**{**facts, **changes})  # type: ignore[arg-type]
 
 
-def _rows(first: int, count: int, plan: Plan) -> np.ndarray:
+def _rows(first: int, count: int, plan: Plan) -> Rows:
     rows = empty_rows(count, plan.row)
-    rows["angles"] = np.arange(first, first + count)[:, None, None]
-    rows["status"] = 0
+    rows["angles"][:] = np.arange(first, first + count)[:, None, None]
     return rows
 
 
 def _journal(path: Path, identity: str = "i") -> Journal:
-    return Journal(path, identity, 0, _RUNS, _plan().row)
+    return Journal(path, {"identity": identity})
+
+
+def _found(path: Path, identity: str = "i") -> list[Receipt]:
+    journal = _journal(path, identity)
+    journal.close()
+    return journal.found
+
+
+_FIRST = Receipt(3, 77, bytes(2), ())
+_SECOND = Receipt(9, 78, bytes([1, 6, 0]), ((9, "broke off"), (10, "its process died")))
+
+
+def test_receipts_come_back_as_they_were(tmp_path: Path) -> None:
+    journal = _journal(tmp_path / "j")
+    journal.append([_FIRST, _SECOND])
+    journal.close()
+    assert _found(tmp_path / "j") == [_FIRST, _SECOND]
 
 
 def test_a_torn_tail_is_cut_off_and_what_was_before_it_stays(tmp_path: Path) -> None:
-    path, plan = tmp_path / "j", _plan()
+    path = tmp_path / "j"
     journal = _journal(path)
-    journal.append([(3, _rows(3, 2, plan))])
+    journal.append([_FIRST])
     whole = path.stat().st_size
-    journal.append([(9, _rows(9, 1, plan))])
+    journal.append([_SECOND])
     journal.close()
     content = path.read_bytes()
-    for length in (whole, whole + 1, whole + 19, whole + 20, whole + 21, len(content) - 1):
+    for length in range(whole, len(content)):
         path.write_bytes(content[:length])
         journal = _journal(path)
-        assert np.flatnonzero(journal.has).tolist() == [3, 4]
+        assert journal.found == [_FIRST]
         assert path.stat().st_size == whole
-        journal.append([(9, _rows(9, 1, plan))])
+        journal.append([_SECOND])
         journal.close()
         assert path.read_bytes() == content
 
 
 def test_a_damaged_record_is_not_believed(tmp_path: Path) -> None:
-    path, plan = tmp_path / "j", _plan()
+    path = tmp_path / "j"
     journal = _journal(path)
-    journal.append([(3, _rows(3, 2, plan))])
+    journal.append([_FIRST])
+    whole = path.stat().st_size
+    journal.append([_SECOND])
     journal.close()
-    content = bytearray(path.read_bytes())
-    content[-100] ^= 1
-    path.write_bytes(content)
-    assert not _journal(path).has.any()
-
-
-def test_rows_come_back_bit_for_bit_in_whatever_order_they_went_in(tmp_path: Path) -> None:
-    plan = _plan()
-    journal = _journal(tmp_path / "j")
-    rng = np.random.default_rng(0)
-    rows = _rows(0, _RUNS, plan)
-    rows["angles"] = rng.standard_normal(rows["angles"].shape)
-    for i in rng.permutation(_RUNS).tolist():
-        journal.append([(i, rows[i : i + 1])])
-    assert journal.read(0, _RUNS).tobytes() == rows.tobytes()
-    assert b"".join(part.tobytes() for _, part in journal.stored()) == rows.tobytes()
+    content = path.read_bytes()
+    for place in range(whole, len(content)):
+        damaged = bytearray(content)
+        damaged[place] ^= 1
+        path.write_bytes(damaged)
+        assert _found(path) == [_FIRST]
 
 
 def test_another_sweeps_journal_is_refused(tmp_path: Path) -> None:
     _journal(tmp_path / "j").close()
     with pytest.raises(InputError, match="another sweep"):
-        _journal(tmp_path / "j", "other")
+        _found(tmp_path / "j", "other")
+
+
+def test_a_sparse_file_is_a_file(tmp_path: Path) -> None:
+    """Random writes over pages and page boundaries, beside the same ones to a real file."""
+    rng = np.random.default_rng(0)
+    sparse = SparseFile()
+    with (tmp_path / "f").open("w+b") as real:
+        for place in rng.integers(0, 50_000, 40).tolist():
+            content = rng.bytes(int(rng.integers(1, 9000)))
+            for file in (sparse, real):
+                file.seek(place)
+                file.write(content)
+        real.seek(0)
+        expected = real.read()
+    sparse.seek(0)
+    assert sparse.read() == expected
+    again = bytearray(len(expected))
+    ends = [0]
+    for place, content in sparse.extents():
+        assert place > ends[-1] or place == 0
+        again[place : place + len(content)] = content
+        ends.append(place + len(content))
+    assert (bytes(again), ends[-1]) == (expected, sparse.size)
+    sparse.truncate(10)
+    assert sparse.size == 10
 
 
 @contextlib.contextmanager
@@ -110,22 +147,130 @@ def _largest_file(size: int) -> Iterator[None]:
 
 
 def test_a_full_disk_loses_nothing_and_the_journal_goes_on(tmp_path: Path) -> None:
-    path, plan = tmp_path / "j", _plan()
+    path = tmp_path / "j"
     journal = _journal(path)
-    journal.append([(0, _rows(0, 4, plan))])
+    journal.append([_FIRST])
     size = path.stat().st_size
-    with _largest_file(size + 100), pytest.raises(StoreError, match="nothing stored before is lost"):
-        journal.append([(4, _rows(4, 1, plan))])
+    with _largest_file(size + 10), pytest.raises(StoreError, match="nothing stored before is lost"):
+        journal.append([_SECOND])
     assert path.stat().st_size == size
-    journal.append([(4, _rows(4, 1, plan))])
+    journal.append([_SECOND])
     journal.close()
-    assert np.flatnonzero(_journal(path).has).tolist() == [0, 1, 2, 3, 4]
+    assert _found(path) == [_FIRST, _SECOND]
 
 
 def _fill(store: SweepStore, plan: Plan, starts: list[int]) -> None:
     for first in starts:
         count = min(4, _RUNS - first)
         store.add([(first, _rows(first, count, plan))])
+
+
+def _whole(folder: Path) -> bytes:
+    """The file of an uninterrupted sweep."""
+    plan = _plan()
+    with SweepStore(folder / "whole.h5", plan, 0, _RUNS, 10**9) as store:
+        _fill(store, plan, list(range(0, _RUNS, 4)))
+    return (folder / "whole.h5").read_bytes()
+
+
+def test_a_disk_that_fills_up_under_the_runs_loses_nothing(tmp_path: Path) -> None:
+    plan, output = _plan(), tmp_path / "s.h5"
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        _fill(store, plan, [0, 4])
+        with _largest_file(5000), pytest.raises(StoreError, match="nothing stored before is lost"):
+            _fill(store, plan, [8])
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        assert store.missing() == [(8, _RUNS)]
+        _fill(store, plan, [8, 12, 16, 20])
+    assert output.read_bytes() == _whole(tmp_path)
+
+
+def test_a_disk_that_fills_up_as_the_file_is_completed_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, output = _plan(), tmp_path / "s.h5"
+    places: list[int] = []
+
+    def full(file: BinaryIO, place: int, content: bytes) -> None:
+        places.append(place)
+        if len(places) > 1:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write_at(file, place, content)
+
+    monkeypatch.setattr("rotor_mbs.store.sweep_file.write_at", full)
+    with (
+        pytest.raises(StoreError, match=r"s\.h5: cannot be written: No space left on device; nothing"),
+        SweepStore(output, plan, 0, _RUNS, 10**9) as store,
+    ):
+        _fill(store, plan, list(range(0, _RUNS, 4)))
+    assert not output.exists()
+    monkeypatch.undo()
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        assert store.missing() == []
+        store.complete()
+    assert output.read_bytes() == _whole(tmp_path)
+    assert not list(tmp_path.glob("*.parts"))
+
+
+def _stopped_store(output: Path, plan: Plan) -> Path:
+    """A store with runs 0-3 and 12-15; returns its data file."""
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        _fill(store, plan, [0, 12])
+    return next(output.with_name(output.name + ".parts").glob("*.data"))
+
+
+def test_data_that_are_not_what_the_journal_says_are_made_again(tmp_path: Path) -> None:
+    plan, output = _plan(), tmp_path / "s.h5"
+    data = _stopped_store(output, plan)
+    content = bytearray(data.read_bytes())
+    place = content.index(np.full(4, 13.0).tobytes())  # the angles of run 13
+    content[place] ^= 1
+    data.write_bytes(content)
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        assert store.missing() == [(4, _RUNS)]
+        _fill(store, plan, [4, 8, 12, 16, 20])
+    assert output.read_bytes() == _whole(tmp_path)
+
+
+@pytest.mark.parametrize("left", [0, 6000])
+def test_data_that_were_lost_are_made_again(tmp_path: Path, left: int) -> None:
+    plan, output = _plan(), tmp_path / "s.h5"
+    os.truncate(_stopped_store(output, plan), left)
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        assert sum(last - first for first, last in store.missing()) > _RUNS - 8
+        _fill(store, plan, list(range(0, _RUNS, 4)))
+    assert output.read_bytes() == _whole(tmp_path)
+
+
+def test_runs_that_were_put_but_not_noted_do_not_count(tmp_path: Path) -> None:
+    """As after a kill between the two: their numbers are there, their receipt is not."""
+    plan, output = _plan(), tmp_path / "s.h5"
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        _fill(store, plan, [0])
+        store.places(4, 8).put(_rows(4, 4, plan))
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        assert store.missing() == [(4, _RUNS)]
+
+
+def test_a_finished_file_beside_its_journal_is_finished(tmp_path: Path) -> None:
+    """As after a kill between the last two steps."""
+    plan, output = _plan(), tmp_path / "whole.h5"
+    _stopped_store(output, plan)
+    journal = next(tmp_path.glob("*.parts/*.journal"))
+    kept = journal.read_bytes()
+    content = _whole(tmp_path)
+    journal.parent.mkdir()
+    journal.write_bytes(kept)
+    with SweepStore(output, plan, 0, _RUNS, 10**9) as store:
+        assert store.missing() == []
+    assert output.read_bytes() == content
+    assert not list(tmp_path.glob("*.parts"))
+
+
+def test_a_sweep_that_stored_nothing_leaves_nothing(tmp_path: Path) -> None:
+    with SweepStore(tmp_path / "s.h5", _plan(), 0, _RUNS, 10**9) as store:
+        store.places(0, 4)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_dataset_has_the_same_bytes_whatever_the_order_of_its_runs(tmp_path: Path) -> None:
@@ -138,10 +283,11 @@ def test_the_dataset_has_the_same_bytes_whatever_the_order_of_its_runs(tmp_path:
 
 
 def test_files_of_bounded_size_share_out_the_runs(tmp_path: Path) -> None:
-    plan = _plan()
-    with SweepStore(tmp_path / "s.h5", plan, 0, _RUNS, 10 * plan.row.itemsize) as store:
+    plan, most = _plan(), 73_500  # ten runs a file
+    with SweepStore(tmp_path / "s.h5", plan, 0, _RUNS, most) as store:
         _fill(store, plan, list(range(0, _RUNS, 4)))
         assert (store.statuses == 0).all()
+    assert all(path.stat().st_size <= most for path in tmp_path.glob("*.h5"))
     xr = pytest.importorskip("xarray")
     names = sorted(path.name for path in tmp_path.glob("*.h5"))
     assert names == ["s-0001.h5", "s-0002.h5", "s-0003.h5"]

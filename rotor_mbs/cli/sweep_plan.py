@@ -7,6 +7,8 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +22,15 @@ from rotor_mbs.scenario.design import validation_rows
 from rotor_mbs.scenario.load import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.variants import Variants
-from rotor_mbs.store.sweep_file import Plan
+from rotor_mbs.store.sweep_layout import Plan
 
-# Runs handed to a worker at once by the fast path: eight full batches, a twentieth of a second of work.
-_ENSEMBLE_RUNS = 64
+# Runs handed to a worker at once by the fast path: an eighth of a second of work, fewer towards the end, so that all
+# workers end together. The least is a full batch on any processor.
+_ENSEMBLE_RUNS = 128
 _LEAST_RUNS = 8
 _CHUNK_BYTES = 1 << 23
 
-_FORMAT = 1  # of rows and columns: a sweep begun by another version is not gone on with
+_FORMAT = 2  # of rows and columns: a sweep begun by another version is not gone on with
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class Work:
     def rows(self) -> int:
         return self.sweep.design.count
 
-    @property
+    @cached_property
     def plan(self) -> Plan:
         sweep = self.sweep
         splits = validation_rows(self.rows, sweep.validation, sweep.design.seed) if sweep.validation else None
@@ -73,16 +76,19 @@ class Work:
         ]
         return np.concatenate(pieces)
 
-    def chunks(self, gaps: Sequence[tuple[int, int]]) -> Iterator[Chunk]:
-        """The runs of `gaps`, cut into what a worker does at once."""
+    def chunks(self, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
+        """The runs of `gaps`, cut into what one of `workers` does at once."""
         variants, row = self.sweep.variants(), self.plan.row
+        for first, _ in gaps[:1]:
+            variants.prepare(self.values(first, first + 1)[0].tolist())
+        left = sum(last - first for first, last in gaps)
         for gap in gaps:
             for first, last in self._by_method(*gap):
                 method = self.methods[first // self.rows]
-                size = self._chunk_size(method, row.itemsize)
-                for start in range(first, last, size):
-                    end = min(start + size, last)
-                    yield self._chunk(variants, method, row, start, end)
+                while first < last:
+                    end = min(first + self._chunk_size(method, row.itemsize, left // (4 * workers)), last)
+                    yield self._chunk(variants, method, row, first, end)
+                    first, left = end, left - (end - first)
 
     def _chunk(self, variants: Variants, method: str, row: np.dtype[np.void], start: int, end: int) -> Chunk:
         known = find_method(method).DEFAULTS
@@ -90,10 +96,10 @@ class Work:
         return Chunk(variants, method, settings, row, start, self.values(start, end), self.time_limit_s)
 
     @staticmethod
-    def _chunk_size(method: str, row_bytes: int) -> int:
+    def _chunk_size(method: str, row_bytes: int, share: int) -> int:
         if method != ENSEMBLE_METHOD:
             return 1
-        return min(max(_CHUNK_BYTES // row_bytes, _LEAST_RUNS), _ENSEMBLE_RUNS)
+        return max(min(_CHUNK_BYTES // row_bytes, share, _ENSEMBLE_RUNS) // _LEAST_RUNS, 1) * _LEAST_RUNS
 
     def _by_method(self, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Spans of runs cut where the method changes."""
@@ -153,7 +159,9 @@ def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_
     if unknown:
         raise InputError(f"settings: {', '.join(unknown)}: no setting of {', '.join(chosen)}; allowed: {sorted(known)}")
     for method in chosen:
-        find_method(method).items(sweep.base)
+        # The fast path's engine refuses nothing, where it is there: this process need not load it.
+        if method != ENSEMBLE_METHOD or find_spec("heyoka") is None:
+            find_method(method).items(sweep.base)
     total = sweep.design.count * len(chosen)
     number, parts = part
     return Work(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)

@@ -7,7 +7,8 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,13 @@ import numpy as np
 from rotor_mbs.cli.sweep_plan import Work, estimate_seconds, plan_work
 from rotor_mbs.cli.sweep_work import Chunk, lost, perform
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.models.lagrange.ensemble import LEAST_LANES
+from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.runner.engines import Engine
 from rotor_mbs.runner.meter import Meter
 from rotor_mbs.runner.queue import Ended, Queue
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.store.journal import Rows
 from rotor_mbs.store.sweep_layout import SWEEP_STATUSES
+from rotor_mbs.store.sweep_rows import Receipt, Rows
 from rotor_mbs.store.sweep_store import SweepStore, runs_per_file
 from rotor_mbs.trajectory.outcome import is_held
 
@@ -61,23 +62,35 @@ def sweep_on(engine: Engine, arguments: argparse.Namespace) -> int:
 
 
 def execute(
-    work: Work, engine: Engine, store: SweepStore, meter: Meter, perform: Callable[[Chunk], Rows] = perform
+    work: Work, engine: Engine, store: SweepStore, meter: Meter, perform: Callable[[Chunk], Rows | Receipt] = perform
 ) -> None:
     """Runs all that the store misses. Raises StoreError, InputError, MethodRefusal, KeyboardInterrupt."""
     queue = Queue(engine, perform, Chunk.parts, _hard_limit)
-    for ended in queue.run(work.chunks(store.missing())):
-        blocks = [(end.task.first, _rows(end)) for end in ended]
-        store.add(blocks)
-        meter.add(Counter(SWEEP_STATUSES[code] for _, rows in blocks for code in rows["status"].tolist()))
+    for ended in queue.run(_placed(work, engine, store)):
+        receipts = [_receipt(end, store) for end in ended]
+        store.note(receipts)
+        meter.add(Counter(SWEEP_STATUSES[code] for receipt in receipts for code in receipt.statuses))
 
 
-def _rows(ended: Ended[Chunk, Rows]) -> Rows:
-    if ended.value is not None:
+def _placed(work: Work, engine: Engine, store: SweepStore) -> Iterator[Chunk]:
+    """The missing runs; workers that share the disk write them themselves.
+
+    But for the first ones, which come back: each worker has one to do while this process lays out the file.
+    """
+    for number, chunk in enumerate(work.chunks(store.missing(), engine.workers)):
+        writes = engine.shares_disk and number >= engine.workers
+        yield replace(chunk, places=store.places(chunk.first, chunk.last)) if writes else chunk
+
+
+def _receipt(ended: Ended[Chunk, Rows | Receipt], store: SweepStore) -> Receipt:
+    if isinstance(ended.value, Receipt):
         return ended.value
-    if isinstance(ended.error, InputError | MethodRefusal):
+    if isinstance(ended.error, InputError | MethodRefusal | StoreError):
         raise ended.error
-    status = ended.failure if ended.failure in SWEEP_STATUSES else "solver_failed"
-    return lost(ended.task, status, ended.message)
+    chunk, rows = ended.task, ended.value
+    if rows is None:
+        rows = lost(chunk, ended.failure if ended.failure in SWEEP_STATUSES else "solver_failed", ended.message)
+    return store.places(chunk.first, chunk.last).put(rows)
 
 
 def _hard_limit(chunk: Chunk) -> float:
@@ -105,20 +118,20 @@ def _exit_status(work: Work, store: SweepStore) -> int:
     held = [is_held(method) for method in work.methods]
     runs = np.arange(work.first, work.last)
     failed = runs[store.statuses != SWEEP_STATUSES.index("ok")] // work.rows
-    return int(any(held[method] for method in np.unique(failed)))
+    return int(any(held[method] for method in set(failed.tolist())))
 
 
 def _tell_estimate(work: Work, engine: Engine, arguments: argparse.Namespace) -> int:
     runs = work.last - work.first
     row = work.plan.row.itemsize
     seconds = estimate_seconds(work, engine)
-    files = -(-runs // runs_per_file(work.sweep.file_bytes, row))
+    files = -(-runs // runs_per_file(work.sweep.file_bytes, work.plan))
     facts = {"runs": runs, "methods": list(work.methods), "seconds": seconds, "bytes": runs * row, "files": files}
     if arguments.json:
         print(json.dumps(facts))
         return 0
     print(f"{runs:,} runs by {', '.join(work.methods)}: about {_readable(seconds)} on {arguments.engine}")
-    print(f"{_size(runs * row)} in {files} file{'s' if files > 1 else ''}, and as much again while it goes on")
+    print(f"{_size(runs * row)} in {files} file{'s' if files > 1 else ''}")
     return 0
 
 

@@ -1,9 +1,11 @@
-"""A chunk of a sweep's runs, from parameters to rows, in a worker process. Opens no file: the parent stores them."""
+"""A chunk of a sweep's runs, from parameters to rows, in a worker process; and where it shares the disk, to their
+places in the file. What counts as stored, the parent says."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +17,8 @@ from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.registry import find_method
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.variants import VariantFaultError, Variants
-from rotor_mbs.store.journal import Rows
-from rotor_mbs.store.sweep_layout import MESSAGE_BYTES, SWEEP_STATUSES, empty_rows
+from rotor_mbs.store.sweep_layout import MESSAGE_BYTES, METRICS_AND_MESSAGE, SWEEP_STATUSES, empty_rows
+from rotor_mbs.store.sweep_rows import MESSAGE, Places, Receipt, Rows
 from rotor_mbs.trajectory.compare import energy_error
 from rotor_mbs.trajectory.many import clearly_ok, energy_drifts, energy_errors
 from rotor_mbs.trajectory.outcome import judge
@@ -32,6 +34,7 @@ class Chunk:
     values        (runs, keys) the varied numbers
     row           the type of a stored row
     time_limit_s  of one run
+    places        where the rows are to be put; None where they are to be returned
     """
 
     variants: Variants
@@ -41,6 +44,12 @@ class Chunk:
     first: int
     values: NDArray[np.float64]
     time_limit_s: float
+    places: Places | None = None
+
+    @property
+    def last(self) -> int:
+        """The run after its last one."""
+        return self.first + len(self.values)
 
     def parts(self) -> list[Chunk]:
         """Its runs one by one; [] where it is one run."""
@@ -49,17 +58,25 @@ class Chunk:
         return [self.part(i, i + 1) for i in range(len(self.values))]
 
     def part(self, start: int, end: int) -> Chunk:
-        values = self.values[start:end]
-        return Chunk(self.variants, self.method, self.settings, self.row, self.first + start, values, self.time_limit_s)
+        places = self.places.part(start, end) if self.places else None
+        return replace(self, first=self.first + start, values=self.values[start:end], places=places)
 
 
 def prepare() -> None:
-    """Loads, with this module, the engine of the fast path where it is installed."""
+    """Loads, with this module, the fast path, and its engine where it is installed."""
+    import_module("rotor_mbs.models.lagrange.ensemble")
     is_available()
 
 
-def perform(chunk: Chunk) -> Rows:
-    """(runs,) rows of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
+def perform(chunk: Chunk) -> Rows | Receipt:
+    """The runs' rows, or the receipt for them. Raises InputError, MethodRefusal, StoreError; a run's failure is in its
+    row."""
+    rows = rows_of(chunk)
+    return chunk.places.put(rows) if chunk.places else rows
+
+
+def rows_of(chunk: Chunk) -> Rows:
+    """(runs, ...) columns of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
     scenes = _scenes(chunk)
     if chunk.method == ENSEMBLE_METHOD:
         return _ensemble(chunk, scenes)
@@ -72,8 +89,8 @@ def perform(chunk: Chunk) -> Rows:
 def lost(chunk: Chunk, status: str, message: str) -> Rows:
     """Rows of runs that left nothing: their process died, or was ended."""
     rows = empty_rows(len(chunk.values), chunk.row)
-    rows["status"], rows["message"] = SWEEP_STATUSES.index(status), message.encode()[:MESSAGE_BYTES]
-    rows["time_reached"] = 0.0
+    rows["status"][:], rows[MESSAGE][:] = SWEEP_STATUSES.index(status), message.encode()[:MESSAGE_BYTES]
+    rows["time_reached"][:] = 0.0
     return rows
 
 
@@ -97,14 +114,14 @@ def _solved(chunk: Chunk, scene: Scene) -> Run | str:
 
 def _put_run(rows: Rows, i: int, scene: Scene, run: Run | str) -> None:
     if isinstance(run, str):
-        rows["status"][i], rows["message"][i] = SWEEP_STATUSES.index("timed_out"), run.encode()[:MESSAGE_BYTES]
+        rows["status"][i], rows[MESSAGE][i] = SWEEP_STATUSES.index("timed_out"), run.encode()[:MESSAGE_BYTES]
         rows["time_reached"][i] = 0.0
         return
     _put_verdict(rows, i, scene, run)
     trajectory = run.trajectory
     n = len(trajectory.time)
     energy = energy_error(trajectory)
-    for name in rows.dtype.names or ():
+    for name in rows:
         values = energy if name == "energy_error" else getattr(trajectory, name, None)
         if values is not None:
             rows[name][i, :n] = values
@@ -115,7 +132,7 @@ def _put_run(rows: Rows, i: int, scene: Scene, run: Run | str) -> None:
 def _put_verdict(rows: Rows, i: int, scene: Scene, run: Run) -> None:
     verdict = judge(scene, run, None)
     rows["status"][i] = SWEEP_STATUSES.index(verdict.status)
-    rows["message"][i] = verdict.message.encode()[:MESSAGE_BYTES]
+    rows[MESSAGE][i] = verdict.message.encode()[:MESSAGE_BYTES]
     rows["energy_drift_max"][i] = verdict.metrics.get("energy_drift_max", np.nan)
 
 
@@ -133,8 +150,10 @@ def _put_extremes(rows: Rows, runs: slice, angles: Array, rates: Array) -> None:
 
 def _largest(values: Array) -> Array:
     """(k,) of (k, n, columns); samples that are missing do not count."""
-    sizes = np.abs(values)
-    largest: Array = sizes.max(axis=(1, 2), initial=0.0, where=np.isfinite(sizes))
+    largest: Array = np.maximum(values.max(axis=(1, 2)), -values.min(axis=(1, 2)))
+    if not np.isfinite(largest).all():
+        sizes = np.abs(values)
+        largest = sizes.max(axis=(1, 2), initial=0.0, where=np.isfinite(sizes))
     return largest
 
 
@@ -144,19 +163,19 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
 
     settings = {**taylor.DEFAULTS, **chunk.settings}
     block = solve_many(scenes, float(str(settings["tolerance"])))
-    rows = empty_rows(len(scenes), chunk.row)
     assert block.kinetic_energy is not None  # a sweep's scenes ask for the energy
     assert block.potential_energy is not None
     assert block.work is not None
     errors = energy_errors(block.kinetic_energy, block.potential_energy, block.work)
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
     ok = clearly_ok(scenes, chunk.method, block.words, block.samples, drifts)
+    rows = empty_rows(len(scenes), chunk.row, METRICS_AND_MESSAGE)
+    for name in chunk.row.names or ():
+        if name not in rows:
+            values = errors if name == "energy_error" else getattr(block, name)
+            rows[name] = np.ascontiguousarray(values, chunk.row[name].base)
     rows["status"][ok] = SWEEP_STATUSES.index("ok")
     rows["energy_drift_max"] = drifts
-    for name in rows.dtype.names or ():
-        values = errors if name == "energy_error" else getattr(block, name, None)
-        if values is not None:
-            rows[name] = values
     _put_extremes(rows, slice(None), block.angles, block.rates)
     for i, word in enumerate(block.words):
         _put_words(rows, i, word, word.time_reached)

@@ -22,6 +22,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _PREPARE_S = 60.0
+_LOOK_EVERY_S = 0.01  # for a worker that died, a task that is late, the end
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 
@@ -34,12 +35,14 @@ class Engine:
     workers    how many tasks it works on at once
     cause      why a future failed: "timed_out", "worker_died", or "error" for what the task itself raised
     stop       ends it now, with all that it is doing
+    shares_disk   whether the workers see this process's files
     """
 
     executor: Executor
     workers: int
     cause: Callable[[BaseException], str]
     stop: Callable[[], None]
+    shares_disk: bool = False
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
         return self.executor.submit(work, task, timeout_s)  # type: ignore[call-arg]
@@ -70,8 +73,9 @@ class _LocalExecutor(Executor):
     """Processes of this machine, started afresh (spawn); one that dies or hangs takes no other with it."""
 
     def __init__(self, workers: int) -> None:
-        from pebble import ProcessPool
+        from pebble import CONSTS, ProcessPool
 
+        CONSTS.sleep_unit = _LOOK_EVERY_S
         for name in ONE_THREAD:  # the processes are the parallelism
             os.environ.setdefault(name, "1")
         context = multiprocessing.get_context("spawn")
@@ -113,4 +117,4 @@ def _local(workers: int) -> Engine:
             return "timed_out"
         return "worker_died" if isinstance(error, ProcessExpired) else "error"
 
-    return Engine(executor, workers, cause, lambda: executor.shutdown(cancel_futures=True))
+    return Engine(executor, workers, cause, lambda: executor.shutdown(cancel_futures=True), shares_disk=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from io import RawIOBase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,26 +31,43 @@ def new_file(path: Path) -> Iterator[Any]:
     where the file cannot be written; what stood at `path` before then still stands.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
-    with h5py.File(path.name, "w", libver=("earliest", "v108"), track_order=True, **memory) as file:
-        file.attrs["Conventions"] = CONVENTIONS
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = FORMAT_VERSION
+    with _begun(path.name, **memory) as file:
         yield file
         file.flush()
         image = file.id.get_file_image()
     replace_file(path, image)
 
 
+def new_file_in(memory: RawIOBase) -> Any:
+    """A new HDF5 file in an object that reads, writes, seeks and truncates like a file."""
+    return _begun(memory)
+
+
+def _begun(place: str | RawIOBase, **driver: object) -> Any:
+    file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
+    file.attrs["Conventions"] = CONVENTIONS
+    file.attrs["format"] = FORMAT
+    file.attrs["format_version"] = FORMAT_VERSION
+    return file
+
+
 def replace_file(path: Path, content: Buffer) -> None:
-    """`content` under a temporary name beside `path`, forced to the disk, then renamed. Raises StoreError."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    """`content` under a temporary name beside `path`, forced to the disk, then renamed. Raises StoreError.
+
+    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to.
+    """
+    place = path.resolve() if path.is_symlink() else path
+    temporary = place.with_name(f".{place.name}.{os.getpid()}.tmp")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and not path.is_file() and not path.is_dir():
+            path.write_bytes(content)
+            return
+        place.parent.mkdir(parents=True, exist_ok=True)
         with temporary.open("wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(path)
+        temporary.replace(place)
     except OSError as exc:
         with suppress(OSError):
             temporary.unlink()
@@ -60,7 +78,8 @@ def replace_file(path: Path, content: Buffer) -> None:
 def open_file(path: Path) -> Iterator[Any]:
     """An existing results file, read only. Raises StoreError where it is missing, damaged or another program's."""
     if not path.is_file():
-        raise StoreError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; a results file is needed")
+        found = "is a folder" if path.is_dir() else "no such file"
+        raise StoreError(f"{path}: {found}; allowed: a results file, as rotor-mbs run or reproduce writes it")
     try:
         file = h5py.File(path, "r")
     except OSError as exc:
@@ -145,11 +164,30 @@ def is_group(item: Any) -> bool:
 
 
 def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Quantity) -> Any:
-    """A dataset to be filled slice by slice: chunked by its first dimension where it has others. Scales as in `put`."""
+    """A dataset whose numbers get their places in the file now, and are put there by others (see `places`).
+
+    Chunked by its first dimension where it has others. Scales as in `put`.
+    """
+    layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
     chunks = (1, *shape[1:]) if len(shape) > 1 else None
-    dataset = group.create_dataset(name, shape, kind, chunks=chunks)
+    dataset = group.create_dataset(name, shape, kind, chunks=chunks, dcpl=layout)
     dataset.attrs["units"] = quantity.units
     dataset.attrs["long_name"] = quantity.long_name
     for axis, dimension in enumerate(quantity.dimensions):
         dataset.dims[axis].attach_scale(group[dimension])
     return dataset
+
+
+def places(dataset: Any) -> NDArray[np.int64]:
+    """(rows,) where in the file each row of a dataset of `put_empty` begins, in bytes."""
+    if dataset.chunks is None:
+        return np.arange(len(dataset)) * int(dataset.dtype.itemsize) + int(dataset.id.get_offset())
+    found = np.empty(len(dataset), np.int64)
+
+    def note(chunk: Any) -> None:
+        found[chunk.chunk_offset[0]] = chunk.byte_offset
+
+    dataset.id.chunk_iter(note)
+    return found

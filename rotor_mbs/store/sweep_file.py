@@ -1,73 +1,56 @@
-"""The runs of a sweep as one netCDF-4 readable dataset, written slice by slice. Knows the layout; judges nothing."""
+"""The runs of a sweep as one netCDF-4 readable dataset, laid out before they are run. Judges nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store import hdf5, sweep_layout
-from rotor_mbs.store.journal import Rows, sync_folder
 from rotor_mbs.store.read import open_results
+from rotor_mbs.store.sweep_layout import Plan
+from rotor_mbs.store.sweep_memory import SparseFile
+from rotor_mbs.store.sweep_rows import Places, write_at
 
-_SLICE = 1 << 23  # bytes of rows held at once
 _MESSAGES = 100  # of runs that did not end well, in the file's attributes
 
 
-@dataclass(frozen=True)
-class Plan:
-    """All that a sweep's files say beside the runs themselves.
+class SweepFile:
+    """The dataset of the runs first ... last - 1, without them: what the library writes, held in memory.
 
-    identity    stands for the sweep's numbers, methods and versions
-    attributes  of the file
-    scene       the base: number of blades, samples, duration
-    parameters  from (first, last) run to (last - first, keys) numbers
-    variants    rows of the design: run r is row r mod variants, by method r div variants
-    splits      (variants,) 0 training, 1 validation; or None
+    It all follows from the plan: where each run's numbers belong is known before there are any, and a file that was
+    filled in any order, by anyone, ends with the same bytes.
     """
 
-    identity: str
-    attributes: Mapping[str, object]
-    scene: Scene
-    outputs: Sequence[str]
-    precision: str
-    keys: Sequence[str]
-    units: Sequence[str]
-    methods: Sequence[str]
-    variants: int
-    parameters: Callable[[int, int], NDArray[np.float64]]
-    splits: NDArray[np.int8] | None
+    def __init__(self, plan: Plan, first: int, last: int) -> None:
+        self._memory = SparseFile()
+        self._file = hdf5.new_file_in(self._memory)
+        hdf5.put_attributes(self._file, {**plan.attributes, "sweep_identity": plan.identity, "runs": last - first})
+        _put_columns(self._file, plan, np.arange(first, last))
+        datasets = _put_datasets(self._file, plan, last - first)
+        self._first = first
+        self._places = {name: hdf5.places(dataset) for name, dataset in datasets.items()}
+        self._sizes = {name: plan.row[name].itemsize for name in datasets}
 
-    @property
-    def row(self) -> np.dtype[np.void]:
-        return sweep_layout.row_type(self.scene, self.outputs, self.precision)
+    def places(self, path: Path) -> Places:
+        """Of all its runs, in the file that is to be."""
+        return Places(path, self._first, self._places, self._sizes)
 
-
-def write_dataset(path: Path, plan: Plan, first: int, last: int, read: Callable[[int, int], Rows]) -> None:
-    """The runs first ... last - 1, from `read`, into `path`, atomically. Its bytes follow from plan and rows alone.
-
-    Raises StoreError.
-    """
-    with hdf5.new_file(path) as file:
-        hdf5.put_attributes(file, {**plan.attributes, "sweep_identity": plan.identity, "runs": last - first})
-        _put_columns(file, plan, np.arange(first, last))
-        datasets = _put_datasets(file, plan, last - first)
-        messages: list[str] = []
-        step = max(_SLICE // plan.row.itemsize, 1)
-        for start in range(first, last, step):
-            end = min(start + step, last)
-            rows = read(start, end)
-            for name, dataset in datasets.items():
-                dataset[start - first : end - first] = rows[name]
-            messages += _messages(start, rows)[: _MESSAGES - len(messages)]
+    def complete(self, file: BinaryIO, messages: Mapping[int, str]) -> None:
+        """Writes all that is not a run's around the runs. May be done again if it breaks off. Raises OSError."""
         if messages:
-            hdf5.put_attributes(file, {"messages": messages})
-    sync_folder(path.parent)
+            told = [f"run {run}: {messages[run]}" for run in sorted(messages)[:_MESSAGES]]
+            hdf5.put_attributes(self._file, {"messages": told})
+        self.close()
+        for place, content in self._memory.extents():
+            write_at(file, place, content)
+        file.truncate(self._memory.size)
+
+    def close(self) -> None:
+        self._file.close()
 
 
 def _put_columns(file: Any, plan: Plan, runs: NDArray[np.int64]) -> None:
@@ -86,7 +69,7 @@ def _put_columns(file: Any, plan: Plan, runs: NDArray[np.int64]) -> None:
 
 
 def _put_datasets(file: Any, plan: Plan, count: int) -> dict[str, Any]:
-    """Scales, then metrics and trajectories, empty."""
+    """Scales, then metrics and trajectories, with room for the runs."""
     for name, (values, quantity) in sweep_layout.scales(plan.scene, plan.outputs).items():
         scale = hdf5.put(file, name, values, quantity)
         if name == "coordinate":
@@ -104,11 +87,6 @@ def _put_flags(dataset: Any, meanings: Sequence[str]) -> None:
     """Integer codes as the CF conventions have them; a blank parts two meanings, and none of ours has one."""
     dataset.attrs["flag_values"] = np.arange(len(meanings), dtype=np.int8)
     dataset.attrs["flag_meanings"] = " ".join(meanings)
-
-
-def _messages(first: int, rows: Rows) -> list[str]:
-    told = np.flatnonzero(rows["message"] != b"")
-    return [f"run {first + i}: {rows['message'][i].decode(errors='replace')}" for i in told[:_MESSAGES].tolist()]
 
 
 def identity_of(path: Path) -> str:

@@ -7,12 +7,15 @@ angles ...           (run, time, coordinate) trajectories, as asked for; NaN aft
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.layout import QUANTITIES, SCALES, Quantity
+from rotor_mbs.store.sweep_rows import MESSAGE, Rows
 from rotor_mbs.trajectory.outcome import STATUSES
 
 SWEEP_STATUSES = (*STATUSES, "worker_died")
@@ -28,6 +31,7 @@ METRICS = {
     "rotor_rate_max": Quantity(("run",), "rad/s", "largest rotor rate, either way"),
     "pitch_max": Quantity(("run",), "rad", "largest pitch angle of any blade, either way"),
 }
+METRICS_AND_MESSAGE = (*METRICS, MESSAGE)
 _INTEGERS = {"status": "i1", "steps": "<i8", "rhs_evaluations": "<i8"}
 
 COLUMNS = {
@@ -67,12 +71,12 @@ def scales(scene: Scene, outputs: Sequence[str]) -> dict[str, tuple[np.ndarray, 
 
 
 def row_type(scene: Scene, outputs: Sequence[str], precision: str) -> np.dtype[np.void]:
-    """One run: its metrics, its message, its trajectories in `precision`."""
+    """One run: its metrics, its message, its trajectories in `precision`; all but the message are datasets."""
     lengths = {name: len(values) for name, (values, _) in scales(scene, outputs).items()}
     fields: list[tuple[str, str] | tuple[str, str, tuple[int, ...]]] = [
         (name, _INTEGERS.get(name, "<f8")) for name in METRICS
     ]
-    fields.append(("message", f"S{MESSAGE_BYTES}"))
+    fields.append((MESSAGE, f"S{MESSAGE_BYTES}"))
     kind = {"float64": "<f8", "float32": "<f4"}[precision]
     fields += [
         (name, kind, tuple(lengths[dimension] for dimension in quantity.dimensions[1:]))
@@ -81,11 +85,40 @@ def row_type(scene: Scene, outputs: Sequence[str], precision: str) -> np.dtype[n
     return np.dtype(fields)
 
 
-def empty_rows(count: int, row: np.dtype[np.void]) -> np.ndarray:
-    """Rows of runs of which nothing is known yet: NaN, -1 and no text."""
-    rows = np.zeros(count, row)
-    for name in row.names or ():
-        if row[name].base.kind == "f":
-            rows[name] = np.nan
-    rows["steps"], rows["rhs_evaluations"] = -1, -1
+@dataclass(frozen=True)
+class Plan:
+    """All that a sweep's files say beside the runs themselves.
+
+    identity    stands for the sweep's numbers, methods and versions
+    attributes  of the file
+    scene       the base: number of blades, samples, duration
+    parameters  from (first, last) run to (last - first, keys) numbers
+    variants    rows of the design: run r is row r mod variants, by method r div variants
+    splits      (variants,) 0 training, 1 validation; or None
+    """
+
+    identity: str
+    attributes: Mapping[str, object]
+    scene: Scene
+    outputs: Sequence[str]
+    precision: str
+    keys: Sequence[str]
+    units: Sequence[str]
+    methods: Sequence[str]
+    variants: int
+    parameters: Callable[[int, int], NDArray[np.float64]]
+    splits: NDArray[np.int8] | None
+
+    @property
+    def row(self) -> np.dtype[np.void]:
+        return row_type(self.scene, self.outputs, self.precision)
+
+
+def empty_rows(count: int, row: np.dtype[np.void], names: Sequence[str] | None = None) -> Rows:
+    """Runs of which nothing is known yet: NaN, -1 and no text. `names`: these columns only."""
+    rows: Rows = {}
+    for name in names or row.names or ():
+        kind = row[name]
+        blank = np.nan if kind.base.kind == "f" else b"" if name == MESSAGE else 0 if name == "status" else -1
+        rows[name] = np.full((count, *kind.shape), blank, kind.base)
     return rows

@@ -1,31 +1,41 @@
-"""A sweep's runs on the disk: journals while it goes on, datasets of bounded size when they are complete.
+"""A sweep's runs on the disk: parts in a folder while it goes on, datasets of bounded size when they are complete.
 
-One sweep writes to an output at a time. What has been added survives any end of this process.
+One sweep writes to an output at a time. What has been noted survives any end of this process.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.store.journal import Journal, Rows
 from rotor_mbs.store.lock import FolderLock
-from rotor_mbs.store.sweep_file import Plan, identity_of, statuses_of, write_dataset
+from rotor_mbs.store.sweep_layout import Plan
+from rotor_mbs.store.sweep_rows import Places, Receipt, Rows, count_of, part_of
+
+if TYPE_CHECKING:  # the file library behind it is loaded when the first runs are on their way
+    from rotor_mbs.store.sweep_part import SweepPart
 
 _MISSING = -1
 
-# The library keeps an index of a file's chunks in memory while it writes, 1.2 kB a run.
+# The library's index of a file's chunks is held in memory while the file fills, 0.9 kB a run.
 _MOST_RUNS = 100_000
 
+# What a file takes beside its runs: descriptions, texts and messages, and an index entry for each dataset of a run.
+_HEAD_BYTES = 60_000
+_INDEX_BYTES = 140
 
-def runs_per_file(file_bytes: int, row_bytes: int) -> int:
+
+def runs_per_file(file_bytes: int, plan: Plan) -> int:
     """As many as fit, one at least, and no more than can be written in bounded memory."""
-    return min(max(file_bytes // row_bytes, 1), _MOST_RUNS)
+    chunked = sum(plan.row[name].ndim > 0 for name in plan.row.names or ())
+    run_bytes = plan.row.itemsize + _INDEX_BYTES * chunked + 8 * len(plan.keys)
+    return min(max((file_bytes - _HEAD_BYTES) // run_bytes, 1), _MOST_RUNS)
 
 
 class SweepStore:
@@ -37,10 +47,10 @@ class SweepStore:
 
     def __init__(self, output: Path, plan: Plan, first: int, last: int, file_bytes: int) -> None:
         self._output, self._plan, self._first, self._last = output, plan, first, last
-        self._per_file = runs_per_file(file_bytes, plan.row.itemsize)
+        self._per_file = runs_per_file(file_bytes, plan)
         self._folder = output.with_name(output.name + ".parts")
         self._statuses = np.full(last - first, _MISSING, np.int8)
-        self._journals: dict[int, Journal] = {}
+        self._parts: dict[int, SweepPart] = {}
 
     def __enter__(self) -> SweepStore:
         self._lock = FolderLock(self._folder, self._output)
@@ -69,62 +79,82 @@ class SweepStore:
         return self._statuses
 
     def missing(self) -> list[tuple[int, int]]:
-        """(first, last) of every gap."""
+        """(first, last) of every gap; none reaches from one file into the next."""
         gaps = np.flatnonzero(self._statuses == _MISSING)
-        spans = np.split(gaps, np.flatnonzero(np.diff(gaps) != 1) + 1) if len(gaps) else []
+        ends = (np.diff(gaps) != 1) | (np.diff(gaps // self._per_file) != 0)
+        spans = np.split(gaps, np.flatnonzero(ends) + 1) if len(gaps) else []
         return [(self._first + int(span[0]), self._first + int(span[-1]) + 1) for span in spans]
 
+    def places(self, first: int, last: int) -> Places:
+        """Where these runs, all of one file, are to be put. Raises StoreError."""
+        part = self._part(first)
+        return part.places.part(first - part.first, last - part.first)
+
     def add(self, blocks: Sequence[tuple[int, Rows]]) -> None:
-        """Adds (first run, rows); returns when they are durable. A block may lie in two files."""
-        for part in sorted({self._part(run) for first, rows in blocks for run in (first, first + len(rows) - 1)}):
-            start, end = self._span(part)
-            inside = [
-                (max(first, start), rows[max(start - first, 0) : max(end - first, 0)])
-                for first, rows in blocks
-                if first < end and first + len(rows) > start
-            ]
-            self._journal(part).append(inside)
-            for first, rows in inside:
-                self._note(first, rows)
-            self._finish_if_complete(part)
+        """Puts (first run, rows) into their places and notes them. A block may lie in two files."""
+        self.note([receipt for first, rows in blocks for receipt in self._put(first, rows)])
+
+    def note(self, receipts: Sequence[Receipt]) -> None:
+        """Makes runs count that are in their places; returns when all that is durable. Raises StoreError."""
+        by_part: dict[int, list[Receipt]] = {}
+        for receipt in receipts:
+            by_part.setdefault(self._number(receipt.first), []).append(receipt)
+        for number, those in by_part.items():
+            self._part(those[0].first).note(those)
+            for receipt in those:
+                self._count(receipt)
+            self._finish_if_complete(number)
 
     def complete(self) -> None:
         """Writes the files whose runs were all there already when this was opened. Raises StoreError."""
-        for part in list(self._journals):
-            self._finish_if_complete(part)
+        for number in list(self._parts):
+            self._finish_if_complete(number)
 
-    def _part(self, run: int) -> int:
+    def _put(self, first: int, rows: Rows) -> Iterator[Receipt]:
+        last = first + count_of(rows)
+        for number in range(self._number(first), self._number(last - 1) + 1):
+            span = self._span(number)
+            start, end = max(first, span[0]), min(last, span[1])
+            yield self.places(start, end).put(part_of(rows, start - first, end - first))
+
+    def _number(self, run: int) -> int:
         return (run - self._first) // self._per_file
 
-    def _span(self, part: int) -> tuple[int, int]:
-        start = self._first + part * self._per_file
+    def _journal(self, number: int) -> Path:
+        return self._folder / f"{number + 1:04d}.journal"
+
+    def _span(self, number: int) -> tuple[int, int]:
+        start = self._first + number * self._per_file
         return start, min(start + self._per_file, self._last)
 
-    def _note(self, first: int, rows: Rows) -> None:
-        start = first - self._first
-        self._statuses[start : start + len(rows)] = rows["status"]
+    def _count(self, receipt: Receipt) -> None:
+        start = receipt.first - self._first
+        codes = np.frombuffer(receipt.statuses, np.int8)
+        self._statuses[start : start + len(codes)] = codes
 
-    def _journal_path(self, part: int) -> Path:
-        return self._folder / f"{part + 1:04d}.journal"
+    def _part(self, run: int) -> SweepPart:
+        from rotor_mbs.store.sweep_part import SweepPart
 
-    def _journal(self, part: int) -> Journal:
-        if part not in self._journals:
-            start, end = self._span(part)
-            identity = f"{self._plan.identity} {self._per_file}"
-            self._journals[part] = Journal(self._journal_path(part), identity, start, end - start, self._plan.row)
-        return self._journals[part]
+        number = self._number(run)
+        if number not in self._parts:
+            start, end = self._span(number)
+            self._parts[number] = SweepPart(self._journal(number), self._plan, start, end, self.files[number])
+        return self._parts[number]
 
-    def _open_part(self, part: int) -> None:
-        path = self.files[part]
-        start, end = self._span(part)
+    def _open_part(self, number: int) -> None:
+        path = self.files[number]
+        start, end = self._span(number)
+        journal = self._journal(number)
         if path.exists():
             self._take_finished(path, start, end)
-            self._journal_path(part).unlink(missing_ok=True)
-        elif self._journal_path(part).exists():
-            for first, rows in self._journal(part).stored():
-                self._note(first, rows)
+            journal.unlink(missing_ok=True)
+        elif journal.exists():
+            for receipt in self._part(start).restored():
+                self._count(receipt)
 
     def _take_finished(self, path: Path, start: int, end: int) -> None:
+        from rotor_mbs.store.sweep_file import identity_of, statuses_of
+
         found = statuses_of(path) if identity_of(path) == self._plan.identity else np.empty(0, np.int8)
         if len(found) != end - start:
             raise InputError(
@@ -133,20 +163,17 @@ class SweepStore:
             )
         self._statuses[start - self._first : end - self._first] = found
 
-    def _finish_if_complete(self, part: int) -> None:
-        start, end = self._span(part)
+    def _finish_if_complete(self, number: int) -> None:
+        start, end = self._span(number)
         if (self._statuses[start - self._first : end - self._first] == _MISSING).any():
             return
-        journal = self._journal(part)
-        write_dataset(self.files[part], self._plan, start, end, journal.read)
-        journal.close()
-        del self._journals[part]
-        journal.path.unlink()
+        self._part(start).finish()
+        del self._parts[number]
 
     def _close(self) -> None:
-        for journal in self._journals.values():
-            journal.close()
-        self._journals.clear()
+        for part in self._parts.values():
+            part.close()
+        self._parts.clear()
         if not any(self._folder.glob("*.journal")):
             try:
                 shutil.rmtree(self._folder)

@@ -25,9 +25,6 @@ from rotor_mbs.models.lagrange.torque import stretches
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration
 
-# Of any processor that heyoka runs on. A time limit for a batch counts on no more.
-LEAST_LANES = 2
-
 # Unrolled code is fastest, but its compile time grows with the number of blades (and with the lanes).
 _UNROLLED_BLADES = 4
 

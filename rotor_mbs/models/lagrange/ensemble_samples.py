@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.parameters import BladeForm, RotorForm
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration, Run, Trajectory
+
+_AT_ONCE = 1 << 13  # samples
 
 
 @dataclass
@@ -45,13 +50,14 @@ class Block:
 
 
 def empty_block(scenes: Sequence[Scene]) -> Block:
+    """Room for their samples, all of which are to be put there."""
     first, runs = scenes[0], len(scenes)
     shape = (runs, first.samples)
     columns = 1 + len(first.blades)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
-    tip = np.full((*shape, len(first.blades), 3), np.nan) if first.wants("tip") else None
-    kinetic, potential, work = (np.full(shape, np.nan) if first.wants("energy") else None for _ in range(3))
-    angles, rates = np.full((*shape, columns), np.nan), np.full((*shape, columns), np.nan)
+    tip = np.empty((*shape, len(first.blades), 3)) if first.wants("tip") else None
+    kinetic, potential, work = (np.empty(shape) if first.wants("energy") else None for _ in range(3))
+    angles, rates = np.empty((*shape, columns)), np.empty((*shape, columns))
     words = [Integration(False)] * runs
     return Block(time, angles, rates, tip, kinetic, potential, work, words, [0] * runs)
 
@@ -62,7 +68,7 @@ def put_single(block: Block, i: int, run: Run) -> None:
     for name in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
         values, target = getattr(run.trajectory, name), getattr(block, name)
         if target is not None and values is not None:
-            target[i, :n] = values
+            target[i, :n], target[i, n:] = values, np.nan
     block.words[i], block.samples[i] = run.integration, n
 
 
@@ -75,44 +81,99 @@ def put_states(
     states: Array,
     words: Sequence[Integration],
 ) -> None:
-    """Runs of one structure, as the runs `numbers` of the block. states: (runs, samples, variables)."""
+    """Runs of one structure, as the runs `numbers` of the block. states: (runs, samples, variables).
+
+    A few at a time: what is worked on then stays in the processor's cache.
+    """
+    at_once = max(_AT_ONCE // states.shape[1], 1)
+    for first in range(0, len(numbers), at_once):
+        part = slice(first, first + at_once)
+        _put_states(block, numbers[part], scenes[part], forms[part], moving, states[part], words[part])
+
+
+def _put_states(
+    block: Block,
+    numbers: Sequence[int],
+    scenes: Sequence[Scene],
+    forms: Sequence[RotorForm],
+    moving: tuple[int, ...],
+    states: Array,
+    words: Sequence[Integration],
+) -> None:
     columns, count = list(moving), len(moving)
-    angles = np.repeat(np.array([scene.initial_angles for scene in scenes])[:, None, :], states.shape[1], axis=1)
-    rates = np.zeros_like(angles)
-    angles[:, :, columns] = states[:, :, :count]
-    rates[:, :, columns] = states[:, :, count : 2 * count]
+    starts = np.array([scene.initial_angles for scene in scenes]).T
     broken = np.isnan(states[:, :, 0])
-    angles[broken] = np.nan
-    rates[broken] = np.nan
-    block.angles[numbers], block.rates[numbers] = angles, rates
+    trigonometry = _Trigonometry()
+    angles, rates = [], []
+    for i in range(starts.shape[0]):
+        k = columns.index(i) if i in columns else None
+        angles.append(_held(starts[i], broken) if k is None else np.ascontiguousarray(states[:, :, k]))
+        rates.append(_held(0.0 * starts[i], broken) if k is None else np.ascontiguousarray(states[:, :, count + k]))
+        block.angles[numbers, :, i], block.rates[numbers, :, i] = angles[i], rates[i]
     if block.tip is not None:
-        block.tip[numbers] = _tips(scenes, angles)
+        for blade, path in _tips(scenes, angles, trigonometry):
+            for axis in range(3):
+                block.tip[numbers, :, blade, axis] = path[axis]
     if block.kinetic_energy is not None and block.potential_energy is not None and block.work is not None:
-        q, qd = [angles[:, :, i] for i in columns], [rates[:, :, i] for i in columns]
-        kinetic, potential = closed_form.energies(q, qd, _stacked(forms), np.sin, np.cos)
+        q, qd = [angles[i] for i in columns], [rates[i] for i in columns]
+        kinetic, potential = closed_form.energies(q, qd, _stacked(forms), trigonometry.sin, trigonometry.cos)
         block.kinetic_energy[numbers], block.potential_energy[numbers] = kinetic, potential
-        block.work[numbers] = states[:, :, 2 * count] if states.shape[2] > 2 * count else _constant_work(scenes, angles)
+        has_work = states.shape[2] > 2 * count
+        block.work[numbers] = states[:, :, 2 * count] if has_work else _constant_work(scenes, angles[0])
     samples = states.shape[1] - broken.sum(axis=1)
     for i, word, rows in zip(numbers, words, samples.tolist(), strict=True):
         word.time_reached = float(block.time[i, max(rows - 1, 0)])
         block.words[i], block.samples[i] = word, rows
 
 
-def _constant_work(scenes: Sequence[Scene], angles: Array) -> Array:
+class _Trigonometry:
+    """Sines and cosines, each found once for an array: energies and tips ask for the same ones."""
+
+    def __init__(self) -> None:
+        self._sines: dict[int, tuple[Array, Array]] = {}
+        self._cosines: dict[int, tuple[Array, Array]] = {}
+
+    def turned(self, angle: Array, phase: float) -> Array:
+        """angle + phase, whose sine and cosine follow from those of the angle."""
+        s, c, turned = self.sin(angle), self.cos(angle), angle + phase
+        sin_phase, cos_phase = math.sin(phase), math.cos(phase)
+        self._sines[id(turned)] = turned, s * cos_phase + c * sin_phase
+        self._cosines[id(turned)] = turned, c * cos_phase - s * sin_phase
+        return turned
+
+    def sin(self, angle: Array) -> Array:
+        return self._found(self._sines, np.sin, angle)
+
+    def cos(self, angle: Array) -> Array:
+        return self._found(self._cosines, np.cos, angle)
+
+    @staticmethod
+    def _found(known: dict[int, tuple[Array, Array]], function: np.ufunc, angle: Array) -> Array:
+        if id(angle) not in known:
+            known[id(angle)] = angle, function(angle)  # held, so that its number stays its own
+        return known[id(angle)][1]
+
+
+def _held(values: Array, broken: NDArray[np.bool_]) -> Array:
+    """(runs, samples) of a pitch that does not move; NaN after a run broke off."""
+    return np.where(broken, np.nan, values[:, None])
+
+
+def _constant_work(scenes: Sequence[Scene], angle: Array) -> Array:
     """Of a constant torque: τ·(q2 - q2(0)), exact."""
     torque = np.array([scene.torque_at(0.0) for scene in scenes])
-    work: Array = torque[:, None] * (angles[:, :, 0] - angles[:, :1, 0])
+    work: Array = torque[:, None] * (angle - angle[:, :1])
     return work
 
 
-def _tips(scenes: Sequence[Scene], angles: Array) -> Array:
-    tips = np.empty((*angles.shape[:2], len(scenes[0].blades), 3))
+def _tips(
+    scenes: Sequence[Scene], angles: Sequence[Array], trigonometry: _Trigonometry
+) -> Iterator[tuple[int, tuple[Any, Any, Any]]]:
+    """(blade, its tip's path (x, y, z))."""
+    sin, cos = trigonometry.sin, trigonometry.cos
     for i, phase in enumerate(scenes[0].phases):
-        point = [np.array([scene.blades[i].tip[axis] for scene in scenes])[:, None] for axis in range(3)]
-        path = closed_form.point_path(angles[:, :, 0] + phase, angles[:, :, 1 + i], point, np.sin, np.cos)  # type: ignore[arg-type]
-        for axis in range(3):
-            tips[:, :, i, axis] = path[axis]
-    return tips
+        point: Any = [np.array([scene.blades[i].tip[axis] for scene in scenes])[:, None] for axis in range(3)]
+        yield i, closed_form.point_path(trigonometry.turned(angles[0], phase), angles[1 + i], point, sin, cos)
 
 
 def _stacked(forms: Sequence[RotorForm]) -> RotorForm:

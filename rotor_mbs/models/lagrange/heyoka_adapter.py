@@ -12,6 +12,9 @@ import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 
+# Of any processor that the engine runs on. A time limit for a batch counts on no more.
+LEAST_LANES = 2
+
 
 @functools.cache
 def heyoka() -> ModuleType:
