@@ -10,7 +10,6 @@ from typing import Any
 from unittest import mock
 
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.bounds import Bounds, load_bounds
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli import batch, check
 from rotor_mbs.cli.batch import Batch, execute
@@ -18,6 +17,7 @@ from rotor_mbs.models.base import solve
 from rotor_mbs.models.multibody import chain
 from rotor_mbs.models.registry import find_method
 from rotor_mbs.runner.pool import Finished
+from rotor_mbs.scenario.bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.load import scene_hash
 from rotor_mbs.scenario.scene import Blade, Scene
@@ -47,11 +47,11 @@ def shipped(name: str) -> Scene:
     return find_scenes([name])[0]
 
 
-def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str]) -> Path:
+def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], timeout_s: float = 60.0) -> Path:
     """A batch as `run` makes it."""
     found = find_scenes(scenes)
     with in_this_process():
-        execute(Batch(found, {scene.name: methods for scene in found}, path, 1, 60.0))
+        execute(Batch(found, {scene.name: methods for scene in found}, path, 1, timeout_s))
     return path
 
 

@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 import pytest
+import test_outcome
 from checking import (
     add_run,
     failed,
@@ -27,7 +28,6 @@ from checking import (
     shipped,
 )
 
-from rotor_mbs.analysis.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli import check, check_runs, main
 from rotor_mbs.cli.check_runs import PROBES, Measured, Probe, measure
@@ -35,9 +35,11 @@ from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.models.registry import METHOD_NAMES, REFERENCE
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario import resources
+from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.store.digests import write_digests
-from rotor_mbs.trajectory.outcome import bound_of, is_held
+from rotor_mbs.trajectory import outcome
+from rotor_mbs.trajectory.outcome import is_held
 
 ROOT = Path(__file__).parents[1]
 SCENES = ("check/general", "check/held")
@@ -77,7 +79,8 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
     lines = told(capsys, good, "-v", status=0)
     assert lines[-1].endswith(" passed, 0 failed")
     checks = ("complete", "status", "times", "start", "agreement", "energy", "energies", "tip", "reference")
-    assert {line.split(":")[0] for line in lines[:-1]} == {f"pass {name}" for name in checks}
+    assert lines[-2] == f"runs judged: 2 exudyn_tree/rk67, 2 {METHOD}"
+    assert {line.split(":")[0] for line in lines[:-2]} == {f"pass {name}" for name in checks}
     assert not failed([*check.judge_bounds(load_bounds()), *check.judge_frozen(load_bounds())])
 
 
@@ -261,7 +264,7 @@ def test_a_tampered_run_fails(fault: str, copy: Path, capsys: pytest.CaptureFixt
         change(file[f"check/general/{METHOD}"])
     lines = told(capsys, copy, status=1)
     named(lines, f": check/general {METHOD} ", *words)
-    assert not any("exudyn_tree" in line or "check/held" in line for line in lines)  # and nobody else
+    assert not any("exudyn_tree" in line or "check/held" in line for line in lines[:-2])  # and nobody else
 
 
 def test_a_false_success_and_an_edited_status_fail(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -285,6 +288,17 @@ def test_a_run_that_gave_up_early_is_not_excused(copy: Path, capsys: pytest.Capt
         run.attrs.update({"status": "solver_failed", "engine_success": np.int8(0), "message": "gave up"})
     line = named(told(capsys, copy, status=1), "FAIL complete: check/general", "not 151")
     assert "stored as solver_failed: gave up" in line
+
+
+def test_a_model_that_is_not_there_is_missed_where_it_is_required(
+    copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    required = ("--require", METHOD, "--require", "exudyn_tree/rk67")
+    told(capsys, copy, *required, status=0)
+    with h5py.File(copy, "r+") as file:
+        del file[f"check/general/{METHOD}"]
+    told(capsys, copy, status=0)
+    named(told(capsys, copy, *required, status=1), "FAIL required: check/general", METHOD, "not in the file")
 
 
 def test_a_file_without_its_reference_fails(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -434,14 +448,31 @@ def test_a_bound_below_what_is_seen_fails(good: Path) -> None:
         }
 
 
-@pytest.mark.parametrize("method", [name for name in METHOD_NAMES if is_held(name)])
-def test_statuses_and_verdicts_are_held_to_the_same_numbers(method: str) -> None:
-    status = bound_of(method)
-    assert status is not None
-    assert status.angle == load_bounds().of("agreement", method).value
-    assert status.energy == load_bounds().of("energy", method).value
-    if method.startswith("exudyn_chain"):
-        assert status.gap == load_bounds().of("gap", method).value
+_CLASSIFYING = [bound for bound in load_bounds().entries if bound.check in ("agreement", "energy", "gap")]
+
+
+@pytest.mark.parametrize("bound", _CLASSIFYING, ids=lambda bound: f"{bound.check}-{bound.method}")
+def test_a_bound_of_the_classification_widened_tenfold_is_told(bound: Bound, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What `test_outcome` requires of the shipped numbers does not hold with one of them widened."""
+    wide = [replace(one, value=10.0 * one.value) if one == bound else one for one in load_bounds().entries]
+    told = (
+        test_outcome.test_an_open_joint_is_caught
+        if bound.check == "gap"
+        else test_outcome.test_the_bounds_are_where_they_are_said_to_be
+    )
+    methods = [name for name in METHOD_NAMES if is_held(name) and load_bounds().find(bound.check, name) == bound]
+    assert methods
+    outcome.allowed_of.cache_clear()
+    for method in methods:
+        told(method)
+    monkeypatch.setattr(outcome, "shipped_bounds", lambda: Bounds(wide))
+    outcome.allowed_of.cache_clear()
+    try:
+        for method in methods:
+            with pytest.raises(AssertionError):
+                told(method)
+    finally:
+        outcome.allowed_of.cache_clear()
 
 
 BAD_BOUNDS = {
@@ -489,8 +520,8 @@ def test_a_users_bound_goes_before_the_shipped_one(
     own = tmp_path / "own.toml"
     own.write_text('[[bound]]\ncheck = "energy"\nmethod = "exudyn_*"\nvalue = 0\nreason = "nothing is good enough"\n')
     lines = told(capsys, good, "--bounds", own, status=1)
-    assert {line.split(":")[0] for line in lines[:-1]} == {"FAIL energy"}
-    assert all("exudyn_tree" in line and "bound 0.00e+00" in line for line in lines[:-1])
+    assert {line.split(":")[0] for line in lines[:-2]} == {"FAIL energy"}
+    assert all("exudyn_tree" in line and "bound 0.00e+00" in line for line in lines[:-2])
 
 
 # Files that are none

@@ -23,37 +23,35 @@ from rotor_mbs.models.base import solve
 from rotor_mbs.models.registry import find_method
 from rotor_mbs.scenario.scene import Scene
 
-# Mutants that no verdict can tell from the original, by module.function and what is changed, and why.
-EXPLAINED = {
+# Mutants that neither a verdict nor a test can tell from the original, by module.scope and what is changed, and why.
+# First those that are the original in other words: what they change is a zero, a whole number or a whole turn, is read
+# by nobody, or is annulled by what follows.
+EQUIVALENT = {
     r"closed_form\.energies .*(0\.0 \* sin_q|:22: sin_q -> cos_q)": "a zero of the right kind of number",
     r"parameters\._cosine_of_turn .*sign in \(?turn \+ Fraction": "the same angle but for a whole turn",
     r"samples\.trajectory .*2 \* count scaled": "a count of columns: what it is compared with is whole",
     r"geometry\._turn .*2 \* rest scaled": "compares whole numbers",
-    r"geometry\._cos_sin .*1\.0 / 3\.0": (
-        "the last bit of sin 30°, which makes balanced blades balance exactly; `test_multibody_parts` sees it"
-    ),
     r"geometry\.hub_body .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
-    r"geometry\._joined .*part\.com - com scaled": "about the common centre of mass: of second order, 1e-12",
-    r"geometry\._joined .*r @ r \* np\.eye": "held blades lie in the rotor's plane: about y the product is zero",
-    r"tree\._tree .*without detail": "words of a listing",
-    r"energy\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack)": "a tolerance in matching times",
-    r"energy\.work .*last - first": "a run that stopped before this stretch of the torque: none here does",
-    r"energy\.cumulative_integral .*(points // 2|np\.arange|points \+ 1|abscissae)": (
-        "a quadrature with orders to spare: what is left of them is still below the energy's bound"
+    r"geometry\._joined .*r @ r \* np\.eye": (
+        "what is held has its centre of mass on its own z, in the rotor's plane: about y the product is zero"
     ),
+    r"energy\.work .*last - first scaled": "whole numbers: rows counted",
+    r"energy\.cumulative_integral .*sign in .*abscissae": "the points stand alike on both sides of the middle",
     r"chain\._rotor_torque .*0\.0 -> ": "a torque across the shaft: its bearing takes it",
     r"readings\._joint_motion .*_dot\(hub_omega, z\)": "the hub turns about y, a pitch axis has no y: always zero",
-    r"readings\._dot ": "a pitch is read off twice, across and along the shaft; either alone tells it",
+    r"readings\._dot ": (
+        "a pitch is read off twice, across and along the shaft: a term lost shrinks both sides of the arctangent alike"
+    ),
     r"observe\.unwrap .*right side of start - wrapped\[0\] lost": "rounded to turns, and less than half of one",
-    r"observe\.unwrap .*(rates\[1:\]|predicted|scaled)": (
-        "rounded to whole turns; the prediction is needed above half a turn between rows, 3000 rad/s"
+    r"observe\.unwrap .*scaled": "rounded to whole turns: 1 % of the way between two rows is no half turn",
+    r"timetable\.legs .*0\.5 \* \(t0 \+ t1\) scaled|timetable\.legs .*right side of t0 \+ t1 scaled": (
+        "any instant inside the leg tells its piece"
     ),
-    r"timetable\.legs .*(piece\.start|scene\.samples - 1|place - near)": (
-        "between which two samples a kink lies, and whether it is on one: either way the engine stops there"
+    r"timetable\.legs .*right side of scene\.samples - 1 scaled": (
+        "a kink that is off its sample by a millionth of the interval is taken to be on it"
     ),
-    r"timetable\.legs .*t0 \+ t1": "any instant inside the leg tells its piece",
     r"timetable\.legs .*end - start scaled": "rounded to a whole number of intervals",
-    r"literal\.held_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:49: .* q2 \+ phase)": (
+    r"literal\.held_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:48: .* q2 \+ phase)": (
         "the cosine multiplies c, which is 0 where this function is used"
     ),
     r"literal\.three_blade_accelerations .*c[345] -> s[345]": (
@@ -66,20 +64,24 @@ EXPLAINED = {
     r"derivation\.blade_terms .*trace\(u23, j3, u3\) \+ trace\(u32, j3, u3\)": (
         "U33,2 and U33 of a point mass are perpendicular: the second trace is zero identically"
     ),
-    r"derivation\.forces .*(left side of terms\.h_2_22|/ in terms\.h_2_22)": (
+    r"derivation\.forces .*left side of terms\.h_2_22": (
         "U32,2 and U32 of a point mass are perpendicular: h_2_22 is zero identically"
     ),
     r"observables\.tip_path .*sign of -1 lost": "the last axis of three one-dimensional arrays is their axis 1",
-    r"outcome\._broken_off .*(if samples: |integration\.success|integration\.message)": "words of the message only",
     r"outcome\._shaft_inertia_forms .*has_pitch_inertia: always": (
         "without pitch inertia the products of inertia that would be divided are zero, too"
     ),
+    r"outcome\.allowed_of .*and, or in angle is None": "a method has a bound for both or for neither",
     r"compare\.energy_error .*and, or in run\.kinetic_energy is None": "energies are all there or none is",
-    r"compare\.energy_scale .*(if run\.|and, or in|0\.0 -> )": (
-        "a judgement asks for the scale only where energies are; the other branch serves ensembles"
-    ),
-    r"compare\._against .*(len\(error\)|tips is not None)": "a number stored for a reader, no status and no verdict",
+    r"compare\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
 }
+# Then what is not the original and is not seen all the same.
+UNSEEN = {
+    r"energy\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
+        "a tolerance in matching times: any between round-off and the distance of two rows does as well"
+    ),
+}
+EXPLAINED = {**EQUIVALENT, **UNSEEN}
 
 
 def _run(*arguments: str) -> list[dict[str, str]]:
@@ -151,7 +153,8 @@ def wrong_scenes(scene: Scene, share: float) -> Iterator[tuple[str, Scene]]:
         ("lagrange/dop853", 1e-6, 6),
         pytest.param("lagrange/dop853", 1e-6, 1, marks=pytest.mark.slow),
         pytest.param("exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.slow),
-        pytest.param("exudyn_chain/generalized_alpha", 1e-2, 1, marks=pytest.mark.slow),
+        # Of second order: a product of inertia of 25 beside 4000 kg m² shows from 3 % on.
+        pytest.param("exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.slow),
     ],
 )
 def test_every_number_of_a_scene_counts(method: str, share: float, every: int, tmp_path: Path) -> None:

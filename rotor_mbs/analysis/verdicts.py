@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.bounds import Bounds
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.restore import Restored, restore
+from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import Results, StoredRun, StoredScene

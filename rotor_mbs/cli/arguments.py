@@ -7,10 +7,11 @@ import importlib
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeAlias
 
 import rotor_mbs
 
+_SCENE, _SCENES = "a name (paper/fig05) or a TOML file", "a name (paper/fig05), a folder (paper), a TOML file"
 _DEFAULT_FOLDER = Path("rotor-mbs-out")
 _DEFAULT_TIMEOUT_S = 60.0
 # The suite has runs by the dozen that no limit would let end: so that it ends in minutes, they are given less.
@@ -23,6 +24,9 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+_Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
@@ -38,14 +42,30 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rotor-mbs {rotor_mbs.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for add in (
+        _add_list_and_show,
+        _add_runs,
+        _add_bench,
+        _add_reference,
+        _add_check,
+        _add_sweep,
+        _add_stability,
+        _add_report,
+    ):
+        add(commands)
+    return parser
 
+
+def _add_list_and_show(commands: _Commands) -> None:
     listing = _command(commands, "list", "the scenes, a line each", "scenes:list_all")
-    listing.add_argument("--json", action="store_true", help="for a script")
+    listing.add_argument("--json", action="store_true", help="as JSON, for a script")
 
     show = _command(commands, "show", "one scene: its data, what each model builds, its methods", "scenes:show")
-    show.add_argument("scene", metavar="SCENE")
-    show.add_argument("--json", action="store_true", help="for a script")
+    show.add_argument("scene", metavar="SCENE", help=_SCENE)
+    show.add_argument("--json", action="store_true", help="as JSON, for a script")
 
+
+def _add_runs(commands: _Commands) -> None:
     reproduce = _command(
         commands, "reproduce", "every scene of the paper by every model, and the report", "runs:reproduce"
     )
@@ -54,15 +74,17 @@ def _parser() -> argparse.ArgumentParser:
     _add_language(reproduce)
 
     run = _command(commands, "run", "a batch of scenes into one results file", "runs:run")
-    run.add_argument("scenes", nargs="+", metavar="SCENE", help="a name (paper/fig05), a folder (paper), a TOML file")
+    run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     run.add_argument("-m", "--method", action="append", metavar="METHOD", help="model/integrator; may be repeated")
-    run.add_argument("-o", "--output", type=Path, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
+    run.add_argument("-o", "--output", type=_file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
     _add_batch_options(run)
 
+
+def _add_bench(commands: _Commands) -> None:
     bench = _command(commands, "bench", "error against run time, method by method", "bench:bench")
-    bench.add_argument("scenes", nargs="*", metavar="SCENE", help="a name (paper/fig05), a folder (paper), a TOML file")
+    bench.add_argument("scenes", nargs="*", metavar="SCENE", help=_SCENES)
     bench.add_argument("-m", "--method", action="append", metavar="METHOD", help="model/integrator; may be repeated")
-    bench.add_argument("-o", "--output", type=Path, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
+    bench.add_argument("-o", "--output", type=_file, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
     bench.add_argument("--growth", action="store_true", help="also how cost grows with blades and with duration")
     bench.add_argument(
         "--repeats", type=_positive(int, "a whole number from 1 up"), default=20, metavar="N",
@@ -73,48 +95,53 @@ def _parser() -> argparse.ArgumentParser:
         help="for each scene (default: %(default)g)",
     )  # fmt: skip
 
+
+def _add_reference(commands: _Commands) -> None:
     reference = _command(
         commands, "reference", "quad precision references, computed anew, as they are frozen", "runs:freeze"
     )
-    reference.add_argument("scenes", nargs="+", metavar="SCENE")
-    reference.add_argument("-o", "--output", type=Path, required=True, metavar="FILE")
+    reference.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
+    reference.add_argument("-o", "--output", type=_file, required=True, metavar="FILE")
     _add_batch_options(reference)
 
+
+def _add_check(commands: _Commands) -> None:
     check = _command(commands, "check", "accuracy verdicts; exit status 1 where one fails", "check:check")
     check.add_argument(
         "file", nargs="?", type=Path, metavar="FILE", help="a results file (default: a quick set, computed)"
     )
     check.add_argument("--bounds", type=Path, metavar="TOML", help="own bounds, read before reference/accuracy.toml")
-    check.add_argument("--junit", type=Path, metavar="XML", help="verdicts as JUnit XML")
-    check.add_argument("--json", metavar="FILE", help="verdicts as JSON; - for standard output")
+    check.add_argument(
+        "--require", action="append", metavar="METHOD",
+        help="fail where a scene of FILE has no run of it; may be repeated",
+    )  # fmt: skip
+    check.add_argument("--junit", type=_file, metavar="XML", help="verdicts as JUnit XML")
+    check.add_argument("--json", type=_file, metavar="FILE", help="verdicts as JSON; - for standard output")
     check.add_argument("--github", action="store_true", help="failures as GitHub annotations")
     check.add_argument("--speed", action="store_true", help="run times too, against a calibration run")
     check.add_argument("-v", "--verbose", action="store_true", help="print verdicts that pass, too")
     _add_jobs(check)
 
-    _add_sweep(commands)
 
+def _add_stability(commands: _Commands) -> None:
     stability = _command(
         commands, "stability", "stiff and extreme scenes by every method: where each holds, and the map of it",
         "stability:stability",
     )  # fmt: skip
     stability.add_argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)")
     stability.add_argument(
-        "-o", "--output", type=Path, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
+        "-o", "--output", type=_file, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
     )
     stability.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
     _add_batch_options(stability, timeout_s=_SUITE_TIMEOUT_S)
 
+
+def _add_report(commands: _Commands) -> None:
     report = _command(commands, "report", "HTML pages from a results file", "reports:report")
-    report.add_argument("file", type=Path, metavar="FILE")
+    report.add_argument("file", type=Path, metavar="FILE", help="a results file")
     report.add_argument("-o", "--output", type=Path, default=Path("report"), metavar="DIR", help=_default("DIR"))
     _add_language(report)
 
-    _add_pictures(commands)
-    return parser
-
-
-def _add_pictures(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     figures = _command(
         commands, "figures", "the paper's figures as files for a manuscript, from a results file", "figures:figures"
     )
@@ -125,14 +152,14 @@ def _add_pictures(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     _add_language(figures)
 
     animate = _command(commands, "animate", "a scene moving, from a results file", "animate:animate")
-    animate.add_argument("scene", metavar="SCENE")
+    animate.add_argument("scene", metavar="SCENE", help="its name in the results file")
     animate.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="FILE",
+        "-o", "--output", type=_file, required=True, metavar="FILE",
         help="FILE.webp, FILE.gif, or FILE.mp4 where ffmpeg is installed",
     )  # fmt: skip
     animate.add_argument(
-        "--offset", type=_positive(float, "a number more than 0"), default=40.0, metavar="TIMES",
-        help="how many times the tip's distance from its pitch axis is drawn (default: %(default)g)",
+        "--offset", type=_positive(float, "a number more than 0"), metavar="TIMES",
+        help="how many times the tip's distance from its pitch axis is drawn (default: to a tenth of the blade)",
     )  # fmt: skip
     _add_results(animate)
 
@@ -152,13 +179,13 @@ def _add_language(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lang", choices=("en", "es"), default="en", help="of the texts (default: %(default)s)")
 
 
-def _add_sweep(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def _add_sweep(commands: _Commands) -> None:
     sweep = _command(commands, "sweep", "a parameter study into one dataset", "sweep:sweep")
     sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
     sweep.add_argument(
         "-m", "--method", action="append", metavar="METHOD", help="in place of the file's; may be repeated"
     )
-    sweep.add_argument("-o", "--output", type=Path, metavar="FILE", help="(default: the sweep's name with .h5)")
+    sweep.add_argument("-o", "--output", type=_file, metavar="FILE", help="(default: the sweep's name with .h5)")
     sweep.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
     sweep.add_argument("--part", type=_part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
     sweep.add_argument("--dry-run", action="store_true", help="how many runs, about how long, how much")
@@ -175,13 +202,19 @@ def _part(text: str) -> tuple[int, int]:
     return int(number), int(parts)
 
 
+def _file(text: str) -> Path:
+    """Where a file is to be written: neither nothing, nor a folder that is there."""
+    path = Path(text)
+    if not path.name or path.name == ".." or path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a file's name, not a folder")
+    return path
+
+
 def _default(metavar: str) -> str:
     return f"{metavar} (default: %(default)s)"
 
 
-def _command(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, text: str, target: str
-) -> argparse.ArgumentParser:
+def _command(commands: _Commands, name: str, text: str, target: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(name, help=text, description=text)
     parser.set_defaults(command=_late(target))
     return parser

@@ -7,19 +7,20 @@ import importlib.util
 import math
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from rotor_mbs.analysis.bounds import Bounds, load_bounds
 from rotor_mbs.analysis.verdicts import Verdict, verdicts
 from rotor_mbs.cli.batch import Batch, execute
 from rotor_mbs.cli.check_runs import PROBES, SPEED_PROBES, Measured, Probe, measure
 from rotor_mbs.errors import StoreError
-from rotor_mbs.models.registry import METHOD_NAMES, REFERENCE, available_defaults
+from rotor_mbs.models.registry import METHOD_NAMES, REFERENCE, available_defaults, check_names
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.runner.pool import run_tasks
+from rotor_mbs.scenario.bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.scenario.scene import Scene
@@ -27,9 +28,11 @@ from rotor_mbs.store.digests import touched
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import open_results
 
-# The chain takes as long as all else together: three scenes of the paper tell what it has to tell.
+# The chain takes as long as all else together: four scenes of the paper tell what it has to tell.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
 _TIMEOUT_S = 60.0
+_STANDARD_OUTPUT = Path("-")
+_OF_EVERY_RUN = "status"  # a check that each run has one verdict of
 
 
 @dataclass(frozen=True)
@@ -44,21 +47,24 @@ class DefaultSet:
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count."""
     bounds = load_bounds(arguments.bounds)
+    required = check_names(arguments.require or ())
     if arguments.file is not None:
         found = judge_file(arguments.file, bounds)
+        found += judge_presence(found, required)
     else:
         found = judge_default_set(default_set(), bounds, arguments.jobs)
     if arguments.speed:
         found += _probe([p for p in SPEED_PROBES if _is_available(p.method)], bounds, 1)
     _write(arguments, found)
     # With --json - the standard output is the JSON's alone.
-    words = sys.stderr if arguments.json == "-" else sys.stdout
+    words = sys.stderr if arguments.json == _STANDARD_OUTPUT else sys.stdout
     failed = [verdict for verdict in found if not verdict.passed]
     for verdict in found if arguments.verbose else failed:
         print(verdict_formats.line(verdict), file=words)
     if arguments.github:
         for verdict in failed:
             print(verdict_formats.github(verdict), file=words)
+    print(_judged(found), file=words)
     print(f"{len(found) - len(failed)} passed, {len(failed)} failed", file=words)
     return 1 if failed or not found else 0
 
@@ -69,6 +75,25 @@ def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
         results = stack.enter_context(open_results(path))
         shipped = [stack.enter_context(open_results(file)) for file in _frozen_files()]
         return verdicts(results, shipped, bounds)
+
+
+def judge_presence(found: Sequence[Verdict], required: Sequence[str]) -> list[Verdict]:
+    """Of every scene that was judged, whether it has a run of each method that must be there."""
+    there = {(verdict.scene, verdict.method) for verdict in found}
+    scenes = dict.fromkeys(verdict.scene for verdict in found if verdict.check == _OF_EVERY_RUN)
+    return [
+        Verdict(
+            "required", scene, method, "run", float((scene, method) not in there), 0.0, "missing", "not in the file"
+        )
+        for scene in scenes
+        for method in required
+    ]
+
+
+def _judged(found: Sequence[Verdict]) -> str:
+    """What there was to be judged, so that a run that is not there is missed by whoever reads."""
+    runs = Counter(one.method for one in found if one.check == _OF_EVERY_RUN and one.method != REFERENCE)
+    return "runs judged: " + (", ".join(f"{count} {method}" for method, count in runs.items()) or "none")
 
 
 def default_set() -> DefaultSet:
@@ -149,9 +174,9 @@ def _verdict(one: Measured, bounds: Bounds) -> Verdict:
 def _write(arguments: argparse.Namespace, found: list[Verdict]) -> None:
     if arguments.junit is not None:
         replace_file(arguments.junit, verdict_formats.junit(found))
-    if arguments.json == "-":
+    if arguments.json == _STANDARD_OUTPUT:
         print(verdict_formats.as_json(found))
     elif arguments.json is not None:
-        replace_file(Path(arguments.json), verdict_formats.as_json(found).encode())
+        replace_file(arguments.json, verdict_formats.as_json(found).encode())
     if not found:
         print("nothing to check: the file holds no run", file=sys.stderr)

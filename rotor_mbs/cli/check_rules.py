@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.bounds import Bounds
+from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.trajectory.compare import compare
 from rotor_mbs.trajectory.outcome import judge, rotor_inertia_shares
 from rotor_mbs.trajectory.record import Array, Integration, Run, Trajectory
 
@@ -66,6 +67,36 @@ def cases(bounds: Bounds, methods: tuple[str, ...]) -> list[Case]:
     """`bounds`: what the statuses are to be true to; `methods`: those that are held to them."""
     found = [case for method in methods for case in _at_the_bounds(method, bounds)]
     return [*found, *_broken_off(), *_singular(), *_conditioned(bounds), *_carried(bounds), *_gross(), *_not_held()]
+
+
+def metrics_off() -> Iterator[tuple[str, float]]:
+    """(metric, relative error) of what is stored beside a status, for a run off by known amounts."""
+    exact = replace(_moving(), growth=_growth(2e5))  # the horizon is sample 3
+    exact.tip = np.zeros((11, 3, 3))
+    wrong = _with_error(_with_error(_moving(), 0.1, 2), 0.3, 10)
+    wrong.tip = np.zeros((11, 3, 3))
+    wrong.tip[1, 2] = (3.0, 0.0, 4.0)
+    wrong.tip[8, 1] = (30.0, 0.0, 40.0)
+    whole = compare(_SCENE, wrong, exact)
+    known = {
+        "horizon_s": 0.3,
+        "angle_error_max": 0.1,
+        "angle_error_whole": 0.3,
+        "angle_error_end": 0.3,
+        "tip_error_max": 5.0,
+    }
+    for name, value in known.items():
+        yield name, abs(whole.get(name, math.nan) / value - 1.0)
+    errors = {"angle_error_max", "angle_error_per_growth", "tip_error_max"}
+    at_once = replace(exact, growth=np.where(np.arange(11) < 1, 1.0, 2e5))  # nothing but the start before its horizon
+    for name, run, reference, expected in (
+        ("stopped early", replace(_cut(wrong, 2), tip=wrong.tip[:2]), exact, errors | {"angle_error_whole"}),
+        ("gone on past its reference", wrong, _cut(exact, 5), errors - {"tip_error_max"} | {"angle_error_whole"}),
+        ("stopped at the start", _cut(wrong, 1), exact, set()),
+        ("past the horizon at once", wrong, at_once, {"angle_error_whole", "angle_error_end"}),
+    ):
+        found = compare(_SCENE, run, reference).keys() & (errors | {"angle_error_whole", "angle_error_end"})
+        yield f"metrics of a run {name}", float(len(found ^ expected))
 
 
 def shares_off(scene: Scene) -> float:
@@ -128,6 +159,9 @@ def _at_the_bounds(method: str, bounds: Bounds) -> Iterator[Case]:
             gap = np.full(11, side * bounds.of("gap", method).value * math.hypot(0.1, 10.0))
             opened = replace(exact, constraint_error=gap)
             yield Case(f"gap of {side:g} bounds", method, status, opened, is_false_success=asked)
+    if not method.startswith("exudyn_chain"):
+        gap = np.full(11, 1e-15)
+        yield Case("a gap without a joint", method, "inaccurate", replace(exact, constraint_error=gap))
 
 
 def _broken_off() -> Iterator[Case]:
@@ -157,7 +191,10 @@ def _singular() -> Iterator[Case]:
         on_the_way.rates[-1, 1:] = 1.0
         yield Case(f"broken off {0.1 - beyond:g} s before it", method, status, on_the_way, _FAILED)
     yield Case("from a singular start to the end", method, "singular", _moving(0.5 * math.pi), is_false_success=True)
-    yield Case("from nearly a singular start to the end", method, "ok", _moving(0.5 * math.pi - 1e-14))
+    # Four and five doubles below π/2: shares of 9.0e-31 and 1.4e-30.
+    four, five = (0.5 * math.pi - math.ulp(1.0) * count for count in (4, 5))
+    yield Case("from the last singular start to the end", method, "singular", _moving(four), is_false_success=True)
+    yield Case("from the first regular start to the end", method, "ok", _moving(five))
     ended = _cut(near, 5)
     yield Case("past the end of the motion", method, "singular", exact, reference=ended, is_false_success=True)
     yield Case("past the end of a reference that merely stops", method, "ok", far, reference=_cut(far, 5))

@@ -14,13 +14,14 @@ from rotor_mbs.analysis.verdicts import Verdict
 
 
 def line(verdict: Verdict) -> str:
-    """One line: outcome, what was checked where, the value, the bound, the margin, what to look at."""
+    """One line: outcome, what was checked where, the value, the bound, the margin; of a failure what to look at."""
     word = "pass" if verdict.passed else "FAIL"
     margin = "inf" if math.isinf(verdict.margin) else f"{verdict.margin:.3g}"
     unit = f" {verdict.unit}" if verdict.unit else ""
+    look_at = "" if verdict.passed else f"; {verdict.look_at}"
     return printable(
         f"{word} {verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}: {verdict.value:.2e}, "
-        f"bound {verdict.bound:.2e}{unit}, margin {margin}; {verdict.look_at}"
+        f"bound {verdict.bound:.2e}{unit}, margin {margin}{look_at}"
     )
 
 

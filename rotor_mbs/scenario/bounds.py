@@ -1,7 +1,11 @@
-"""What checks are held to: reference/accuracy.toml, and a user's own file before it. Knows no results."""
+"""What results are held to: reference/accuracy.toml, and a user's own file before it. Knows no results.
+
+It stands this low because a run's status and the verdicts of `check` read the same entries: one bound, one place.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,10 +47,15 @@ class Bounds:
 
     def of(self, check: str, method: str) -> Bound:
         """The first that fits. Raises InputError where none does: a check without a bound would pass anything."""
-        for bound in self.entries:
-            if bound.check == check and fnmatchcase(method, bound.method):
-                return bound
-        raise InputError(f"no bound for check {check!r} of {method}; allowed: an entry in a file given with --bounds")
+        bound = self.find(check, method)
+        if bound is None:
+            raise InputError(f"no bound for check {check!r} of {method}; allowed: an entry in a --bounds file")
+        return bound
+
+    def find(self, check: str, method: str) -> Bound | None:
+        """The first that fits, or None."""
+        fitting = (one for one in self.entries if one.check == check and fnmatchcase(method, one.method))
+        return next(fitting, None)
 
 
 def shipped_file() -> Path:
@@ -54,10 +63,16 @@ def shipped_file() -> Path:
     return reference_folder() / "accuracy.toml"
 
 
+@functools.cache
+def shipped_bounds() -> Bounds:
+    """Those of reference/accuracy.toml, read once. Raises InputError with every fault of the file."""
+    return Bounds(_read(shipped_file(), frozenset({"fault", "known_fault"})))
+
+
 def load_bounds(own: Path | None = None) -> Bounds:
     """The user's bounds, then the shipped ones. Raises InputError with every fault of a file."""
     users = _read(own, frozenset()) if own else []
-    return Bounds([*users, *_read(shipped_file(), frozenset({"fault", "known_fault"}))])
+    return Bounds([*users, *shipped_bounds().entries])
 
 
 def _read(path: Path, also: frozenset[str]) -> list[Bound]:
