@@ -5,13 +5,22 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from checking import in_this_process
 
 from rotor_mbs.analysis.stability import OUTCOMES, advice, cells, in_words, reached_by, unreached
-from rotor_mbs.cli import main
-from rotor_mbs.runner.pool import run_tasks
+from rotor_mbs.cli import main, stability_records
+from rotor_mbs.cli.batch import Batch, execute
+from rotor_mbs.cli.stability_records import complete_records
+from rotor_mbs.report.stability_page import write_stability_report
+from rotor_mbs.report.stability_texts import NOT_COMPARED
+from rotor_mbs.runner.pool import Finished, run_tasks
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.stability import Record, read_records, write_records
 
@@ -61,12 +70,67 @@ def test_the_map_and_its_pages(suite: Path) -> None:
         assert one.method in in_words(one)
 
 
+def test_a_run_held_by_its_energy_alone_says_so(tmp_path: Path) -> None:
+    """A needle sampled at its two ends: the horizon is before the second, where doubles have lost the motion."""
+    pytest.importorskip("heyoka")
+    path = tmp_path / "needle.h5"
+    (one,) = find_scenes(["extreme/needle-fig05-1e-15"])
+    with in_this_process():
+        execute(Batch([replace(one, samples=2)], {one.name: ["lagrange/taylor"]}, path, 1, 60.0))
+    (cell,) = cells(path)
+    assert (cell.status, cell.outcome) == ("ok", "energy_alone")
+    assert cell.message == "held by its energy alone: the horizon is before the second sample"
+    assert cell.angle_error is None
+    assert not cell.reaches_target
+    assert reached_by([cell], one.name) is None
+    assert in_words(advice([cell])[0]).startswith("lagrange/taylor: holds on 1 of 1 (1 by its energy alone)")
+    page = write_stability_report(path, tmp_path / "report").read_text(encoding="utf-8")
+    assert cell.message in page
+    assert NOT_COMPARED in page
+    assert "closed form, Taylor: holds on 1 of 1 (1 by its energy alone); use for “on a needle”" in page
+    own = (tmp_path / "report" / "extreme-needle-fig05-1e-15.html").read_text(encoding="utf-8")
+    assert cell.message in own
+
+
 def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    write_records(path, [Record("limits", "stiff/x/exudyn_tree/rk44", {"theory_s": 0.25})])
+    record = Record("steps", "stiff/x/exudyn_tree/rk44", {"step_for_target_s": 0.25}, {"step": np.array([0.5, 0.25])})
+    write_records(path, [record])
+    write_records(path, read_records(path))
     (back,) = read_records(path)
-    assert (back.kind, back.scene, back.method) == ("limits", "stiff/x", "exudyn_tree/rk44")
-    assert back.attributes["theory_s"] == 0.25
+    assert (back.kind, back.scene, back.method) == ("steps", "stiff/x", "exudyn_tree/rk44")
+    assert back.attributes["step_for_target_s"] == 0.25
+    assert {name: list(values) for name, values in back.arrays.items()} == {"step": [0.5, 0.25]}
+
+
+def test_an_interrupted_suite_goes_on_with_its_records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each record is stored when it is made; what is there is not made again, by whatever way it got there."""
+    path = tmp_path / "s.h5"
+    scenes, methods = find_scenes(["extreme/zero-gravity"]), ["lagrange/ode45", "exudyn_tree/rk67", "exudyn_tree/rk44"]
+    by_scene = {"extreme/zero-gravity": methods}
+    with in_this_process():
+        execute(Batch(scenes, by_scene, path, 1, 60.0))
+    made: list[str] = []
+    ends_after = 1
+
+    def one_by_one(work: Any, tasks: Any, *_: object) -> Iterator[Any]:
+        for task in tasks:
+            if len(made) == ends_after:
+                raise KeyboardInterrupt
+            yield Finished(task, work(task))
+            made.append(task.method)
+
+    monkeypatch.setattr(stability_records, "run_tasks", one_by_one)
+    with pytest.raises(KeyboardInterrupt):
+        complete_records(scenes, by_scene, [], path, 1)
+    assert read_records(path) == []
+    ends_after = 10
+    complete_records(scenes, by_scene, [], path, 1)
+    assert made == methods
+    assert [record.method for record in read_records(path)] == sorted(methods)
+    complete_records(scenes, by_scene, [], path, 1)
+    assert made == methods
+    assert [file.name for file in tmp_path.iterdir()] == ["s.h5"]
 
 
 def _work(task: int) -> int:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Blade, Scene
 
 Array = NDArray[np.float64]
 
@@ -30,15 +30,15 @@ def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:
         shaft = np.stack([s, c, np.zeros_like(s)])
         omega = shaft * spin
         omega[2] = rates[:, 1 + i]
-        total = total + np.einsum("in,ij,jn->n", shaft, _inertia_about_hub(blade.mass, blade), omega)
+        total = total + np.einsum("in,ij,jn->n", shaft, _inertia_about_hub(blade), omega)
     return np.asarray(total)
 
 
-def _inertia_about_hub(mass: float, blade: object) -> Array:
-    xx, yy, zz, xy, xz, yz = blade.inertia  # type: ignore[attr-defined]
-    r = np.array(blade.centre_of_mass)  # type: ignore[attr-defined]
+def _inertia_about_hub(blade: Blade) -> Array:
+    xx, yy, zz, xy, xz, yz = blade.inertia
+    r = np.array(blade.centre_of_mass)
     own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return np.asarray(own + mass * (r @ r * np.eye(3) - np.outer(r, r)))
+    return np.asarray(own + blade.mass * (r @ r * np.eye(3) - np.outer(r, r)))
 
 
 def largest_relative_change(values: Array) -> float:

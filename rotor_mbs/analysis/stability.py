@@ -1,4 +1,4 @@
-"""The map of the stability suite: every scene and method as one of six outcomes, and what to use which method for.
+"""The map of the stability suite: every scene and method as one of a few outcomes, and what to use which method for.
 
 Reads the store alone.
 """
@@ -20,6 +20,7 @@ TARGET = 1e-6  # rad: what "right" means on the map
 # Outcome -> symbol, words. Colour is the report's.
 OUTCOMES = {
     "holds": ("✓", "holds"),
+    "energy_alone": ("E", "keeps its energy; nothing else to hold it against"),
     "smaller_step": ("▾", "holds with a smaller step"),
     "inaccurate": ("≈", "ends, but off its bound"),
     "loses_energy": ("↯", "loses or makes energy"),
@@ -28,6 +29,8 @@ OUTCOMES = {
     "refuses": ("–", "refuses, rightly: no motion to follow"),
     "timed_out": ("⧗", "too slow for the time limit"),
 }
+
+_HOLDS = ("holds", "energy_alone")
 
 # Above this share of the energy scale a run has not merely lost digits.
 _ENERGY_LOST = 1e-3
@@ -38,7 +41,9 @@ class Cell:
     """A scene under a method.
 
     outcome      a key of OUTCOMES, from the run's status and what a ladder of steps found
-    angle_error  rad up to the horizon; None without a reference
+    message      the run's own; for "energy_alone", why nothing else holds it
+    angle_error  rad up to the horizon; None without a reference, or where the horizon is before the second sample
+    time_reached s: of the last finite sample, whatever the engine says
     step         s: the step that 1e-6 rad needs, where a ladder found it
     """
 
@@ -108,18 +113,20 @@ def _cell(scene: StoredScene, run: StoredRun, ladder: Record | None) -> Cell:
     reference = scene.reference
     step = ladder.attributes.get("step_for_target_s") if ladder is not None else None
     ladder_reaches = ladder is not None and bool(np.any(_ok(ladder) & (ladder.arrays["angle_error_max"] <= TARGET)))
+    has_reference = reference is not None and reference.status == "ok"
+    outcome = _outcome(run, ladder, has_motion=has_reference)
     return Cell(
         scene.name,
         run.method,
         run.status,
-        _outcome(run, ladder, has_motion=reference is not None and reference.status == "ok"),
-        str(facts.get("message", "")),
+        outcome,
+        _not_compared(reference) if outcome == "energy_alone" else str(facts.get("message", "")),
         bool(facts.get("false_success", 0)),
-        reference is not None and reference.status == "ok",
+        has_reference,
         None if error is None else float(error),
         facts.get("energy_drift_max"),
         float(facts["run_time_s"]),
-        float(facts["time_reached"]),
+        float(run.array("time")[-1]) if len(run.array("time")) else 0.0,
         None if step is None else float(step),
         (run.status == "ok" and error is not None and error <= TARGET) or ladder_reaches,
     )
@@ -131,7 +138,7 @@ def _ok(ladder: Record) -> np.ndarray:
 
 def _outcome(run: StoredRun, ladder: Record | None, *, has_motion: bool) -> str:
     if run.status == "ok":
-        return "holds"
+        return "holds" if "angle_error_max" in run.attributes else "energy_alone"
     if ladder is not None and bool(_ok(ladder).any()):
         return "smaller_step"
     if run.status == "timed_out":
@@ -144,6 +151,14 @@ def _outcome(run: StoredRun, ladder: Record | None, *, has_motion: bool) -> str:
         return "says_so"
     lost = not run.attributes.get("energy_drift_max", 0.0) <= _ENERGY_LOST
     return "loses_energy" if lost else "inaccurate"
+
+
+def _not_compared(reference: StoredRun | None) -> str:
+    if reference is None:
+        return "held by its energy alone: there is no reference"
+    if len(reference.array("time")) < 2:
+        return f"held by its energy alone: no reference ({reference.attributes['message']})"
+    return "held by its energy alone: the horizon is before the second sample"
 
 
 def unreached(found: Iterable[Cell]) -> list[str]:
@@ -163,13 +178,18 @@ def reached_by(found: Iterable[Cell], scene: str) -> str | None:
 
 @dataclass(frozen=True)
 class Advice:
-    """use, avoid: families of scenes; holds: scenes on which the method holds, of all it ran."""
+    """holds: scenes on which the method holds, of all it ran; by_energy: of those.
+
+    use, in_part, avoid: families of scenes; by_smaller_step: whether a smaller step is what holds in part.
+    """
 
     method: str
     holds: int
+    by_energy: int
     of: int
     use: tuple[str, ...]
-    with_smaller_step: tuple[str, ...]
+    in_part: tuple[str, ...]
+    by_smaller_step: bool
     avoid: tuple[str, ...]
     false_successes: int
 
@@ -182,39 +202,44 @@ def advice(found: Sequence[Cell]) -> list[Advice]:
 
 
 def _advice(method: str, own: Sequence[Cell]) -> Advice:
-    use, smaller, avoid = [], [], []
+    use, in_part, avoid = [], [], []
     for family in dict.fromkeys(cell.family for cell in own):
         inside = [cell for cell in own if cell.family == family and cell.outcome != "refuses"]
         if not inside:
             continue
-        holds = sum(cell.outcome == "holds" for cell in inside) / len(inside)
-        with_step = sum(cell.outcome in ("holds", "smaller_step") for cell in inside) / len(inside)
+        holds = sum(cell.outcome in _HOLDS for cell in inside) / len(inside)
+        with_step = sum(cell.outcome in (*_HOLDS, "smaller_step") for cell in inside) / len(inside)
         if holds >= 0.9:
             use.append(family)
         elif with_step >= 0.5:
-            smaller.append(family)
+            in_part.append(family)
         else:
             avoid.append(family)
-    held = sum(cell.outcome == "holds" for cell in own)
+    held = sum(cell.outcome in _HOLDS for cell in own)
+    by_energy = sum(cell.outcome == "energy_alone" for cell in own)
     claimed = sum(cell.false_success for cell in own)
-    return Advice(method, held, len(own), tuple(use), tuple(smaller), tuple(avoid), claimed)
+    smaller = any(cell.outcome == "smaller_step" and cell.family in in_part for cell in own)
+    return Advice(method, held, by_energy, len(own), tuple(use), tuple(in_part), smaller, tuple(avoid), claimed)
 
 
 def summary_lines(found: Sequence[Cell]) -> list[str]:
-    """The advice in plain words, a line per method."""
+    """The advice in plain words, a line per method; a family is named by what its scenes are."""
     return [in_words(one) for one in advice(found)]
 
 
 def in_words(one: Advice) -> str:
-    parts = [f"{one.method}: holds on {one.holds} of {one.of}"]
+    alone = f" ({one.by_energy} by its energy alone)" if one.by_energy else ""
+    parts = [f"{one.method}: holds on {one.holds} of {one.of}{alone}"]
     if one.use:
         parts.append(f"use for {_listed(one.use)}")
-    if one.with_smaller_step:
-        parts.append(f"with a smaller step or not everywhere for {_listed(one.with_smaller_step)}")
+    if one.in_part:
+        how = "with a smaller step or not everywhere" if one.by_smaller_step else "not everywhere"
+        parts.append(f"{how} for {_listed(one.in_part)}")
     if one.avoid:
         parts.append(f"do not use for {_listed(one.avoid)}")
     if one.false_successes:
-        parts.append(f"its engine claimed success {one.false_successes} times where the state says otherwise")
+        times = "once" if one.false_successes == 1 else f"{one.false_successes} times"
+        parts.append(f"its engine claimed success {times} where the state says otherwise")
     return "; ".join(parts)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -25,20 +26,26 @@ _SEED = 20200101  # any: the starts must be the same on every machine
 
 @dataclass(frozen=True)
 class ConservationTask:
-    """kind: "symmetry" or "drift"; the scene must be without damping and without a torque that changes."""
+    """kind: "symmetry", or "drift" for that and the drift; piece: where the record goes.
+
+    The scene must be without damping and without a torque that changes.
+    """
 
     kind: str
     scene: Scene
     method: str
+    piece: Path | None = None
 
 
 def perform_conservation(task: ConservationTask) -> Record:
     name = f"{task.scene.name}/{task.method}"
     try:
         with time_limit(_LIMIT_S):
-            if task.kind == "drift":
-                return drift_record(name, task)
-            return Record("conservation", name, _symmetry(task.scene, task.method))
+            symmetry = _symmetry(task.scene, task.method)
+            if task.kind != "drift":
+                return Record("conservation", name, symmetry)
+            drift = drift_record(name, task)
+            return replace(drift, attributes={**symmetry, **drift.attributes})
     except OutOfTimeError as exc:
         return Record("conservation", name, {"message": str(exc)})
 

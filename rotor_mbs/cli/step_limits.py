@@ -31,6 +31,8 @@ TARGET = 1e-6  # rad
 # A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to take this long.
 _FACTOR = 4
 _LONGEST_RUN_S = 1.5
+# A run that fails at once costs nothing, however small its step.
+_MOST_STEPS = 1e7
 # Bisection: a window of so many radians of the fastest mode; a pitch this many times its start has grown, not swung.
 _WINDOW_RADIANS = 5e3
 _GROWTH = 100.0
@@ -39,12 +41,13 @@ _INTERVALS = 10
 
 @dataclass(frozen=True)
 class StepTask:
-    """kind: "steps" or "limits"; results: a file with the scene's reference and runs."""
+    """kind: "steps" or "limits"; results: a file with the scene's reference; piece: where the record goes."""
 
     kind: str
     scene: Scene
     method: str
     results: Path
+    piece: Path | None = None
 
 
 def perform_steps(task: StepTask) -> Record:
@@ -64,7 +67,7 @@ def _ladder(task: StepTask) -> Record:
     interval = task.scene.duration / (task.scene.samples - 1)
     rows: list[tuple[float, Verdict]] = []
     expected, step = 0.0, interval
-    while expected <= _LONGEST_RUN_S:
+    while expected <= _LONGEST_RUN_S and task.scene.duration <= _MOST_STEPS * step:
         verdict, seconds = _judged(task, {"step": step}, reference)
         rows.append((step, verdict))
         if verdict.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and verdict.status == "ok":
@@ -131,7 +134,7 @@ def _limit(task: StepTask) -> Record:
         "largest_stable_step_s": found,
         "theory_s": theory,
         "fastest_mode_per_s": max(abs(mode) for mode in modes),
-        "real_mode": int(all(mode.imag == 0.0 for mode in modes)),
+        "mode_damping_ratio": min(1.0, *(abs(mode.real) / abs(mode) for mode in modes)),
     }
     return Record("limits", f"{scene.name}/{task.method}", attributes)
 

@@ -85,7 +85,7 @@ def _records(group: Any, path: str) -> Iterator[Record]:
         below = f"{path}/{name}" if path else name
         if "record" in item.attrs:
             kind, _, rest = below.partition("/")
-            arrays = {key: values[()] for key, values in item.items()}
+            arrays = {key: values[()] for key, values in item.items() if key != "row"}
             yield Record(kind, rest, hdf5.attributes_of(item), arrays)
         else:
             yield from _records(item, below)

@@ -82,7 +82,7 @@ def compare(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metr
     if not len(run.time):
         return metrics
     energy = energy_error(run)
-    if energy is not None:
+    if energy is not None and len(energy) > 1:  # the first sample is what the others are held to
         scale = energy_scale(scene, run)
         metrics["energy_scale_J"] = scale
         metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
@@ -95,19 +95,19 @@ def compare(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metr
 
 
 def _against(run: Trajectory, reference: Trajectory) -> Metrics:
+    """Errors only where there is a second sample to tell them from: the first one is given, and right in every run."""
     error = angle_error(run, reference)
     until = min(horizon_samples(reference), len(error))
-    metrics = {
-        "horizon_s": horizon(reference),
-        "angle_error_max": float(error[:until].max()),
-        "angle_error_whole": float(error.max()),
-        "angle_error_per_growth": float((error / _carried_error(reference)[: len(error)])[:until].max()),
-    }
-    if len(error) == len(reference.time):
-        metrics["angle_error_end"] = float(error[-1])
-    tips = tip_error(run, reference)
-    if tips is not None:
-        metrics["tip_error_max"] = float(tips[:until].max())
+    metrics = {"horizon_s": horizon(reference)}
+    if until > 1:
+        metrics["angle_error_max"] = float(error[:until].max())
+        metrics["angle_error_per_growth"] = float((error / _carried_error(reference)[: len(error)])[:until].max())
+        if (tips := tip_error(run, reference)) is not None:
+            metrics["tip_error_max"] = float(tips[:until].max())
+    if len(error) > 1:
+        metrics["angle_error_whole"] = float(error.max())
+        if len(run.time) == len(reference.time):
+            metrics["angle_error_end"] = float(error[-1])
     return metrics | _invariant_set(run, reference)
 
 
