@@ -66,8 +66,9 @@ def test_the_whole_of_fig08(method: str) -> None:
 @pytest.mark.parametrize("method", BEST)
 @pytest.mark.parametrize("name", PAPER)
 def test_energy_less_work_is_kept(name: str, method: str) -> None:
+    """Of the energy scale; 5e-14 is the worst that was seen, the rest is for another machine's rounding."""
     scene = paper(name)
-    assert compare(scene, run(scene, method).trajectory, None)["energy_drift_max"] <= 1e-9
+    assert compare(scene, run(scene, method).trajectory, None)["energy_drift_max"] <= 1e-12
 
 
 def test_the_chain_on_fig08_up_to_its_horizon() -> None:

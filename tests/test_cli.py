@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 
 import pytest
-from scenes import paper
 
 from rotor_mbs.store.read import open_results
 
@@ -215,4 +214,3 @@ def test_samples_do_not_depend_on_how_many_processes(tmp_path: Path) -> None:
         for name, scene in one.scenes.items():
             for method, run in scene.runs.items():
                 assert (run.array("angles") == two.scenes[name].runs[method].array("angles")).all()
-    assert paper("fig08").samples == 1001

@@ -85,7 +85,7 @@ def test_figure_5_numbers():
 
 
 def test_figure_8_rotor_stays_below_half_a_radian():
-    # 0.4176 is what others found with the same equations and control. Starts changed by 1e-15 rad give 0.415 to 0.423
+    # 0.4176: another program of the same equations and step control. Starts changed by 1e-15 rad give 0.415 to 0.423
     # over 8 s; over 10 s chaos leaves no digit of it.
     angle, _ = rotor(run(replace(FIG08, duration=8.0)))
     assert np.abs(angle).max() == pytest.approx(0.4176, abs=0.01)

@@ -19,7 +19,7 @@ from rotor_mbs.runner.progress import Progress
 from rotor_mbs.scenario.load import scene_hash
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.merge import merge
+from rotor_mbs.store.merge import merge, refuse_other_kinds
 from rotor_mbs.store.read import open_results
 from rotor_mbs.trajectory.outcome import is_held
 
@@ -68,6 +68,7 @@ def execute(batch: Batch) -> Report:
     Every finished run is a file of its own in `<output>.parts` until the merge, so that an interrupted batch goes on
     where it stopped; the merged file replaces the old one in one step.
     """
+    refuse_other_kinds(batch.output)
     parts = batch.output.with_name(batch.output.name + ".parts")
     _make_folder(parts)
     there = _hashes(batch.output) if batch.output.exists() else {}
@@ -123,8 +124,8 @@ def default_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list
 def _settle(finished: Finished[Task, Summary]) -> Summary:
     if finished.value is not None:
         return finished.value
-    if finished.failure == "error" and finished.message.startswith(StoreError.__name__):
-        raise StoreError(finished.message.partition(": ")[2])
+    if isinstance(finished.error, StoreError):
+        raise finished.error
     status = "timed_out" if finished.failure == "timed_out" else "solver_failed"
     return record_failure(finished.task, status, finished.message)
 

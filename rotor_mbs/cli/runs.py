@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,7 @@ from rotor_mbs.runner.environment import numerics_fingerprint
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.errata import errata_fingerprint, write_errata
+from rotor_mbs.store.merge import refuse_other_kinds
 from rotor_mbs.store.read import open_results
 
 
@@ -78,12 +80,27 @@ def freeze(arguments: argparse.Namespace) -> int:
     from rotor_mbs.store.freeze import freeze as thin
 
     scenes = find_scenes(arguments.scenes)
+    _refuse_other_contents(arguments.output, {scene.name for scene in scenes})
     nothing: dict[str, Sequence[str]] = {scene.name: () for scene in scenes}
     full = arguments.output.with_name(arguments.output.name + ".full.h5")
     report = execute(Batch(scenes, nothing, full, arguments.jobs, arguments.timeout, use_frozen=False))
     thin(full, arguments.output, datetime.now(UTC).date().isoformat())
     full.unlink()
     return _tell(report, arguments.output)
+
+
+def _refuse_other_contents(path: Path, wanted: AbstractSet[str]) -> None:
+    """A file of references is replaced as a whole: what this call does not make anew would be gone."""
+    refuse_other_kinds(path)
+    if not path.exists():
+        return
+    with open_results(path) as results:
+        kept = [scene.name for scene in results.scenes.values() if scene.runs or scene.name not in wanted]
+    if kept:
+        raise InputError(
+            f"{path}: holds {', '.join(kept)}, which would be dropped; allowed: another output file, or a file of "
+            "references of these scenes alone"
+        )
 
 
 def _chosen(scenes: Sequence[Scene]) -> tuple[dict[str, Sequence[str]], list[str]]:

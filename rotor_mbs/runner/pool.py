@@ -23,12 +23,14 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True, slots=True)
 class Finished(Generic[T, R]):
-    """A task's end. Either `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`."""
+    """A task's end. Either `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`;
+    error: what the task itself raised."""
 
     task: T
     value: R | None = None
     failure: str = ""
     message: str = ""
+    error: Exception | None = None
 
 
 def run_tasks(work: Callable[[T], R], tasks: Sequence[T], workers: int, timeout_s: float) -> Iterator[Finished[T, R]]:
@@ -60,4 +62,4 @@ def _finished(task: T, future: Future[R], timeout_s: float) -> Finished[T, R]:
         return Finished(task, failure="worker_died", message=f"its process died (exit code {exc.exitcode})")
     except Exception as exc:
         text = str(exc).strip().splitlines()
-        return Finished(task, failure="error", message=f"{type(exc).__name__}: {text[0] if text else 'no message'}")
+        return Finished(task, None, "error", f"{type(exc).__name__}: {text[0] if text else 'no message'}", exc)

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from rotor_mbs.errors import StoreError
 from rotor_mbs.store import hdf5, layout
 from rotor_mbs.store.bench import GROUP, leaves
 from rotor_mbs.store.read import open_results
@@ -18,8 +19,10 @@ def merge(path: Path, sources: Sequence[Path], versions: Mapping[str, str]) -> N
     A later run takes the place of an earlier one of the same scene and method. Runs of a scene whose numbers have
     changed since (another scene_hash than in the last source that has it) belong to another machine and are left
     out. The same holds for the curves of a bench; other groups that are not scenes come from the last source that has
-    them. Raises StoreError.
+    them. Raises StoreError, also where a source is not a batch's.
     """
+    for source in sources:
+        refuse_other_kinds(source)
     runs, others = _plan(sources)
     with hdf5.new_file(path) as file:
         hdf5.put_attributes(file, {**versions, "created": datetime.now(UTC).isoformat(timespec="seconds")})
@@ -34,6 +37,16 @@ def merge(path: Path, sources: Sequence[Path], versions: Mapping[str, str]) -> N
             with open_results(source) as results:
                 for name in names:
                     hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
+
+
+def refuse_other_kinds(path: Path) -> None:
+    """Raises StoreError where `path` holds what a merge would not carry over: a sweep's dataset, which has its arrays
+    at the root, where a batch has groups alone."""
+    if not path.exists():
+        return
+    with open_results(path) as results:
+        if not all(hdf5.is_group(member) for member in results.root.values()):
+            raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
 
 
 def _plan(sources: Iterable[Path]) -> tuple[dict[str, dict[str, Path]], dict[str, Path]]:

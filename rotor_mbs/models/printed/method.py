@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from types import MappingProxyType
 
 import numpy as np
@@ -87,9 +88,7 @@ class PrintedMethod:
 
     def items(self, scene: Scene) -> list[Item]:
         rotor = self._rotor(scene)
-        sources = ("(33), rotor row", "(33), pitch row")
-        if len(scene.blades) > 1:
-            sources = ("(42)-(45), (52), (56)", "(46)-(51), (53)-(56)")
+        sources = self._sources(len(scene.blades))
         built = [Item("equation", "rotor", sources[0])]
         for i in range(1, 1 + len(scene.blades)):
             if rotor.pitches_move:
@@ -101,6 +100,15 @@ class PrintedMethod:
         if scene.has_torque:
             built.append(Item("term", "rotor torque"))
         return built + [Item("output", name) for name in scene.outputs]
+
+    def _sources(self, blades: int) -> tuple[str, str]:
+        """Where in the paper the rotor's row and a pitch's stand, in the form that is run."""
+        if self._errata:
+            left = " ".join(name.upper() for name, is_left in asdict(self._errata).items() if is_left)
+            return (f"(24)-(38) derived anew, {left} left in",) * 2
+        if blades == 1:
+            return "(33), rotor row", "(33), pitch row"
+        return "(42)-(45), (52); of (56) the sum it stands for, (32)", "(46)-(51), (53)-(56)"
 
     def build(self, scene: Scene, settings: Mapping[str, object]) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""

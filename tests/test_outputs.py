@@ -1,0 +1,102 @@
+"""Where commands write: what stands there is not lost, links and devices stay what they are, folders are refused."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from rotor_mbs.cli import main
+from rotor_mbs.store.hdf5 import replace_file
+from rotor_mbs.store.read import open_results
+
+SWEEP = """
+title = "two starts"
+scene = "paper/fig03"
+methods = ["lagrange/dop853"]
+samples = 3
+change = { duration = 0.1 }
+[[axis]]
+key = "initial.angles[0]"
+values = [0.1, 0.2]
+"""
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a sweep."""
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "two.toml").write_text(SWEEP)
+    assert main(["sweep", str(folder / "two.toml"), "-o", str(folder / "two.h5"), "-j", "1"]) == 0
+    return folder / "two.h5"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a batch."""
+    path = tmp_path_factory.mktemp("batch") / "r.h5"
+    assert main(["run", "paper/fig03", "-m", "lagrange/dop853", "-o", str(path), "-j", "1"]) == 0
+    return path
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run", "paper/fig03", "-m", "lagrange/dop853"],
+        ["bench", "paper/fig03", "-m", "lagrange/dop853", "--budget", "1"],
+        ["stability", "extreme/zero-gravity"],
+        ["reference", "paper/fig03"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_a_sweeps_dataset_is_no_output_of_a_batch(
+    command: list[str], dataset: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = dataset.read_bytes()
+    assert main([*command, "-o", str(dataset)]) == 2
+    assert capsys.readouterr().err.strip() == f"{dataset}: holds the dataset of a sweep; allowed: another output file"
+    assert dataset.read_bytes() == before
+    assert [path.name for path in dataset.parent.iterdir() if path.suffix != ".toml"] == [dataset.name]
+
+
+def test_references_do_not_take_the_place_of_runs(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = results.read_bytes()
+    for scene in ("paper/fig03", "paper/fig04b"):
+        assert main(["reference", scene, "-o", str(results)]) == 2
+        assert "which would be dropped" in capsys.readouterr().err
+    assert results.read_bytes() == before
+
+
+def test_a_link_stays_a_link_to_what_is_written(results: Path, tmp_path: Path) -> None:
+    target, link = tmp_path / "far" / "r.h5", tmp_path / "r.h5"
+    target.parent.mkdir()
+    target.write_bytes(results.read_bytes())
+    link.symlink_to(target)
+    assert main(["run", "paper/fig04b", "-m", "lagrange/dop853", "-o", str(link), "-j", "1"]) == 0
+    assert link.is_symlink()
+    with open_results(target) as found:
+        assert sorted(found.scenes) == ["paper/fig03", "paper/fig04b"]
+
+
+def test_a_pipe_is_written_to(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    far_end = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        replace_file(pipe, b"verdicts")
+        assert os.read(far_end, 100) == b"verdicts"
+    finally:
+        os.close(far_end)
+    assert pipe.is_fifo()
+
+
+@pytest.mark.parametrize("place", [".", "..", ""])
+@pytest.mark.parametrize("command", [["run", "paper/fig03", "-o"], ["sweep", "x.toml", "-o"], ["check", "--junit"]])
+def test_a_folder_is_no_output(command: list[str], place: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([*command, place])
+    assert caught.value.code == 2
+    told = capsys.readouterr().err.strip()
+    assert "allowed: a file's name, not a folder" in told
+    assert "\n" not in told
