@@ -22,7 +22,16 @@ from rotor_mbs.analysis.work_precision import (
 )
 from rotor_mbs.report.bench_build import write_bench_report
 from rotor_mbs.report.bench_figures import diagram
-from rotor_mbs.report.bench_tables import csv_text, failure_table, reach_table, summary
+from rotor_mbs.report.bench_tables import (
+    csv_text,
+    failure_table,
+    omissions,
+    overview,
+    overview_table,
+    reach_table,
+    summary,
+)
+from rotor_mbs.report.names import LOOKS
 from rotor_mbs.store.bench import STATUSES, Curve, read_curves, write_curves
 from rotor_mbs.store.merge import merge
 
@@ -136,6 +145,12 @@ def test_failures_are_points_and_none_is_dropped() -> None:
     assert [row[4] for row in told] == ["", "", "yes"]
 
 
+def test_the_diagram_draws_each_method_as_every_other_figure_does() -> None:
+    drawn = [line for line in diagram([FAST, SLOW]).axes[0].lines if line.get_marker() not in ("x", "None")]
+    found = [(line.get_color(), line.get_linestyle(), line.get_marker()) for line in drawn]
+    assert found == [tuple(LOOKS["lagrange/taylor"]), tuple(LOOKS["exudyn_tree/rk67"])]
+
+
 def test_the_diagram_draws_what_was_measured() -> None:
     axes = diagram([FAST, SLOW]).axes[0]
     drawn = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
@@ -149,10 +164,44 @@ def test_the_diagram_draws_what_was_measured() -> None:
 
 def test_words_and_tables_come_from_the_numbers() -> None:
     words = [sentence.replace("\N{NO-BREAK SPACE}", " ") for sentence in summary("paper/fig09", [FAST, SLOW])]
-    assert words[2] == "paper/fig09, 1×10⁻⁹ rad: closed form, Taylor 3.4 ms."
+    assert words[2] == "paper/fig09, 10⁻⁹ rad: closed form, Taylor 3.4 ms."
+    assert words[3].startswith("The budget left out 1 of 8 settings")
     assert "Exudyn tree, RK67 32 ms (27 times)" in words[0]
     cells = [cell.text.replace("\N{NO-BREAK SPACE}", " ") for cell in reach_table([FAST, SLOW]).rows[1]]
-    assert cells == ["Exudyn tree, RK67", "31.6 ms", "–", "–"]
+    assert cells == ["Exudyn tree, RK67", "31.6 ms", "not measured", "not measured"]
+
+
+def test_what_a_method_cannot_reach_is_not_what_it_was_not_asked_to() -> None:
+    """Two ladders that end at 1e-4 rad: one at its end, one where the budget cut it."""
+    whole = curve("exudyn_tree/rk44", [1e-2, 1e-4], [1e-2, 1e-1])
+    cut = curve("exudyn_tree/rk67", [1e-2, 1e-4, np.nan, np.nan], [1e-2, 1e-1, np.nan, np.nan],
+                ["ok", "ok", "left_out", "left_out"])  # fmt: skip
+    table = reach_table([FAST, whole, cut])
+    for row, text, note in ((1, "–", "1.0×10⁻⁴ rad at best"), (2, "not measured", "2 finer settings left out")):
+        for cell in table.rows[row][2:]:
+            assert (cell.text, cell.note.replace("\N{NO-BREAK SPACE}", " ")) == (text, note)
+    assert omissions([FAST, whole]) == []
+    assert omissions([FAST, whole, cut])[0].startswith("The budget left out 2 of 9 settings")
+
+
+def test_the_overview_names_the_fastest_and_the_next_and_says_so_in_words() -> None:
+    """At 1e-6 rad the closed form needs 2 ms on one scene and 20 ms on the other, the tree 10 ms and 10 ms."""
+    tree = curve("exudyn_tree/rk67", [1e-2, 1e-6], [1e-3, 1e-2])
+    slow = curve("lagrange/taylor", [1e-2, 1e-6, 1e-10], [1e-2, 2e-2, 4e-2])
+    scenes = {"a": [FAST, tree], "b": [slow, tree]}
+    rows = overview_table(scenes, {"a": "a.html", "b": "b.html"}).rows
+    seen = [[(cell.text.replace("\N{NO-BREAK SPACE}", " "), cell.note) for cell in row] for row in rows]
+    assert [row[0].href for row in rows] == ["a.html", "b.html"]
+    assert seen[0][2] == ("closed form, Taylor: 2.0 ms", "then Exudyn tree, RK67, 5.0 times as long")
+    assert seen[1][2] == ("Exudyn tree, RK67: 10 ms", "then closed form, Taylor, 2.0 times as long")
+    assert seen[0][3][1] == "no other gets there"
+    words = [sentence.replace("\N{NO-BREAK SPACE}", " ") for sentence in overview(scenes)]
+    assert len(words) == 3
+    assert words[1] == (
+        "To 10⁻⁶ rad the fastest is closed form, Taylor in 1 of 2 scenes (2.0 ms) and Exudyn tree, RK67 in 1 of 2 "
+        "scenes (10 ms); the best of Exudyn's tree takes 5.0 times as long (1 of 2); the best of the closed form takes "
+        "2.0 times as long (1 of 2)."
+    )
 
 
 def test_csv_has_every_point_unrounded() -> None:
@@ -197,4 +246,6 @@ def test_pages_and_csv_are_written(tmp_path: Path) -> None:
     assert "ended after 10 s" in page
     assert "horizon at 6.00" in page
     assert page.count("<svg viewBox") >= 2
-    assert 'href="paper-fig09.html"' in index.read_text()
+    first = index.read_text()
+    assert first.count('href="paper-fig09.html"') == 2  # in the table, and under the small picture
+    assert first.index('id="fastest"') < first.index('id="scenes"')

@@ -84,7 +84,9 @@ def test_a_spanish_report_speaks_spanish_in_every_page(results: Path, tmp_path: 
     assert "Tres palas giradas, rotor a 30 grados" in pages["index.html"]
     assert "El rotor en movimiento" in pages["paper-fig11.html"]
     assert "Igual: " in pages["figures.html"]
-    captions = re.findall(r"<(?:figcaption|caption)>([^<]*)", "".join(pages.values()))
+    assert "de su transformación (3) respecto de los ángulos" in pages["errata.html"]
+    assert "U32, fila 2, columna 4" in pages["errata.html"]
+    captions = re.findall(r"<(?:figcaption|caption><span)>([^<]*)", "".join(pages.values()))
     assert captions
     for english in ("printed", "Reference", "model", "Exudyn tree", "Largest", "error of"):
         assert not [caption for caption in captions if english in caption and "modelo" not in caption], english

@@ -9,7 +9,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 with (ROOT / "reference" / "published.toml").open("rb") as file:
-    PUBLISHED = tomllib.load(file)["published"]
+    FILE = tomllib.load(file)
+PUBLISHED, CONDITIONS = FILE["published"], FILE["conditions"]
 
 STATISTICS = {"min", "max", "max_abs", "range", "max_abs_change", "net_change", "reversals", "growth", "swing_ratio"}
 
@@ -37,7 +38,9 @@ def test_ids_are_unique():
 @pytest.mark.parametrize("entry", PUBLISHED, ids=lambda entry: entry["id"])
 def test_vocabulary(entry):
     expected = {"number": {"of", "value", "decimals"}, "claim": {"statement", "tests"}}[entry["kind"]]
-    assert entry.keys() == {"id", "figure", "kind", "quote"} | expected
+    assert entry.keys() - {"matched"} == {"id", "figure", "kind", "quote"} | expected
+    # What is matched is told to be so in the conditions, by its figure.
+    assert not entry.get("matched") or "both were chosen to match" in CONDITIONS[f"fig{int(entry['figure']):02d}"]
     for scene, quantity, coordinate, statistic in measures(entry):
         assert (ROOT / "scenarios" / f"{scene}.toml").is_file()
         assert quantity in ("angle", "rate")

@@ -14,7 +14,7 @@ from scenes import paper
 from stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.viewer import FRAMES, packed, script_json, viewer
+from rotor_mbs.report.viewer import FRAMES, magnification, packed, script_json, viewer
 from rotor_mbs.store.read import open_results
 
 TEMPLATES = Path(write_report.__code__.co_filename).parent / "templates"
@@ -71,6 +71,23 @@ def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path
     assert made is not None
     data = json.loads(str(made.data))
     assert (FRAMES - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("offset", "factor"), [(0.11, 10), (0.5, 2), (2.0, 1), (0.0, None)])
+def test_an_offset_is_drawn_as_a_tenth_of_the_blade_and_never_smaller(offset: float, factor: int | None) -> None:
+    scene = replace(FIG11, blades=tuple(replace(blade, tip=(offset, 0.0, 11.0)) for blade in FIG11.blades))
+    assert magnification(scene) == factor
+
+
+@pytest.mark.parametrize(("offset", "shown"), [(0.1, True), (5.0, False)])
+def test_only_an_offset_that_is_too_small_to_be_seen_is_told_to_be(tmp_path: Path, offset: float, shown: bool) -> None:
+    assert FIG11.text.count("tip = ") == 1
+    text = re.sub(r"tip = .*", f"tip = [{offset}, 0, 11]", FIG11.text)
+    path = store(tmp_path / "r.h5", [Made(replace(FIG11, text=text), "reference", TURNING)])
+    page = write_report(path, tmp_path / "out").parent / "paper-fig11.html"
+    written = page.read_text(encoding="utf-8")
+    assert 'data-part="offset"' in written
+    assert ("so near the pitch axis that pitch could not be seen" in written) == shown
 
 
 def test_no_viewer_where_the_bodies_are_not_known(tmp_path: Path) -> None:

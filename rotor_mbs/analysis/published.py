@@ -34,7 +34,11 @@ class Condition:
 
 @dataclass(frozen=True)
 class Published:
-    """A number or claim of the paper. A number has of, value, decimals; a claim has statement, tests."""
+    """A number or claim of the paper. A number has of, value, decimals; a claim has statement, tests.
+
+    matched: of a number that is grown rounding error: the run's length and the order of adding the weights were chosen
+    so that it comes out.
+    """
 
     id: str
     figure: str
@@ -44,6 +48,7 @@ class Published:
     of: Asked | None = None
     value: float = 0.0
     decimals: int = 0
+    matched: bool = False
     tests: tuple[Condition, ...] = ()
 
     @property
@@ -102,9 +107,8 @@ def _erratum(item: Mapping[str, Any]) -> Erratum:
 
 
 def _published(item: Mapping[str, Any]) -> Published:
-    plain = {
-        key: item[key] for key in ("id", "figure", "kind", "quote", "statement", "value", "decimals") if key in item
-    }
+    names = ("id", "figure", "kind", "quote", "statement", "value", "decimals", "matched")
+    plain = {key: item[key] for key in names if key in item}
     of = Asked(*item["of"]) if "of" in item else None
     return Published(**plain, of=of, tests=tuple(_test(test) for test in item.get("tests", ())))
 

@@ -5,12 +5,14 @@ Knows no words: the sentences are the report's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.order import natural
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.load import parse_scene
 from rotor_mbs.store.read import StoredScene
 
 # Share of a scene's energy scale. ode45's own drift at the paper's tolerances is below a thousandth of that (seen on
@@ -24,6 +26,21 @@ class Tally:
 
     count: int
     of: int
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """Published numbers of one figure that the printed model gives, and on what condition.
+
+    gravity   m/s², None where the file does not tell; duration: s
+    matched   whether they are grown rounding error, with the run's length and the order of adding chosen to match
+    """
+
+    figure: str
+    count: int
+    gravity: float | None
+    duration: float
+    matched: bool
 
 
 @dataclass(frozen=True)
@@ -57,6 +74,7 @@ class Finding:
     scenes: int
     numbers: Tally | None
     numbers_right: Tally | None
+    reproduced: tuple[Reproduced, ...]
     claims_printed: Tally | None
     claims_right: Tally | None
     energy: PrintedEnergy | None
@@ -72,6 +90,7 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
         len(scenes),
         _tally(claim.printed.holds for claim in numbers),
         _tally(claim.right.holds for claim in numbers),
+        _reproduced(scenes, [claim for claim in numbers if claim.printed.holds]),
         _tally(claim.printed.holds for claim in others),
         _tally(claim.right.holds for claim in others),
         _printed_energy(scenes),
@@ -82,6 +101,32 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
 def _tally(verdicts: Iterable[bool | None]) -> Tally | None:
     decided = [verdict for verdict in verdicts if verdict is not None]
     return Tally(sum(decided), len(decided)) if decided else None
+
+
+def _reproduced(scenes: Mapping[str, StoredScene], numbers: Iterable[Claim]) -> tuple[Reproduced, ...]:
+    """By figure, in order."""
+    by_figure: dict[str, list[Claim]] = {}
+    for claim in numbers:
+        by_figure.setdefault(claim.published.figure, []).append(claim)
+    return tuple(_on_condition(figure, found, scenes) for figure, found in by_figure.items())
+
+
+def _on_condition(figure: str, numbers: Sequence[Claim], scenes: Mapping[str, StoredScene]) -> Reproduced:
+    of = numbers[0].published.of
+    assert of is not None  # every number has it
+    stored = scenes[of.scene]
+    run = methods.printed_run(stored)
+    assert run is not None  # it has given the number
+    matched = any(claim.published.matched for claim in numbers)
+    return Reproduced(figure, len(numbers), _gravity(stored), float(run.array("time")[-1]), matched)
+
+
+def _gravity(stored: StoredScene) -> float | None:
+    """m/s², from the scene's stored text."""
+    try:
+        return parse_scene(str(stored.attributes.get("scene_toml", "")), stored.name).gravity
+    except InputError:
+        return None
 
 
 def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:

@@ -49,6 +49,11 @@ def failed(curve: Curve) -> NDArray[np.bool_]:
     return failures
 
 
+def left_out(curve: Curve) -> int:
+    """How many rungs of its ladder, the finest ones, the budget left out: what it does not reach they might."""
+    return curve.statuses.count("left_out")
+
+
 def points(curve: Curve, *, with_setup: bool = False) -> tuple[Array, Array]:
     """(errors in rad, times in s) of the points on the curve; with_setup: what one run costs, building included."""
     chosen = succeeded(curve)
@@ -89,6 +94,13 @@ def reaches(curves: Sequence[Curve], *, with_setup: bool = False) -> dict[str, d
         for name, time in times.items():
             found[name][target] = None if time is None else Reach(time, time / fastest)
     return found
+
+
+def fastest(curves: Sequence[Curve], target: float) -> list[tuple[Curve, Reach]]:
+    """Those that reach the target, the fastest first."""
+    found = reaches(curves)
+    able = [(curve, reach) for curve in curves if (reach := found[curve.name][target]) is not None]
+    return sorted(able, key=lambda pair: pair[1].seconds)
 
 
 def fitted_order(steps: Array, errors: Array) -> float | None:

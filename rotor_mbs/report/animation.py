@@ -20,7 +20,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.canvas import font_file
 from rotor_mbs.report.frames import Wires, wires
 from rotor_mbs.report.names import GREY, coordinate_look, name_of
-from rotor_mbs.report.viewer import has_offset, scene_of
+from rotor_mbs.report.viewer import magnification, scene_of
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
 Array = NDArray[Any]
@@ -32,8 +32,10 @@ _PATH_POINTS = 4  # along a path, from one frame to the next
 _INK, _FAINT = "#1b1f24", "#d5dae0"
 
 
-def write_animation(results: Path, name: str, output: Path, magnified: float) -> Path:
+def write_animation(results: Path, name: str, output: Path, magnified: float | None = None) -> Path:
     """`magnified`: how many times the tip's distance from the pitch axis is drawn; it is told in the picture.
+
+    None: as many times as it takes to see it.
 
     Raises InputError for a scene that the file does not have or a suffix that cannot be made here, StoreError.
     """
@@ -59,7 +61,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float) ->
     return output
 
 
-def frames(stored: StoredScene, magnified: float) -> tuple[Iterator[Image.Image], float]:
+def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image.Image], float]:
     """The pictures and the seconds each is shown. Raises InputError where nothing can be drawn."""
     scene = scene_of(stored)
     runs = {
@@ -72,7 +74,8 @@ def frames(stored: StoredScene, magnified: float) -> tuple[Iterator[Image.Image]
     end = max(float(run.array("time")[-1]) for run in runs.values())
     count = max(2, min(round(end * RATE) + 1, _LONGEST))
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
-    factor = magnified if has_offset(scene) else 1.0
+    needed = magnification(scene)
+    factor = 1.0 if needed is None else float(magnified or needed)
     drawn = {name: wires(scene, run.array("time"), _finite(run), at, factor) for name, run in runs.items()}
     return (_picture(drawn, i, float(at[i]), factor) for i in range(0, len(at), _PATH_POINTS)), 1.0 / RATE
 

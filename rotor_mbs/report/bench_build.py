@@ -13,10 +13,10 @@ from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import bench_tables as tables
 from rotor_mbs.report import bench_texts as texts
-from rotor_mbs.report.bench_figures import FRONT_COLOUR, diagram, has_visible_floor, look
+from rotor_mbs.report.bench_figures import FRONT_COLOUR, diagram, has_visible_floor
 from rotor_mbs.report.canvas import Panels, svg_text
 from rotor_mbs.report.files import INDEX, page_names, write_pages
-from rotor_mbs.report.names import GREY, Look
+from rotor_mbs.report.names import GREY, Look, look_of
 from rotor_mbs.report.pages import render
 from rotor_mbs.report.parts import Picture, Sample, Section, mark_sample, run_sample
 from rotor_mbs.report.vector import embedded
@@ -62,19 +62,17 @@ def write_bench_report(results: Path, output: Path) -> Path:
 
 def _scene(name: str, curves: Sequence[Curve], csv: str) -> BenchPage:
     facts = curves[0].attributes
+    pictures = [
+        _picture(diagram(curves), "run", name, texts.RUN_CAPTION),
+        _picture(diagram(curves, with_setup=True), "setup", name, texts.SETUP_CAPTION),
+    ]
     sections = [
-        Section(
-            "diagram", texts.RUN_HEADING, [_picture(diagram(curves), "run", name, texts.RUN_CAPTION)], _legend(curves)
-        ),
+        Section("diagram", texts.DIAGRAM_HEADING, pictures, _legend(curves)),
         Section("reach", texts.REACH_HEADING, tables=[tables.reach_table(curves)], notes=[texts.REACH_NOTE]),
-        Section(
-            "setup", texts.SETUP_HEADING,
-            [_picture(diagram(curves, with_setup=True), "setup", name, texts.SETUP_CAPTION)], _legend(curves),
-        ),
         Section("order", texts.ORDER_HEADING, tables=[tables.order_table(curves)]),
         Section("failures", texts.FAILURES_HEADING, tables=[tables.failure_table(curves)]),
         Section("points", texts.POINTS_HEADING, tables=[tables.point_table(curves)]),
-    ]  # fmt: skip
+    ]
     notes = [
         texts.horizon(facts["horizon_s"], facts["duration_s"], facts["uncertainty_rad"]),
         texts.sampling(facts["samples"], facts["budget_s"], facts["load_before"], facts["pinned_core"]),
@@ -96,13 +94,16 @@ def _index(
     ]
     every = [curve for curves in scenes.values() for curve in curves]
     one_of_each = list({curve.name: curve for curve in every}.values())
-    sections = [Section("scenes", texts.SCENES_HEADING, pictures, _legend(one_of_each))] if pictures else []
+    sections = []
+    if scenes:
+        overview = tables.overview_table(scenes, files)
+        sections.append(Section("fastest", texts.OVERVIEW_HEADING, tables=[overview], notes=[texts.REACH_NOTE]))
+        sections.append(Section("scenes", texts.SCENES_HEADING, pictures, _legend(one_of_each)))
     sections += [
         Section(name.replace("/", "-"), texts.growth_heading(name), tables=[tables.growth_table(measured)])
         for name, measured in growth.items()
     ]
-    lead = [sentence for name, curves in scenes.items() for sentence in tables.summary(name, curves)]
-    return BenchPage(texts.TITLE, texts.LEAD, lead, sections, "bench.csv", machine=machine)
+    return BenchPage(texts.TITLE, texts.LEAD, tables.overview(scenes), sections, "bench.csv", machine=machine)
 
 
 def _picture(panels: Panels, kind: str, scene: str, caption: str, href: str = "") -> Picture:
@@ -113,7 +114,7 @@ def _picture(panels: Panels, kind: str, scene: str, caption: str, href: str = ""
 
 def _legend(curves: Sequence[Curve]) -> list[Sample]:
     return [
-        *(run_sample(tables.name(curve), look(curve)) for curve in curves),
+        *(run_sample(tables.name(curve), look_of(curve.name)) for curve in curves),
         Sample(texts.FRONT, FRONT_COLOUR, width=6.0),
         mark_sample(texts.FAILED, Look(GREY, "-", "x")),
         *([Sample(texts.FLOOR, GREY, width=8.0)] if has_visible_floor(curves) else []),

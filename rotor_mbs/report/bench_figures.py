@@ -15,40 +15,17 @@ from rotor_mbs.analysis.work_precision import failed, pareto, points, succeeded
 from rotor_mbs.report import bench_texts as texts
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import Panels
-from rotor_mbs.report.names import GREY, Look
+from rotor_mbs.report.names import GREY, Look, look_of
 from rotor_mbs.report.numbers import power
 from rotor_mbs.store.bench import Curve
 
 FRONT_COLOUR = "#c8c8c8"
 _LOWEST_ERROR, _RAIL_START, _RAIL, _RAIL_END = 1e-16, 3.0, 20.0, 120.0
 
-# Colour and mark tell the method; the line tells its choices.
-_LOOKS = {
-    "lagrange/taylor": ("#0072b2", "o"),
-    "lagrange/dop853": ("#0072b2", "D"),
-    "lagrange/ode45": ("#56b4e9", "v"),
-    "lagrange/radau": ("#56b4e9", "*"),
-    "exudyn_tree/rk67": ("#d55e00", "s"),
-    "exudyn_tree/rk44": ("#e69f00", "P"),
-    "exudyn_tree/dopri5": ("#d55e00", "v"),
-    "exudyn_tree/generalized_alpha": ("#e69f00", "^"),
-    "exudyn_chain/generalized_alpha": ("#009e73", "^"),
-    "exudyn_chain/newmark_index2": ("#cc79a7", "D"),
-}
-_LINES = ("-", "--", "-.", ":")
-
 
 class _Drawn(NamedTuple):
     errors: Any
     seconds: Any
-
-
-def look(curve: Curve) -> Look:
-    method = str(curve.attributes["method"])
-    colour, marker = _LOOKS.get(method, (GREY, "o"))
-    choices = curve.name.removeprefix(method)
-    line = ("rho0.7" in choices) + 2 * ("rho1.0" in choices)
-    return Look(colour, _LINES[3 if "rotation" in choices else line], marker)
 
 
 def diagram(curves: Sequence[Curve], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
@@ -58,7 +35,7 @@ def diagram(curves: Sequence[Curve], *, with_setup: bool = False, height: float 
     drawn = [_Drawn(*points(curve, with_setup=with_setup)) for curve in curves]
     _front(axes, drawn)
     for curve, one in zip(curves, drawn, strict=True):
-        style = look(curve)
+        style = look_of(curve.name)
         axes.plot(
             np.maximum(one.errors, _LOWEST_ERROR), one.seconds, color=style.colour, linestyle=style.line,
             marker=style.marker, markersize=3.0 if small else 4.2, markerfacecolor="white", linewidth=1.0,

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import csv
 import io
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from rotor_mbs.analysis.work_precision import TARGETS_RAD, growth_exponent, reaches, succeeded
+from rotor_mbs.analysis.work_precision import (
+    TARGETS_RAD,
+    Reach,
+    fastest,
+    growth_exponent,
+    left_out,
+    reaches,
+    succeeded,
+)
 from rotor_mbs.report import bench_texts as texts
 from rotor_mbs.report import texts as report_texts
 from rotor_mbs.report.numbers import NOTHING, number, prefixed
@@ -42,16 +49,77 @@ def csv_text(curves: Sequence[Curve]) -> str:
 def reach_table(curves: Sequence[Curve]) -> Table:
     """A row per curve: time and ratio for each target."""
     found = reaches(curves)
-    head = [texts.METHOD, *(f"{number(target, 1)} rad" for target in TARGETS_RAD)]
+    head = [texts.METHOD, *(texts.target(target) for target in TARGETS_RAD)]
     rows = []
     for curve in curves:
         cells = [Cell(name(curve))]
         for target in TARGETS_RAD:
             reach = found[curve.name][target]
-            known = reach and Cell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
-            cells.append(known or Cell(NOTHING))
+            cells.append(_unreached(curve) if reach is None else _reached(reach))
         rows.append(cells)
     return Table(texts.REACH_CAPTION, head, rows, numeric=range(1, len(head)))
+
+
+def _reached(reach: Reach) -> Cell:
+    return Cell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
+
+
+def _unreached(curve: Curve) -> Cell:
+    """Whether the method cannot, or was not asked to."""
+    if left_out(curve):
+        return Cell(texts.NOT_MEASURED, note=texts.finer_left_out(left_out(curve)))
+    errors = curve.arrays["angle_error_max"][succeeded(curve)]
+    return Cell(NOTHING, note=texts.best_reached(float(errors.min()) if len(errors) else None))
+
+
+def overview_table(scenes: Mapping[str, Sequence[Curve]], files: Mapping[str, str]) -> Table:
+    """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
+    head = [texts.SCENE, *(texts.target(target) for target in TARGETS_RAD)]
+    rows = [
+        [Cell(scene, href=files[scene]), *(_fastest_cell(curves, target) for target in TARGETS_RAD)]
+        for scene, curves in scenes.items()
+    ]
+    return Table(texts.OVERVIEW_CAPTION, head, rows)
+
+
+def _fastest_cell(curves: Sequence[Curve], target: float) -> Cell:
+    found, is_cut = fastest(curves, target), any(map(left_out, curves))
+    if not found:
+        return Cell(texts.NOT_MEASURED if is_cut else NOTHING)
+    (first, reach), *others = found
+    if others:
+        next_one = texts.runner_up(name(others[0][0]), others[0][1].ratio)
+    else:
+        next_one = texts.OTHERS_NOT_MEASURED if is_cut else texts.ALONE
+    return Cell(f"{name(first)}: {prefixed(reach.seconds, 's', 2)}", note=next_one)
+
+
+def overview(scenes: Mapping[str, Sequence[Curve]]) -> list[str]:
+    """Plain words over all scenes: for each target who is fastest, and by how much the other models are slower."""
+    sentences = [_overview(list(scenes.values()), target) for target in TARGETS_RAD]
+    return [*filter(None, sentences), *omissions([curve for curves in scenes.values() for curve in curves])]
+
+
+def _overview(scenes: Sequence[Sequence[Curve]], target: float) -> str:
+    wins: dict[str, list[float]] = {}
+    ratios: dict[str, list[float]] = {}
+    for curves in scenes:
+        best: dict[str, float] = {}
+        for place, (curve, reach) in enumerate(fastest(curves, target)):
+            model = curve.name.partition("/")[0]
+            if not place:
+                wins.setdefault(name(curve), []).append(reach.seconds)
+            best.setdefault(model, reach.ratio)
+        for model, ratio in best.items():
+            if ratio > 1.0:
+                ratios.setdefault(model, []).append(ratio)
+    return texts.overview(target, len(scenes), wins, ratios) if wins else ""
+
+
+def omissions(curves: Sequence[Curve]) -> list[str]:
+    """How much the budget left out, and what that means for the tables; nothing where it left out nothing."""
+    count = sum(map(left_out, curves))
+    return [texts.omissions(count, sum(len(curve.statuses) for curve in curves))] if count else []
 
 
 def order_table(curves: Sequence[Curve]) -> Table:
@@ -127,22 +195,14 @@ def growth_table(curves: Sequence[Curve]) -> Table:
 
 
 def summary(scene: str, curves: Sequence[Curve]) -> list[str]:
-    """Plain words from the numbers: for each target, each model's best."""
-    found = reaches(curves)
+    """Plain words from the numbers: for each target, each model's best; what the budget left out."""
     sentences = []
     for target in TARGETS_RAD:
-        best: dict[str, tuple[float, str]] = {}
-        for curve in curves:
-            reach = found[curve.name][target]
-            model = curve.name.partition("/")[0]
-            if reach is not None and reach.seconds < best.get(model, (math.inf, ""))[0]:
-                best[model] = (reach.seconds, name(curve))
-        sentences.append(texts.summary(scene, target, {text: seconds for seconds, text in best.values()}))
-    return sentences
-
-
-def has_points(curves: Sequence[Curve]) -> bool:
-    return any(succeeded(curve).any() for curve in curves)
+        best: dict[str, tuple[str, float]] = {}
+        for curve, reach in fastest(curves, target):
+            best.setdefault(curve.name.partition("/")[0], (name(curve), reach.seconds))
+        sentences.append(texts.summary(scene, target, dict(best.values())))
+    return [*sentences, *omissions(curves)]
 
 
 def _setting(curve: Curve, i: int) -> str:

@@ -115,6 +115,7 @@ def _spoken_errata() -> tuple[published.Erratum, ...]:
     return tuple(
         replace(
             one,
+            entry=texts.erratum(one.id, "entry", one.entry),
             printed=texts.erratum(one.id, "printed", one.printed),
             right=texts.erratum(one.id, "right", one.right),
             reason=texts.erratum(one.id, "reason", one.reason),

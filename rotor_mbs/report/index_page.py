@@ -87,12 +87,7 @@ def _printed_cells(run: StoredRun | None) -> list[Cell]:
     if run is None:
         return [Cell(""), Cell(""), Cell("")]
     departs, gain = metrics.metric(run, "angle_error_whole"), metrics.metric(run, "energy_gain_J")
-    return [_ran(run), Cell(number(departs)), Cell(prefixed(gain, "J"))]
-
-
-def _ran(run: StoredRun) -> Cell:
-    """Not "ok": that the run reached its end says nothing of the printed equations."""
-    return Cell(texts.RAN_TO_THE_END) if run.status == "ok" else metrics.status_cell(run)
+    return [metrics.status_cell(run), Cell(number(departs)), Cell(prefixed(gain, "J"))]
 
 
 def _right_cells(run: StoredRun | None) -> list[Cell]:

@@ -14,10 +14,14 @@ from rotor_mbs.report.numbers import number, prefixed
 from rotor_mbs.report.parts import Cell, Table, without_empty_columns
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
+from rotor_mbs.trajectory.outcome import is_held
 
 
 def status_cell(run: StoredRun) -> Cell:
-    return Cell(texts.status(run.status), tone="good" if run.status == "ok" else "bad")
+    """Not "ok" for a model that is held to nothing: that its run reached the end says nothing of its equations."""
+    if run.status == "ok":
+        return Cell(texts.status("ok"), tone="good") if is_held(run.method) else Cell(texts.RAN_TO_THE_END)
+    return Cell(texts.status(run.status), tone="bad")
 
 
 def metric(run: StoredRun, name: str) -> float | None:
@@ -58,13 +62,11 @@ def _metrics_row(run: StoredRun) -> list[Cell]:
     ]  # fmt: skip
 
 
-def _count(value: float | None) -> str:
-    return "" if value is None else f"{value:.0f}"
-
-
 def metrics_notes(scene: StoredScene) -> list[str]:
     """What the numbers mean, and the reason of every run that is not ok."""
     notes = [texts.HORIZON_NOTE] if horizon(scene) is not None else []
+    if any(run.status == "ok" and not is_held(run.method) for run in scene.runs.values()):
+        notes.append(texts.NOT_HELD_NOTE)
     if any("zero_pitch_max" in run.attributes for run in scene.runs.values()):
         notes.append(texts.zero_pitch_note(escape_rate(scene)))
     return notes

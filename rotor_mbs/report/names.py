@@ -37,30 +37,44 @@ NAMES = {
     "reference": "reference, quad precision",
 }
 
-# The four methods of a reproduction; any others take what is left, in turn.
-_LOOKS = {
+# The one table of looks: every method, and every variant of a method that a bench draws (by the name of its curve).
+# Blues the closed form, reds and yellows Exudyn's tree, green and purple its chain; a spectral radius changes the line,
+# a kind of node the mark.
+LOOKS = {
+    "reference": Look(GREY, "-", "*"),
     "printed/ode45": Look("#000000", "-", "x"),
+    "printed_e1/ode45": Look("#000000", "--", "<"),
+    "printed_e2/ode45": Look("#000000", "-.", ">"),
+    "printed_e3/ode45": Look("#000000", ":", "p"),
     "lagrange/taylor": Look("#0072b2", "-", "o"),
+    "lagrange/dop853": Look("#0072b2", "--", "D"),
+    "lagrange/ode45": Look("#56b4e9", "-", "v"),
+    "lagrange/radau": Look("#56b4e9", "--", "*"),
     "exudyn_tree/rk67": Look("#d55e00", "--", "s"),
+    "exudyn_tree/dopri5": Look("#d55e00", "-", "<"),
+    "exudyn_tree/rk44": Look("#e69f00", "-.", "P"),
+    "exudyn_tree/generalized_alpha": Look("#e69f00", "-", "^"),
+    "exudyn_tree/generalized_alpha_rho0.7": Look("#e69f00", "--", "^"),
+    "exudyn_tree/generalized_alpha_rho1.0": Look("#e69f00", ":", "^"),
     "exudyn_chain/generalized_alpha": Look("#009e73", "-.", "^"),
+    "exudyn_chain/generalized_alpha_rho0.7": Look("#009e73", "--", "^"),
+    "exudyn_chain/generalized_alpha_rho1.0": Look("#009e73", ":", "^"),
+    "exudyn_chain/generalized_alpha_rotation_vector": Look("#009e73", "-.", ">"),
+    "exudyn_chain/generalized_alpha_rho0.7_rotation_vector": Look("#009e73", "--", ">"),
+    "exudyn_chain/generalized_alpha_rho1.0_rotation_vector": Look("#009e73", ":", ">"),
+    "exudyn_chain/newmark_index2": Look("#cc79a7", "-", "D"),
+    "exudyn_chain/newmark_index2_rotation_vector": Look("#cc79a7", ":", "p"),
 }
-_OTHERS = (
-    Look("#cc79a7", "-", "D"),
-    Look("#e69f00", "--", "v"),
-    Look("#56b4e9", "-.", "P"),
-    Look(GREY, "-", "*"),
-)
+_UNKNOWN = Look(GREY, ":", "D")
 
 
 def name_of(method: str) -> str:
     return texts.METHOD_NAMES.get(method, method)
 
 
-def looks(methods: list[str]) -> dict[str, Look]:
-    """A look for each, all different for up to eight."""
-    others = [method for method in methods if method not in _LOOKS]
-    rest = {method: _OTHERS[i % len(_OTHERS)] for i, method in enumerate(others)}
-    return {method: _LOOKS.get(method) or rest[method] for method in methods}
+def look_of(curve: str) -> Look:
+    """Of "model/integrator", or of a variant by the name of its curve; one in grey for what is none of ours."""
+    return LOOKS.get(curve, _UNKNOWN)
 
 
 def coordinate_look(index: int) -> tuple[str, str | tuple[float, tuple[float, ...]]]:

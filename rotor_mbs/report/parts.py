@@ -20,6 +20,9 @@ _MARKS = {
     "D": "M0-4l4 4l-4 4l-4-4z",
     "P": "M-1-3h2v2h2v2h-2v2h-2v-2h-2v-2h2z",
     "*": "M0-4l1 3h3l-2 2l1 3l-3-2l-3 2l1-3l-2-2h3z",
+    "<": "M-3.5 0l6.5-3.5v7z",
+    ">": "M3.5 0l-6.5-3.5v7z",
+    "p": "M0-4l3.8 2.8l-1.5 4.4h-4.6l-1.5-4.4z",
 }
 
 
@@ -83,7 +86,12 @@ class Section:
     @property
     def tables_beside(self) -> bool:
         """Whether the tables fill the free place beside the last picture."""
-        return len(self.pictures) % 2 == 1
+        return bool(self.tables) and len(self.pictures) % 2 == 1
+
+    @property
+    def is_single(self) -> bool:
+        """Whether a picture stands alone: the legend fills the free place beside it."""
+        return len(self.pictures) == 1 and not self.tables
 
     @property
     def has_content(self) -> bool:

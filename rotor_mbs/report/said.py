@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from rotor_mbs.analysis.claims import Claim, Outcome, Reading
 from rotor_mbs.report.language import texts
@@ -48,10 +49,16 @@ def _number_row(claim: Claim) -> list[Cell]:
         Cell(f"{what} ({unit})", note=f"«{item.quote}»", language="es"),
         Cell(fixed(item.value, item.decimals)),
         Cell(fixed(printed.value, item.decimals + 2)),
-        _verdict(printed.holds, texts.REPRODUCED, texts.NOT_REPRODUCED),
+        _reproduced(claim),
         Cell(fixed(right.value, item.decimals + 2)),
         _verdict(right.holds, texts.YES, texts.NO),
     ]
+
+
+def _reproduced(claim: Claim) -> Cell:
+    cell = _verdict(claim.printed.holds, texts.REPRODUCED, texts.NOT_REPRODUCED)
+    is_matched = claim.published.matched and claim.printed.holds
+    return replace(cell, note=f"{texts.GROWN_ROUNDING}; {texts.MATCHED}") if is_matched else cell
 
 
 def _claim_row(claim: Claim) -> list[Cell]:

@@ -17,7 +17,7 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.report import canvas, figures, metrics, said, vector
 from rotor_mbs.report.language import texts
-from rotor_mbs.report.names import GREY, Look, coordinate_look, looks, name_of
+from rotor_mbs.report.names import GREY, Look, coordinate_look, look_of, name_of
 from rotor_mbs.report.parts import Picture, Sample, Section, line_sample, mark_sample, run_sample
 from rotor_mbs.report.viewer import viewer
 from rotor_mbs.store.layout import REFERENCE
@@ -30,7 +30,7 @@ _ROUNDING = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Drawn:
-    """The runs of a scene that are drawn, with their looks.
+    """The runs of a scene that are drawn.
 
     printed, right   the printed model and what stands for the right one
     others           runs of the right models other than `right`
@@ -40,16 +40,14 @@ class Drawn:
     printed: StoredRun | None
     right: StoredRun | None
     others: dict[str, StoredRun]
-    looks: dict[str, Look]
     horizon: float | None
 
     @classmethod
     def of(cls, scene: StoredScene) -> Drawn:
         printed, right = methods.printed_run(scene), methods.right_run(scene)
         good = {n: run for n, run in methods.right_runs(scene).items() if methods.has_samples(run)}
-        names = [methods.PRINTED, *good]
         others = {name: run for name, run in good.items() if right is None or name != right.method}
-        return cls(scene, printed, right, others, looks(names), metrics.horizon(scene))
+        return cls(scene, printed, right, others, metrics.horizon(scene))
 
     @property
     def sides(self) -> list[StoredRun]:
@@ -105,7 +103,7 @@ def motion(drawn: Drawn) -> Section:
         pictures.append(_motion_picture(drawn, run, marked))
     labels = runs[0].labels
     legend = [line_sample(texts.coordinate(label), *coordinate_look(i)) for i, label in enumerate(labels)]
-    legend += [mark_sample(name_of(name), drawn.looks[name]) for name in marked]
+    legend += [mark_sample(name_of(name), look_of(name)) for name in marked]
     pictures += _rotor_picture(drawn)
     table = metrics.range_table({_heading(drawn, run): run for run in runs})
     return Section("motion", texts.MOTION, pictures, [*legend, *_horizon_sample(drawn)], [table])
@@ -116,7 +114,7 @@ def _heading(drawn: Drawn, run: StoredRun) -> str:
 
 
 def _motion_picture(drawn: Drawn, run: StoredRun, marked: dict[str, StoredRun]) -> Picture:
-    marks = [(_motion(other), drawn.looks[name]) for name, other in marked.items()]
+    marks = [(_motion(other), look_of(name)) for name, other in marked.items()]
     plain = _motion(run)
     name = name_of(run.method)
     ranges = []
@@ -167,7 +165,7 @@ def difference(drawn: Drawn) -> Section:
     for name, run in drawn.compared.items():
         if "angles" not in run:
             continue
-        one = figures.Series(*angle_difference(run, reference), drawn.looks[name])
+        one = figures.Series(*angle_difference(run, reference), look_of(name))
         described.append((name_of(name), float(one.values.max())))
         if one.values.max() > figures.LOWEST:
             series.append(one)
@@ -176,7 +174,7 @@ def difference(drawn: Drawn) -> Section:
     if not described:
         return Section("difference", texts.DIFFERENCE)
     notes = [texts.exact_note(exact)] if exact else []
-    legend = [run_sample(name_of(n), drawn.looks[n]) for n in drawn.compared if name_of(n) not in exact]
+    legend = [run_sample(name_of(n), look_of(n)) for n in drawn.compared if name_of(n) not in exact]
     carried, uncertainty = carried_rounding(reference), None
     if carried is not None:
         legend.append(line_sample(texts.CARRIED, GREY, ":"))
@@ -218,13 +216,12 @@ def energy(drawn: Drawn) -> Section:
         return Section("energy", texts.ENERGY)
     scales = {name: metrics.metric(run, "energy_scale_J") or 0.0 for name, run in errors.items()}
     relative = all(scales.values())
-    own = {name: drawn.looks.get(name) or Look(GREY, "-", "*") for name in errors}
     series, exact, described = [], [], []
     for name, run in errors.items():
         values = np.abs(run.array("energy_error")) / (scales[name] if relative else 1.0)
         described.append((name_of(name), float(values.max())))
         if values.max() > figures.LOWEST:
-            series.append(figures.Series(run.array("time"), values, own[name]))
+            series.append(figures.Series(run.array("time"), values, look_of(name)))
         else:
             exact.append(name_of(name))
     notes = [texts.exact_energy_note(exact)] if exact else []
@@ -239,7 +236,7 @@ def energy(drawn: Drawn) -> Section:
     )
     names = (texts.KINETIC, texts.POTENTIAL, texts.TOTAL)
     legend = [line_sample(name, *look) for name, look in zip(names, figures.ENERGY_LOOKS, strict=True)] if runs else []
-    legend += [run_sample(name_of(name), own[name]) for name in errors if name_of(name) not in exact]
+    legend += [run_sample(name_of(name), look_of(name)) for name in errors if name_of(name) not in exact]
     return Section("energy", texts.ENERGY, pictures, [*legend, *_horizon_sample(drawn)], [metrics.energy_table(errors)])
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rotor_mbs.analysis.stability import OUTCOMES, Cell, advice, cells, in_words, is_number, reached_by
+from rotor_mbs.analysis.stability import OUTCOMES, Advice, Cell, advice, cells, in_words, is_number, reached_by
 from rotor_mbs.report import stability_texts as words
 from rotor_mbs.report.files import INDEX, page_names, write_pages
 from rotor_mbs.report.names import name_of
@@ -76,7 +76,7 @@ def _map(
         own = {cell.method: cell for cell in found if cell.scene == name}
         any_cell = next(iter(own.values()))
         marks = [_mark(own[method], file) if method in own else None for method in methods]
-        row = MapRow(name, file, titles[name], marks, _right_by(found, any_cell))
+        row = MapRow(name, file, titles[name], marks, _right_by(own.values(), any_cell))
         families.setdefault(words.FAMILIES.get(any_cell.family, any_cell.family), []).append(row)
     sections = [_limits(records), _kept(records)]
     used = {cell.outcome for cell in found}
@@ -84,10 +84,19 @@ def _map(
         [name_of(method) for method in methods],
         list(families.items()),
         [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        [in_words(one) for one in advice(found)],
+        [in_words(_named(one)) for one in advice(found)],
         [words.LEAD, words.false_successes(sum(cell.false_success for cell in found))],
         [section for section in sections if section.has_content],
     )
+
+
+def _named(one: Advice) -> Advice:
+    """Methods by the names, families by the headings that the map has for them."""
+    use, in_part, avoid = (
+        tuple(f"“{words.FAMILIES.get(family, family)}”" for family in kind)
+        for kind in (one.use, one.in_part, one.avoid)
+    )
+    return replace(one, method=name_of(one.method), use=use, in_part=in_part, avoid=avoid)
 
 
 def _mark(cell: Cell, file: str) -> Mark:
@@ -96,10 +105,12 @@ def _mark(cell: Cell, file: str) -> Mark:
     return Mark(cell.outcome, symbol + claimed, f"{name_of(cell.method)}: {text}. {cell.message}".strip(), file)
 
 
-def _right_by(found: Sequence[Cell], cell: Cell) -> str:
-    if not cell.has_reference:
+def _right_by(own: Collection[Cell], any_cell: Cell) -> str:
+    if not any_cell.has_reference:
         return words.NO_REFERENCE
-    method = reached_by(found, cell.scene)
+    if all(cell.angle_error is None for cell in own):
+        return words.NOT_COMPARED
+    method = reached_by(own, any_cell.scene)
     return words.NOBODY if method is None else name_of(method)
 
 
@@ -110,12 +121,12 @@ def _limits(records: Sequence[Record]) -> Section:
             continue
         facts = record.attributes
         step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
-        kind = words.REAL if facts["real_mode"] else words.IMAGINARY
         numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
-        rows.append([Entry(record.scene), Entry(name_of(record.method)), *map(Entry, numbers), Entry(kind)])
-    head = [words.SCENE, words.METHOD, words.MEASURED, words.THEORY, words.RATIO, words.SCALED, words.KIND]
+        numbers.append(f"{facts['mode_damping_ratio']:.3g}")
+        rows.append([Entry(record.scene), Entry(name_of(record.method)), *map(Entry, numbers)])
+    head = [words.SCENE, words.METHOD, words.MEASURED, words.THEORY, words.RATIO, words.SCALED, words.DAMPING]
     return Section(
-        "limits", words.LIMITS, tables=[Table(words.LIMITS, head, rows, (2, 3, 4, 5))], notes=[words.LIMITS_NOTE]
+        "limits", words.LIMITS, tables=[Table(words.LIMITS, head, rows, (2, 3, 4, 5, 6))], notes=[words.LIMITS_NOTE]
     )
 
 

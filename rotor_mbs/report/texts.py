@@ -5,12 +5,12 @@ Knows numbers and names, not where they come from. Another language is another m
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from typing import TYPE_CHECKING
 
 from rotor_mbs.analysis.methods import model_of
-from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Tally
+from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally
 from rotor_mbs.report.names import NAMES, name_of
 from rotor_mbs.report.numbers import number, prefixed, quantity
 
@@ -137,9 +137,14 @@ QUOTE_NOTE = (
     "Numbers are read off the integrator's own output points, as off a printed figure, and compared at the printed "
     "digits."
 )
+MATCHED = "a length of the run and an order of adding the weights that were chosen to match"
+GROWN_ROUNDING = "grown rounding error"
+MATCHED_NOTE = f"These numbers are {GROWN_ROUNDING}; they come out for {MATCHED}."
 ERRATA_LEAD = (
-    "Each printed matrix entry was compared with its derivative, numerically, at random states. With the errata below "
-    "mended, the printed equations are the right Euler-Lagrange equations of the rotor."
+    "By the paper's own definition the printed matrices U, (8), (9) and (16) to (19), are the first and second "
+    "derivatives of its transformation (3) by the angles; mass, rate and gravity terms follow from the same "
+    "transformation by Lagrange's equations. Each printed entry was compared, at random states, with what so follows "
+    "from (3). With the errata below mended, the printed equations are the right Euler-Lagrange equations of the rotor."
 )
 EFFECTS_NOTE = (
     "The right equations with one erratum put in, integrated by ode45 at the paper's tolerances, against the "
@@ -169,6 +174,10 @@ PRINTED_STATUS = "As printed, ode45"
 PRINTED_DEPARTS = "departs by (rad, whole run)"
 PRINTED_GAIN = "makes energy"
 RAN_TO_THE_END = "runs to the end"
+NOT_HELD_NOTE = (
+    "The printed equations are held to nothing, neither to the reference nor to their energy: that they depart from "
+    "both is the finding. That a run of theirs reaches its end says nothing of whether it is right."
+)
 DRIFT_COLUMN = "energy drift"
 METRIC_COLUMNS = (
     "Angle error to the horizon (rad)", "Angle error, whole run (rad)", "Tip error to the horizon (m)",
@@ -194,7 +203,7 @@ def condition(key: str, text: str) -> str:
 
 
 def erratum(id_of: str, field: str, text: str) -> str:
-    """A field of an erratum ("printed", "right", "reason"), as reference/errata.toml says in `text`."""
+    """A field of an erratum ("entry", "printed", "right", "reason"), as reference/errata.toml says in `text`."""
     del id_of, field
     return text
 
@@ -339,16 +348,30 @@ def _reproduced(facts: Finding) -> str:
     reached = facts.numbers
     text = (
         f"{_of(reached, 'published number')} {_is_are(reached.count)} reproduced to every printed digit by "
-        "integrating the equations as they are printed"
+        f"integrating the equations as they are printed{_on_conditions(facts.reproduced)}"
     )
     if facts.numbers_right is not None:
-        text += f", {_none_or(facts.numbers_right)} by the right model"
+        text += f". The right model reproduces {_none_or(facts.numbers_right)}"
     if facts.claims_printed is not None and facts.claims_right is not None:
         text += (
             f"; of the paper's claims in words the printed model bears out {_share(facts.claims_printed)}, "
             f"the right model {_share(facts.claims_right)}"
         )
     return text + "."
+
+
+def _on_conditions(found: Sequence[Reproduced]) -> str:
+    """ ": that of Fig. 11 with g = 9.8 m/s² and 10 s; the 3 of Fig. 5, which are grown ...", "" where none is."""
+    parts = []
+    for one in found:
+        what = f"{'that' if one.count == 1 else f'the {one.count}'} of Fig. {one.figure}"
+        parts.append(f"{what}, {GROWN_ROUNDING}, for {MATCHED}" if one.matched else f"{what} {_under(one)}")
+    return f": {'; '.join(parts)}" if parts else ""
+
+
+def _under(one: Reproduced) -> str:
+    gravity = "" if one.gravity is None else f"g = {number(one.gravity)} m/s² and "
+    return f"with {gravity}{quantity(one.duration, 's')}"
 
 
 def _claims_alone(facts: Finding) -> str:
@@ -368,7 +391,8 @@ def _made_energy(energy: PrintedEnergy | None) -> str:
         return f"{start}still it makes none to speak of in {'this scene' if energy.made.of == 1 else 'these scenes'}."
     where = f"more than a thousandth of the energy scale in {energy.made.count} of {scene_count(energy.made.of)}"
     if energy.scene:
-        text = f"{start}it makes up to {prefixed(energy.gain, 'J')} out of nothing, {where}"
+        most = f"among the runs that reach the end up to {prefixed(energy.gain, 'J')}"
+        text = f"{start}it makes energy out of nothing, {where}, {most}"
     else:
         text = f"{start}it makes energy out of nothing, {where}"
     if energy.broke_off:
@@ -568,11 +592,11 @@ def seconds(value: float) -> str:
 
 
 def agreeing_summary(count: int, largest: float) -> str:
-    return f"{count} entries agree with their derivative to {number(largest)}"
+    return f"{count} entries agree with what follows from (3) to {number(largest)}"
 
 
 def differing_caption(count: int, of: int) -> str:
-    return f"{count} of {of} printed entries differ from their derivative"
+    return f"{count} of {of} printed entries differ from what follows from (3)"
 
 
 def error_column(method: str) -> str:

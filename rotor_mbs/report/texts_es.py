@@ -6,12 +6,12 @@ methods, scene files) stays in the language it was written in.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from typing import TYPE_CHECKING
 
 from rotor_mbs.analysis.methods import model_of
-from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Tally
+from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally
 from rotor_mbs.report.names import NAMES, name_of
 from rotor_mbs.report.numbers import number, prefixed, quantity
 
@@ -160,9 +160,15 @@ QUOTE_NOTE = (
     "Los números se leen en los puntos de salida del propio integrador, como en una figura impresa, y se comparan en "
     "los dígitos impresos."
 )
+MATCHED = "una duración de la corrida y un orden de sumar los pesos elegidos para que coincidan"
+GROWN_ROUNDING = "error de redondeo crecido"
+MATCHED_NOTE = f"Estos números son {GROWN_ROUNDING}; salen con {MATCHED}."
 ERRATA_LEAD = (
-    "Cada elemento impreso de las matrices se comparó con su derivada, numéricamente, en estados al azar. Corregidas "
-    "las erratas de abajo, las ecuaciones impresas son las ecuaciones de Euler-Lagrange correctas del rotor."
+    "Por la definición del propio artículo las matrices impresas U, (8), (9) y (16) a (19), son las derivadas primeras "
+    "y segundas de su transformación (3) respecto de los ángulos; los términos de masa, de velocidad y de gravedad se "
+    "siguen de la misma transformación por las ecuaciones de Lagrange. Cada elemento impreso se comparó, en estados al "
+    "azar, con lo que así se sigue de (3). Corregidas las erratas de abajo, las ecuaciones impresas son las "
+    "ecuaciones de Euler-Lagrange correctas del rotor."
 )
 EFFECTS_NOTE = (
     "Las ecuaciones correctas con una sola errata, integradas con ode45 a las tolerancias del artículo, frente a la "
@@ -196,6 +202,10 @@ PRINTED_STATUS = "Como se imprimió, ode45"
 PRINTED_DEPARTS = "se aparta (rad, corrida entera)"
 PRINTED_GAIN = "crea energía"
 RAN_TO_THE_END = "llega al final"
+NOT_HELD_NOTE = (
+    "A las ecuaciones impresas no se les exige nada, ni frente a la referencia ni en su energía: que se aparten de "
+    "ambas es el resultado. Que una corrida suya llegue al final no dice si es correcta."
+)
 DRIFT_COLUMN = "deriva de energía"
 METRIC_COLUMNS = (
     "Error de ángulo hasta el horizonte (rad)", "Error de ángulo, corrida entera (rad)",
@@ -237,12 +247,19 @@ _CONDITIONS = {
     "fig11": "La cresta es en parte error de integración: resueltas hasta converger, las mismas ecuaciones impresas la "
     "tienen en 2.746 rad. No es redondeo: inicios cambiados hasta en 4e-15 rad dan los mismos cinco dígitos.",
     "fig05": "El inicio de la Fig. 5 es un equilibrio de las ecuaciones correctas y de las impresas: en aritmética "
-    "exacta nada se mueve. Lo que la figura muestra es error de redondeo crecido desde un equilibrio inestable.",
+    "exacta nada se mueve. Lo que la figura muestra es error de redondeo, 1e-9 N m en la suma de los pesos de las tres "
+    "palas respecto del eje, crecido desde un equilibrio inestable. 0.5273 sale de todo modo de sumar los pesos que "
+    "deja un resto. Cuándo empieza el movimiento, y con ello 0.5127 y 0.0458 a una duración dada, depende del modo de "
+    "sumar como de la duración: ambos se eligieron para que coincidan. Un inicio cambiado en 1e-15 rad da 0.5137 y "
+    "0.0457, o ningún movimiento, como (56) en su forma impresa, simplificada.",
     "rounding": "En las Figs. 8, 14c y 15 un inicio cambiado en 1e-15 rad da a las ecuaciones impresas con ode45 otro "
     "curso antes de 10 s. Lo que se halla sobre una afirmación de estas figuras vale para un redondeo.",
 }
 
 _ERRATA = {
+    ("E1", "entry"): "U32, fila 2, columna 4; y su derivada U32,3, fila 2, columna 4",
+    ("E2", "entry"): "U33,3, fila 1, columna 4",
+    ("E3", "entry"): "los últimos términos: la velocidad de pala a la primera potencia",
     ("E1", "printed"): "c c3; y -c s3",
     ("E1", "right"): "0; y 0",
     ("E1", "reason"): "el elemento es la derivada respecto de q2 de la fila 2, columna 4 de (3), c s3 + d2, que no "
@@ -400,16 +417,30 @@ def _reproduced(facts: Finding) -> str:
         return _claims_alone(facts)
     text = (
         f"{_share(facts.numbers)} números publicados se reproducen en cada dígito impreso al integrar las ecuaciones "
-        "tal como se imprimieron"
+        f"tal como se imprimieron{_on_conditions(facts.reproduced)}"
     )
     if facts.numbers_right is not None:
-        text += f", {facts.numbers_right.count or 'ninguno'} con el modelo correcto"
+        right = facts.numbers_right.count
+        text += f". El modelo correcto {f'reproduce {right}' if right else 'no reproduce ninguno'}"
     if facts.claims_printed is not None and facts.claims_right is not None:
         text += (
             f"; de las afirmaciones del artículo el modelo impreso cumple {_share(facts.claims_printed)}, el correcto "
             f"{_share(facts.claims_right)}"
         )
     return text + "."
+
+
+def _on_conditions(found: Sequence[Reproduced]) -> str:
+    parts = []
+    for one in found:
+        what = f"{'el' if one.count == 1 else f'los {one.count}'} de la Fig. {one.figure}"
+        parts.append(f"{what}, {GROWN_ROUNDING}, con {MATCHED}" if one.matched else f"{what} {_under(one)}")
+    return f": {'; '.join(parts)}" if parts else ""
+
+
+def _under(one: Reproduced) -> str:
+    gravity = "" if one.gravity is None else f"g = {number(one.gravity)} m/s² y "
+    return f"con {gravity}{quantity(one.duration, 's')}"
 
 
 def _claims_alone(facts: Finding) -> str:
@@ -429,7 +460,8 @@ def _made_energy(energy: PrintedEnergy | None) -> str:
         return f"{start}aun así no crea energía digna de mención en {scene_count(energy.made.of)}."
     where = f"más de una milésima de la escala de energía en {energy.made.count} de {scene_count(energy.made.of)}"
     if energy.scene:
-        text = f"{start}crea hasta {prefixed(energy.gain, 'J')} de la nada, {where}"
+        most = f"entre las corridas que llegan al final hasta {prefixed(energy.gain, 'J')}"
+        text = f"{start}crea energía de la nada, {where}, {most}"
     else:
         text = f"{start}crea energía de la nada, {where}"
     if energy.broke_off:
@@ -613,11 +645,11 @@ def seconds(value: float) -> str:
 
 
 def agreeing_summary(count: int, largest: float) -> str:
-    return f"{count} elementos coinciden con su derivada a {number(largest)}"
+    return f"{count} elementos coinciden con lo que se sigue de (3) a {number(largest)}"
 
 
 def differing_caption(count: int, of: int) -> str:
-    return f"{count} de {of} elementos impresos difieren de su derivada"
+    return f"{count} de {of} elementos impresos difieren de lo que se sigue de (3)"
 
 
 def error_column(method: str) -> str:

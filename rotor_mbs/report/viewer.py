@@ -26,16 +26,20 @@ from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]
 FRAMES = 361
+SEEN = 0.1
 _TURN = 65536  # values of 16 bits
 
 
 @dataclass(frozen=True)
 class Viewer:
-    """For the template. data: JSON, safe inside a script element; models: their names, in the order of the data."""
+    """For the template. data: JSON, safe inside a script element; models: their names, in the order of the data.
+
+    magnified: how many times the tip's distance from the pitch axis is drawn at first; None where it has none.
+    """
 
     data: Markup
     models: Sequence[str]
-    has_offset: bool
+    magnified: int | None
     described: str
 
 
@@ -68,12 +72,19 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun], described: str) -
         ],
         "models": [{"name": name, "angles": packed(*move, step)} for name, move in moves.items()],
     }
-    return Viewer(script_json(data), list(moves), has_offset(scene), described)
+    return Viewer(script_json(data), list(moves), magnification(scene), described)
 
 
-def has_offset(scene: Scene) -> bool:
-    """Whether a pitch can be seen at all: a tip off its pitch axis."""
-    return any(math.hypot(*blade.tip[:2]) > 0.0 for blade in scene.blades)
+def magnification(scene: Scene) -> int | None:
+    """So many times the largest distance of a tip from its pitch axis makes SEEN of the longest blade; at least 1.
+
+    None where no tip lies off its axis: there no pitch can be seen at all.
+    """
+    offset = max(math.hypot(*blade.tip[:2]) for blade in scene.blades)
+    if not offset:
+        return None
+    length = max(math.hypot(*blade.tip) for blade in scene.blades)
+    return max(1, round(SEEN * length / offset))
 
 
 def packed(time: Array, angles: Array, step: float) -> str:

@@ -31,13 +31,15 @@ def entry(
         rows = [_torque_row(figure, stored, files)]
     else:
         rows = [_row(figure, letter, stored[name], files[name]) for letter, name in figure.panels]
-    notes = [texts.FIGURE_NOTES[figure.number]] if figure.number in texts.FIGURE_NOTES else []
+    numbers = [claim for claim in claims if claim.published.is_number and claim.published.figure == figure.number]
+    notes = [texts.MATCHED_NOTE] if any(claim.published.matched for claim in numbers) else []
+    notes += [texts.FIGURE_NOTES[figure.number]] if figure.number in texts.FIGURE_NOTES else []
     return Entry(
         figure.number,
         texts.figure_heading(figure.number, figure.kind),
         legend(figure, stored),
         rows,
-        [_number(claim) for claim in claims if claim.published.is_number and claim.published.figure == figure.number],
+        [_number(claim) for claim in numbers],
         notes,
     )
 

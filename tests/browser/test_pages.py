@@ -98,6 +98,20 @@ def test_axe_finds_nothing(page: Page, pages: list[Path], axe: str, width: int, 
     assert found == []
 
 
+def test_captions_are_not_cut_off_and_first_columns_stay_on_a_telephone(page: Page, pages: list[Path]) -> None:
+    for path in pages:
+        page.open(path, 390)
+        right = page.run("Math.max(0, ...[...document.querySelectorAll('caption span')].map("
+                         "s => s.getBoundingClientRect().right))")  # fmt: skip
+        assert right <= 390, path.name
+        moved = page.run(
+            "[...document.querySelectorAll('.scroll')].filter(s => s.scrollWidth > s.clientWidth + 50).map(s => {"
+            "const cell = s.querySelector('tbody th[scope=row]'), at = () => cell.getBoundingClientRect().left, before = at();"
+            "s.scrollLeft = 50; return at() - before; })"
+        )
+        assert all(abs(way) < 2 for way in moved), path.name
+
+
 def _scene(pages: list[Path]) -> Path:
     return next(path for path in pages if path.name == "paper-fig11.html")
 

@@ -1,0 +1,58 @@
+"""What the README and `docs/` tell a reader to type is understood, and what they link to is there."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from rotor_mbs.cli.arguments import parse
+from rotor_mbs.scenario.load import load_scene
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+NAMES = [path.name for path in DOCUMENTS]
+
+
+def commands(text: str) -> list[list[str]]:
+    """Every call of rotor-mbs in an indented line, without what the shell does around it."""
+    lines = [line.split("#")[0] for line in text.splitlines() if line.startswith("    ")]
+    parts = [part.strip() for line in lines for part in line.replace("exec ", "").split("&&")]
+    calls = [part for part in parts if re.match(r"(\.venv/bin/|- run: )?rotor-mbs ", part)]
+    return [shlex.split(re.sub(r"\$\(.*?\)", "0001", call.partition("rotor-mbs ")[2])) for call in calls]
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=NAMES)
+def test_every_command_is_one(path: Path) -> None:
+    for arguments in commands(path.read_text()):
+        replaced = ["3/16" if word.startswith("$SLURM_ARRAY_TASK_ID") else word for word in arguments]
+        parse(replaced)  # ends with status 2 where it is none
+
+
+def test_there_are_commands_to_be_tried() -> None:
+    assert sum(len(commands(path.read_text())) for path in DOCUMENTS) > 15
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=NAMES)
+def test_every_link_leads_somewhere(path: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", path.read_text()):
+        assert target.startswith("https://") or (path.parent / target).exists(), target
+
+
+def test_the_readmes_own_scene_is_one(tmp_path: Path) -> None:
+    (block,) = re.findall(r"```toml\n(title.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
+    scene_file = tmp_path / "my.toml"
+    scene_file.write_text(block)
+    scene = load_scene(scene_file, "my")
+    assert len(scene.blades) == 2
+    assert scene.has_torque
+    assert scene.has_damping
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=NAMES)
+def test_lines_fit_an_editor(path: Path) -> None:
+    """But tables, which cannot be wrapped."""
+    long = [line for line in path.read_text().splitlines() if len(line) > 125 and not line.startswith("|")]
+    assert not long
