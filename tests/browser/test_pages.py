@@ -106,7 +106,8 @@ def test_captions_are_not_cut_off_and_first_columns_stay_on_a_telephone(page: Pa
         assert right <= 390, path.name
         moved = page.run(
             "[...document.querySelectorAll('.scroll')].filter(s => s.scrollWidth > s.clientWidth + 50).map(s => {"
-            "const cell = s.querySelector('tbody th[scope=row]'), at = () => cell.getBoundingClientRect().left, before = at();"
+            "const cell = s.querySelector('tbody th[scope=row]');"
+            "const at = () => cell.getBoundingClientRect().left, before = at();"
             "s.scrollLeft = 50; return at() - before; })"
         )
         assert all(abs(way) < 2 for way in moved), path.name
