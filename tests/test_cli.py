@@ -142,6 +142,17 @@ def test_a_run_over_its_time_limit_is_recorded_and_the_rest_goes_on(tmp_path: Pa
         assert results.scenes["quick"].runs["exudyn_chain/generalized_alpha"].status == "ok"
 
 
+def test_a_run_without_a_single_finite_sample_is_stored_as_what_it_is(tmp_path: Path) -> None:
+    """Rates of 1e200: the engine reports success, and has nothing to show for it."""
+    ended = rotor_mbs("run", "extreme/rate-1e200", "-m", "exudyn_tree/rk44", "-o", "r.h5", cwd=tmp_path)
+    assert ended.returncode == 1
+    with open_results(tmp_path / "r.h5") as results:
+        run = results.scenes["extreme/rate-1e200"].runs["exudyn_tree/rk44"]
+        assert run.status == "diverged"
+        assert run.attributes["false_success"] == 1
+        assert not len(run.array("time"))
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

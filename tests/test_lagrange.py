@@ -15,8 +15,10 @@ from rotor_mbs.models.base import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.registry import find_method
+from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.compare import energy_error, energy_scale
+from rotor_mbs.trajectory.outcome import judge
 from rotor_mbs.trajectory.record import Trajectory
 
 heyoka = pytest.importorskip("heyoka")
@@ -260,3 +262,10 @@ def test_ode45_on_the_right_equations_converges_in_its_tolerance() -> None:
     )
     assert tight <= loose / 100
     assert tight <= 1e-5
+
+
+@pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/ode45", "lagrange/dop853", "lagrange/radau"])
+def test_rates_whose_squares_overflow_end_in_words_and_not_in_warnings(method: str) -> None:
+    """Warnings are errors here: a run that cannot be followed says so in its result, not on the terminal."""
+    scene = find_scenes(["extreme/rate-1e200"])[0]
+    assert judge(scene, solve(method, find_method(method), scene, {}, time_limit_s=5.0), None).status != "ok"

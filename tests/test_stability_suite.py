@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import time
 from collections.abc import Iterator
@@ -51,6 +52,8 @@ def test_no_run_of_ours_claims_success(suite: Path) -> None:
     assert not [cell for cell in ours if cell.false_success]
     assert [cell for cell in found if cell.false_success]  # Exudyn's explicit methods on the overdamped bearing
     assert not [cell for cell in found if cell.status == "ok" and cell.scene == "extreme/rate-1e200"]
+    # A fault of this package would be stored as a run that failed, with the exception's name before its text.
+    assert not [cell for cell in found if re.match(r"\w+Error: ", cell.message)]
     assert not unreached(found)
     assert reached_by(found, "extreme/light-1e-8") == "lagrange/taylor"
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rotor_mbs.cli.work import Summary, Task, perform, record_failure
-from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.errors import InputError, MethodRefusal, RotorError, StoreError
 from rotor_mbs.models.registry import REFERENCE, find_method
 from rotor_mbs.runner.environment import machine, numerics_fingerprint, versions
 from rotor_mbs.runner.pool import Finished, run_tasks
@@ -127,7 +127,8 @@ def _settle(finished: Finished[Task, Summary]) -> Summary:
     if isinstance(finished.error, StoreError):
         raise finished.error
     status = "timed_out" if finished.failure == "timed_out" else "solver_failed"
-    return record_failure(finished.task, status, finished.message)
+    message = str(finished.error) if isinstance(finished.error, RotorError) else finished.message
+    return record_failure(finished.task, status, message)
 
 
 def _line(task: Task, summary: Summary) -> str:

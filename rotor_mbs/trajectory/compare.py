@@ -58,7 +58,7 @@ def energy_error(run: Trajectory) -> Array | None:
     if run.kinetic_energy is None or run.potential_energy is None or run.work is None:
         return None
     total = run.kinetic_energy + run.potential_energy - run.work
-    error: Array = total - total[0]
+    error: Array = total - total[:1]  # of a run without a sample, too
     return error
 
 

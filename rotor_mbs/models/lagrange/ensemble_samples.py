@@ -116,7 +116,8 @@ def _put_states(
                 block.tip[numbers, :, blade, axis] = path[axis]
     if block.kinetic_energy is not None and block.potential_energy is not None and block.work is not None:
         q, qd = [angles[i] for i in columns], [rates[i] for i in columns]
-        kinetic, potential = closed_form.energies(q, qd, _stacked(forms), trigonometry.sin, trigonometry.cos)
+        with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200, as in `samples`
+            kinetic, potential = closed_form.energies(q, qd, _stacked(forms), trigonometry.sin, trigonometry.cos)
         block.kinetic_energy[numbers], block.potential_energy[numbers] = kinetic, potential
         has_work = states.shape[2] > 2 * count
         block.work[numbers] = states[:, :, 2 * count] if has_work else _constant_work(scenes, angles[0])

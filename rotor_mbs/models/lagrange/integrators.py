@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rotor_mbs.models import deadline
 from rotor_mbs.models import ode45 as matlab
+from rotor_mbs.models.deadline import OutOfTimeError
 from rotor_mbs.models.lagrange.plain import Advance, Integrator, RightHandSide
 from rotor_mbs.trajectory.record import Array
 
@@ -17,23 +20,32 @@ def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: f
     solver_type = getattr(scipy.integrate, name)
 
     def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
-        rows, steps, message = [np.empty((0, len(state)))], 0, ""
+        def watched(time: float, values: Sequence[float]) -> list[float]:
+            if deadline.is_over():  # a step may try ever smaller sizes without end
+                raise OutOfTimeError
+            return function(time, values)
+
+        rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
         with np.errstate(all="ignore"), deadline.polled():
-            solver = solver_type(function, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
-            done = 0
-            while solver.status == "running" and not message:
-                said = solver.step()
-                if solver.status == "failed":
-                    message = f"SciPy: {said}"
-                    break
-                steps += 1
-                reached = int(np.searchsorted(times, solver.t, side="right"))
-                if reached > done:
-                    rows.append(solver.dense_output()(times[done:reached]).T)
-                    done = reached
-                if deadline.is_over():
-                    message = deadline.words()
-        return Advance(np.concatenate(rows), solver.y, steps, solver.nfev, message)
+            try:
+                solver = solver_type(watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
+                done = 0
+                while solver.status == "running":
+                    said = solver.step()
+                    if solver.status == "failed":
+                        message = f"SciPy: {said}"
+                        break
+                    steps += 1
+                    reached = int(np.searchsorted(times, solver.t, side="right"))
+                    if reached > done:
+                        rows.append(solver.dense_output()(times[done:reached]).T)
+                        done = reached
+            except OutOfTimeError:
+                message = deadline.words()
+            except (ValueError, np.linalg.LinAlgError) as exc:  # of its linear algebra, on what is not finite
+                message = f"SciPy: {exc}"
+        last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)
+        return Advance(np.concatenate(rows), last, steps, evaluations, message)
 
     return advance
 

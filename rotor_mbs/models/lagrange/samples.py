@@ -31,9 +31,10 @@ def trajectory(scene: Scene, time: Array, states: Array, moving: tuple[int, ...]
         result.tip = np.ascontiguousarray(np.array([np.broadcast_arrays(*path) for path in paths]).transpose(2, 0, 1))
     if scene.wants("energy"):
         form = rotor_form(scene)
-        result.kinetic_energy, result.potential_energy = closed_form.energies(
-            list(angles[:, columns].T), list(rates[:, columns].T), form, np.sin, np.cos
-        )
+        with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200; the judgement sees what is not finite
+            result.kinetic_energy, result.potential_energy = closed_form.energies(
+                list(angles[:, columns].T), list(rates[:, columns].T), form, np.sin, np.cos
+            )
         result.work = states[:, 2 * count] if states.shape[1] > 2 * count else _constant_work(scene, angles)
     return result
 

@@ -116,7 +116,7 @@ class Propagation:
             if message:
                 break
         states = np.concatenate(rows)
-        finite = np.isfinite(states.astype(float))
+        finite = np.isfinite(states.astype(float, copy=False))
         self.states = states if finite.all() else states[: int(np.argmin(finite.all(axis=1)))]
         reached = float(self._times[max(len(self.states) - 1, 0)])
         return Integration(not message, message, reached, steps, out_of_time=message == deadline.words())
