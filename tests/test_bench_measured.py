@@ -216,7 +216,8 @@ def test_two_benches_tell_the_same(tmp_path: Path) -> None:
         assert bench(tmp_path, "paper/fig09", *chosen, "--budget", "25", name=name) == 0
     first, second = curves(tmp_path, "a.h5"), curves(tmp_path, "b.h5")
     assert set(first) == set(second)
-    idle = max(curve.attributes["load_after"] for curve in (*first.values(), *second.values())) < 1.3
+    # The bench's own process makes a load of one; half of one more is what an idle machine has beside it.
+    idle = max(curve.attributes["load_after"] for curve in (*first.values(), *second.values())) < 1.5
     changes = {}
     for name, one in first.items():
         other = second[name]
