@@ -19,7 +19,8 @@ from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.runner.engines import Engine
 from rotor_mbs.runner.meter import Meter
-from rotor_mbs.runner.queue import Ended, Queue
+from rotor_mbs.runner.pool import Finished
+from rotor_mbs.runner.queue import Queue
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.store.sweep_layout import SWEEP_STATUSES
 from rotor_mbs.store.sweep_rows import Receipt, Rows
@@ -82,7 +83,7 @@ def _placed(work: Work, engine: Engine, store: SweepStore) -> Iterator[Chunk]:
         yield replace(chunk, places=store.places(chunk.first, chunk.last)) if writes else chunk
 
 
-def _receipt(ended: Ended[Chunk, Rows | Receipt], store: SweepStore) -> Receipt:
+def _receipt(ended: Finished[Chunk, Rows | Receipt], store: SweepStore) -> Receipt:
     if isinstance(ended.value, Receipt):
         return ended.value
     if isinstance(ended.error, InputError | MethodRefusal | StoreError):

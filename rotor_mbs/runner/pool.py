@@ -30,7 +30,7 @@ class Finished(Generic[T, R]):
     value: R | None = None
     failure: str = ""
     message: str = ""
-    error: Exception | None = None
+    error: BaseException | None = None
 
 
 def run_tasks(work: Callable[[T], R], tasks: Sequence[T], workers: int, timeout_s: float) -> Iterator[Finished[T, R]]:
@@ -61,5 +61,10 @@ def _finished(task: T, future: Future[R], timeout_s: float) -> Finished[T, R]:
     except ProcessExpired as exc:
         return Finished(task, failure="worker_died", message=f"its process died (exit code {exc.exitcode})")
     except Exception as exc:
-        text = str(exc).strip().splitlines()
-        return Finished(task, None, "error", f"{type(exc).__name__}: {text[0] if text else 'no message'}", exc)
+        return Finished(task, None, "error", in_words(exc), exc)
+
+
+def in_words(error: BaseException) -> str:
+    """What a task raised, in one line: its type, and the first line of what it says."""
+    text = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {text[0] if text else 'no message'}"

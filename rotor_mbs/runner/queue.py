@@ -12,24 +12,13 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from rotor_mbs.runner.engines import Engine
+from rotor_mbs.runner.pool import Finished, in_words
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 # Tasks handed out per worker: one to work on, one waiting, so that no worker waits for its parent.
 _PER_WORKER = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Ended(Generic[T, R]):
-    """A task's end. Either `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`;
-    error: what the task itself raised."""
-
-    task: T
-    value: R | None = None
-    failure: str = ""
-    message: str = ""
-    error: BaseException | None = None
 
 
 @dataclass(frozen=True)
@@ -42,13 +31,13 @@ class Queue(Generic[T, R]):
     parts: Callable[[T], Sequence[T]]
     timeout_s: Callable[[T], float]
 
-    def run(self, tasks: Iterable[T]) -> Iterator[list[Ended[T, R]]]:
+    def run(self, tasks: Iterable[T]) -> Iterator[list[Finished[T, R]]]:
         """Tasks as they end, all that have ended since the last look together."""
         suspects: list[T] = []
         yield from self._pass(iter(tasks), suspects)
         yield from self._pass(iter(suspects), None)
 
-    def _pass(self, tasks: Iterator[T], suspects: list[T] | None) -> Iterator[list[Ended[T, R]]]:
+    def _pass(self, tasks: Iterator[T], suspects: list[T] | None) -> Iterator[list[Finished[T, R]]]:
         waiting: dict[Future[R], T] = {}
         more = True
         while more or waiting:
@@ -63,20 +52,19 @@ class Queue(Generic[T, R]):
             if told:
                 yield told
 
-    def _ended(self, task: T, future: Future[R]) -> Ended[T, R]:
+    def _ended(self, task: T, future: Future[R]) -> Finished[T, R]:
         error = future.exception()
         if error is None:
-            return Ended(task, future.result())
+            return Finished(task, future.result())
         cause = self.engine.cause(error)
         if cause == "timed_out":
-            return Ended(task, failure=cause, message=f"ended after {self.timeout_s(task):g} s")
+            return Finished(task, failure=cause, message=f"ended after {self.timeout_s(task):g} s")
         if cause == "worker_died":
-            return Ended(task, failure=cause, message="its process died, and died again when it was tried alone")
-        text = str(error).strip().splitlines()
-        return Ended(task, None, cause, f"{type(error).__name__}: {text[0] if text else 'no message'}", error)
+            return Finished(task, failure=cause, message="its process died, and died again when it was tried alone")
+        return Finished(task, None, cause, in_words(error), error)
 
 
-def _retried(end: Ended[T, R], suspects: list[T] | None, parts: Callable[[T], Sequence[T]]) -> bool:
+def _retried(end: Finished[T, R], suspects: list[T] | None, parts: Callable[[T], Sequence[T]]) -> bool:
     """Whether the task is tried once more: a dead worker's, and one that was late for the sake of a part of it."""
     if not end.failure or suspects is None:
         return False
