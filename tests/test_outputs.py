@@ -60,6 +60,22 @@ def test_a_sweeps_dataset_is_no_output_of_a_batch(
     assert [path.name for path in dataset.parent.iterdir() if path.suffix != ".toml"] == [dataset.name]
 
 
+def test_a_reference_that_starts_in_a_singular_state_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["bench", "extreme/singular-start", "-m", "lagrange/dop853", "-o", str(tmp_path / "b.h5")]) == 2
+    assert "every pitch at ±π/2 leaves the rotor no inertia" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_a_sweeps_link_stays_one(dataset: Path, tmp_path: Path) -> None:
+    target, link = tmp_path / "far" / "two.h5", tmp_path / "two.h5"
+    target.parent.mkdir()
+    link.symlink_to(target)
+    assert main(["sweep", str(dataset.with_name("two.toml")), "-o", str(link), "-j", "1"]) == 0
+    assert link.is_symlink()
+    assert target.read_bytes() == dataset.read_bytes()
+
+
 def test_references_do_not_take_the_place_of_runs(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = results.read_bytes()
     for scene in ("paper/fig03", "paper/fig04b"):

@@ -46,6 +46,7 @@ class SweepStore:
     """
 
     def __init__(self, output: Path, plan: Plan, first: int, last: int, file_bytes: int) -> None:
+        output = output.resolve() if output.is_symlink() else output  # a link stays one
         self._output, self._plan, self._first, self._last = output, plan, first, last
         self._per_file = runs_per_file(file_bytes, plan)
         self._folder = output.with_name(output.name + ".parts")
