@@ -129,6 +129,11 @@ _BAD = {
         4,
         "angels: is no key here, perhaps angles",
     ),
+    "an unknown key of two values, told once": (
+        '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]',
+        4,
+        r"^[^\n]*initial\.angels\[1\]: initial\.angels: is no key here[^\n]*$",
+    ),
     "an index too high": ('[[axis]]\nkey = "initial.angles[4]"\nvalues = [1]', 4, r"initial.angles\[3\]"),
     "an unknown table": ('[[axis]]\nkey = "bering.stiffness"\nvalues = [1]', 4, "bering: is no key here, perhaps bear"),
     "no number there": ('[[axis]]\nkey = "title"\nvalues = [1]', 4, "is no text"),

@@ -197,7 +197,8 @@ class _Reader:
                 values.scene(row)
             except VariantFaultError as fault:
                 line = line_of(self._lines, ("axis", i, "key"))
-                shown = ", ".join(f"{key} = {value:g}" for key, value in zip(values.keys, row, strict=True))
+                pairs = zip(values.keys, row, strict=True)
+                shown = ", ".join(key if fault.is_of_key else f"{key} = {value:g}" for key, value in pairs)
                 for words in fault.faults:
                     problems.setdefault(f"{shown_path(self._path)}:{line}: {shown}: {words}")
                 if len(problems) >= 20:

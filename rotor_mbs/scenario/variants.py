@@ -20,10 +20,13 @@ _MAX_MACHINES = 512
 
 
 class VariantFaultError(ValueError):
-    """Parameters that make no scene: one line per fault, without the file."""
+    """Parameters that make no scene: one line per fault, without the file.
 
-    def __init__(self, faults: Sequence[str]) -> None:
-        self.faults = tuple(faults)
+    is_of_key   whether it is a key that is wrong, whatever its value
+    """
+
+    def __init__(self, faults: Sequence[str], *, is_of_key: bool = False) -> None:
+        self.faults, self.is_of_key = tuple(faults), is_of_key
         super().__init__("; ".join(faults))
 
 
@@ -80,7 +83,9 @@ class Variants:
         try:
             return SceneTable.model_validate(tables, context=Known()).to_scene(self._name, "")
         except ValidationError as error:
-            raise VariantFaultError([fault.text for fault in faults_of(error, tables)]) from error
+            unknown = {detail["type"] for detail in error.errors(include_url=False)} == {"extra_forbidden"}
+            texts = [fault.text for fault in faults_of(error, tables)]
+            raise VariantFaultError(texts, is_of_key=unknown) from error
 
     def _with(self, values: Sequence[float]) -> dict[str, Any]:
         tables = copy.deepcopy(dict(self._tables))
@@ -93,7 +98,7 @@ def _put_all(tables: dict[str, Any], entries: Sequence[tuple[KeyPath, float]]) -
         try:
             put(tables, path, value)
         except KeyFaultError as fault:
-            raise VariantFaultError([str(fault)]) from fault
+            raise VariantFaultError([str(fault)], is_of_key=True) from fault
 
 
 def _is_plain(scene: Scene) -> bool:
