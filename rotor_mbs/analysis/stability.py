@@ -228,6 +228,7 @@ def summary_lines(found: Sequence[Cell]) -> list[str]:
 
 
 def in_words(one: Advice) -> str:
+    """One line: where the method holds, what to use it for and what not."""
     alone = f" ({one.by_energy} by its energy alone)" if one.by_energy else ""
     parts = [f"{one.method}: holds on {one.holds} of {one.of}{alone}"]
     if one.use:
@@ -248,4 +249,5 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def is_number(value: float | None) -> bool:
+    """Neither absent nor infinite nor NaN."""
     return value is not None and math.isfinite(value)

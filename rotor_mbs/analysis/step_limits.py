@@ -17,9 +17,6 @@ STABILITY_FUNCTIONS: dict[str, Sequence[float]] = {
     "exudyn_tree/rk67": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
 }
 
-# Linear problems: none, for any spectral radius (J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993), 371-375).
-UNLIMITED = ("exudyn_tree/generalized_alpha", "exudyn_chain/generalized_alpha", "exudyn_chain/newmark_index2")
-
 
 def oscillator_modes(inertia: float, stiffness: float, damping: float) -> tuple[complex, complex]:
     """λ in 1/s of J θ̈ + d θ̇ + k θ = 0 (kg m², N m/rad, N m s/rad)."""

@@ -38,6 +38,7 @@ class ConservationTask:
 
 
 def perform_conservation(task: ConservationTask) -> Record:
+    """What a right run keeps, as a record: relative, or in rad; where a run fails, its words."""
     name = f"{task.scene.name}/{task.method}"
     try:
         with time_limit(_LIMIT_S):

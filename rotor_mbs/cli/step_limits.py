@@ -51,6 +51,7 @@ class StepTask:
 
 
 def perform_steps(task: StepTask) -> Record:
+    """Errors in rad over steps in s, or the largest stable step in s, as a record."""
     return _ladder(task) if task.kind == "steps" else _limit(task)
 
 

@@ -17,8 +17,6 @@ from rotor_mbs.report.paper_set import MOTION, TORQUES, PaperFigure, available
 from rotor_mbs.report.walk import legend
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
-FORMATS = ("pdf", "svg", "png")
-
 
 def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str], language: str = "en") -> list[Path]:
     """`folder`/figNN.`kind` for each figure asked for, all that the file has where `numbers` is empty.

@@ -160,6 +160,7 @@ def copy_group(source: Any, target: Any) -> None:
 
 
 def is_group(item: Any) -> bool:
+    """Whether a member of a file holds others, and is no array."""
     return isinstance(item, h5py.Group)
 
 

@@ -25,10 +25,12 @@ MESSAGE = "message"
 
 
 def count_of(rows: Rows) -> int:
+    """How many runs."""
     return len(rows["status"])
 
 
 def part_of(rows: Rows, start: int, end: int) -> Rows:
+    """The runs start ... end - 1 of them, without a copy."""
     return {name: values[start:end] for name, values in rows.items()}
 
 

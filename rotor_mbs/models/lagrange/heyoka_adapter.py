@@ -30,6 +30,7 @@ def heyoka() -> ModuleType:
 
 
 def is_available() -> bool:
+    """Whether heyoka can be loaded, which this tries."""
     try:
         heyoka()
     except MethodRefusal:

@@ -40,6 +40,7 @@ class System:
 
 
 def build_system(scene: Scene) -> System:
+    """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed."""
     engine = heyoka()
     parameters = Parameters()
     form = rotor_form(scene, parameters)
