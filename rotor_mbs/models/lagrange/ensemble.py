@@ -141,48 +141,43 @@ def _compiled(structure: tuple[int, ...], tolerance: float, example: Scene) -> A
 def _propagate(
     scenes: Sequence[Scene], machine: _Machine, parameters: Array, tolerance: float
 ) -> tuple[Array, list[Integration]]:
-    """States (runs, samples, variables), NaN after a run broke off, and the engine's word on each run."""
+    """States (variables, runs, samples), NaN after a run broke off, and the engine's word on each run."""
     integrator = _compiled(machine.structure, tolerance, _without_start(scenes[0]))
     initial = _initial(scenes, machine.moving, integrator.state.shape[0])
     times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), scenes[0].samples)
-    states = np.empty((len(scenes), scenes[0].samples, len(initial)))
+    states = np.empty((len(initial), len(scenes), scenes[0].samples))
     words: list[Integration] = []
     width = integrator.state.shape[1]
     for first in range(0, len(scenes), width):
         runs = list(range(first, min(first + width, len(scenes))))
-        batch = _batch(integrator, times, parameters, initial, runs)
-        if any(word.message for word in batch[1]):
+        told = _batch(integrator, times, parameters, initial, runs, states)
+        if any(word.message for word in told):
             # One lane's failure ends all lanes: each runs again with itself alone in every lane.
-            alone = [_batch(integrator, times, parameters, initial, [run]) for run in runs]
-            batch = np.concatenate([part[0] for part in alone]), [part[1][0] for part in alone]
-        states[runs] = batch[0]
-        words += batch[1]
+            told = [_batch(integrator, times, parameters, initial, [run], states)[0] for run in runs]
+        words += told
     return states, words
 
 
 def _batch(
-    integrator: Any, times: Array, parameters: Array, initial: Array, runs: Sequence[int]
-) -> tuple[Array, list[Integration]]:
-    """One integration of up to as many runs as there are lanes; spare lanes repeat the last one."""
+    integrator: Any, times: Array, parameters: Array, initial: Array, runs: Sequence[int], states: Array
+) -> list[Integration]:
+    """One integration of up to as many runs as there are lanes, into `states`; spare lanes repeat the last one."""
     width = integrator.state.shape[1]
     padded = [*runs, *[runs[-1]] * (width - len(runs))]
     integrator.set_time(np.zeros(width))
     integrator.state[:] = initial[:, padded]
     set_parameters(integrator, parameters[:, padded])
-    states = np.ascontiguousarray(integrator.propagate_grid(times[:, padded])[1].transpose(2, 0, 1)[: len(runs)])
+    found = integrator.propagate_grid(times[:, padded])[1]
+    filled = states[:, runs[0] : runs[-1] + 1]
+    filled[:] = found.transpose(1, 2, 0)[:, : len(runs)]
+    if not np.isfinite(filled).all():
+        broken = np.maximum.accumulate(~np.isfinite(filled).all(axis=0), axis=1)
+        filled[:, broken] = np.nan
     words = []
     for result in integrator.propagate_res[: len(runs)]:
         message = failure(result[0])
         words.append(Integration(not message, message, 0.0, int(result[3])))
-    if not np.isfinite(states).all():
-        for state in states:
-            state[_first_not_finite(state) :] = np.nan
-    return states, words
-
-
-def _first_not_finite(states: Array) -> int:
-    broken = np.flatnonzero(~np.isfinite(states).all(axis=1))
-    return int(broken[0]) if len(broken) else len(states)
+    return words
 
 
 def _initial(scenes: Sequence[Scene], moving: tuple[int, ...], variables: int) -> Array:

@@ -81,14 +81,14 @@ def put_states(
     states: Array,
     words: Sequence[Integration],
 ) -> None:
-    """Runs of one structure, as the runs `numbers` of the block. states: (runs, samples, variables).
+    """Runs of one structure, as the runs `numbers` of the block. states: (variables, runs, samples).
 
     A few at a time: what is worked on then stays in the processor's cache.
     """
-    at_once = max(_AT_ONCE // states.shape[1], 1)
+    at_once = max(_AT_ONCE // states.shape[2], 1)
     for first in range(0, len(numbers), at_once):
         part = slice(first, first + at_once)
-        _put_states(block, numbers[part], scenes[part], forms[part], moving, states[part], words[part])
+        _put_states(block, numbers[part], scenes[part], forms[part], moving, states[:, part], words[part])
 
 
 def _put_states(
@@ -102,13 +102,13 @@ def _put_states(
 ) -> None:
     columns, count = list(moving), len(moving)
     starts = np.array([scene.initial_angles for scene in scenes]).T
-    broken = np.isnan(states[:, :, 0])
+    broken = np.isnan(states[0])
     trigonometry = _Trigonometry()
     angles, rates = [], []
     for i in range(starts.shape[0]):
         k = columns.index(i) if i in columns else None
-        angles.append(_held(starts[i], broken) if k is None else np.ascontiguousarray(states[:, :, k]))
-        rates.append(_held(0.0 * starts[i], broken) if k is None else np.ascontiguousarray(states[:, :, count + k]))
+        angles.append(_held(starts[i], broken) if k is None else states[k])
+        rates.append(_held(0.0 * starts[i], broken) if k is None else states[count + k])
         block.angles[numbers, :, i], block.rates[numbers, :, i] = angles[i], rates[i]
     if block.tip is not None:
         for blade, path in _tips(scenes, angles, trigonometry):
@@ -119,9 +119,9 @@ def _put_states(
         with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200, as in `samples`
             kinetic, potential = closed_form.energies(q, qd, _stacked(forms), trigonometry.sin, trigonometry.cos)
         block.kinetic_energy[numbers], block.potential_energy[numbers] = kinetic, potential
-        has_work = states.shape[2] > 2 * count
-        block.work[numbers] = states[:, :, 2 * count] if has_work else _constant_work(scenes, angles[0])
-    samples = states.shape[1] - broken.sum(axis=1)
+        has_work = len(states) > 2 * count
+        block.work[numbers] = states[2 * count] if has_work else _constant_work(scenes, angles[0])
+    samples = states.shape[2] - broken.sum(axis=1)
     for i, word, rows in zip(numbers, words, samples.tolist(), strict=True):
         word.time_reached = float(block.time[i, max(rows - 1, 0)])
         block.words[i], block.samples[i] = word, rows
