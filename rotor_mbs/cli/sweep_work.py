@@ -20,7 +20,7 @@ from rotor_mbs.scenario.variants import VariantFaultError, Variants
 from rotor_mbs.store.sweep_layout import MESSAGE_BYTES, METRICS_AND_MESSAGE, SWEEP_STATUSES, empty_rows
 from rotor_mbs.store.sweep_rows import MESSAGE, Places, Receipt, Rows
 from rotor_mbs.trajectory.compare import energy_error
-from rotor_mbs.trajectory.many import clearly_ok, energy_drifts, energy_errors
+from rotor_mbs.trajectory.many import clearly_ok, energy_drifts, energy_errors, largest
 from rotor_mbs.trajectory.outcome import judge
 from rotor_mbs.trajectory.record import Array, Integration, Run, Trajectory
 
@@ -143,18 +143,9 @@ def _put_words(rows: Rows, i: int, word: Integration, time_reached: float) -> No
 
 
 def _put_extremes(rows: Rows, runs: slice, angles: Array, rates: Array) -> None:
-    rows["rotor_angle_max"][runs] = _largest(angles[:, :, :1])
-    rows["rotor_rate_max"][runs] = _largest(rates[:, :, :1])
-    rows["pitch_max"][runs] = _largest(angles[:, :, 1:])
-
-
-def _largest(values: Array) -> Array:
-    """(k,) of (k, n, columns); samples that are missing do not count."""
-    largest: Array = np.maximum(values.max(axis=(1, 2)), -values.min(axis=(1, 2)))
-    if not np.isfinite(largest).all():
-        sizes = np.abs(values)
-        largest = sizes.max(axis=(1, 2), initial=0.0, where=np.isfinite(sizes))
-    return largest
+    rows["rotor_angle_max"][runs] = largest(angles[:, :, 0])
+    rows["rotor_rate_max"][runs] = largest(rates[:, :, 0])
+    rows["pitch_max"][runs] = np.max([largest(angles[:, :, i]) for i in range(1, angles.shape[2])], axis=0)
 
 
 def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:

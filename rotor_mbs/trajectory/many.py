@@ -19,6 +19,15 @@ from rotor_mbs.trajectory.record import Array, Integration, Trajectory
 _CLEAR_SHARE = 1e-6
 
 
+def largest(values: Array) -> Array:
+    """(k,) of (k, n): the largest size of each row; samples that are not finite do not count."""
+    found: Array = np.maximum(values.max(axis=1), -values.min(axis=1))
+    if not np.isfinite(found).all():
+        sizes = np.abs(values)
+        found = sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))
+    return found
+
+
 def energy_errors(kinetic: Array, potential: Array, work: Array) -> Array:
     """(k, n) J: total energy less work, less its value at the start of each run."""
     total = kinetic + potential - work
@@ -28,18 +37,9 @@ def energy_errors(kinetic: Array, potential: Array, work: Array) -> Array:
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
     """(k,) largest energy error of each run, of its scale (J where that is zero); NaN samples do not count."""
-    scales = _scales(scenes) + kinetic[:, 0] + _largest(work)
-    drifts: Array = _largest(errors) / np.where(scales == 0.0, 1.0, scales)
+    scales = _scales(scenes) + kinetic[:, 0] + largest(work)
+    drifts: Array = largest(errors) / np.where(scales == 0.0, 1.0, scales)
     return drifts
-
-
-def _largest(values: Array) -> Array:
-    """(k,) of (k, n) either way; NaN samples do not count."""
-    largest: Array = np.maximum(values.max(axis=1), -values.min(axis=1))
-    if not np.isfinite(largest).all():
-        sizes = np.abs(values)
-        largest = sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))
-    return largest
 
 
 def _scales(scenes: Sequence[Scene]) -> Array:

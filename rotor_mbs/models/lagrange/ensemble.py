@@ -17,9 +17,10 @@ import numpy as np
 from rotor_mbs.models.base import solve
 from rotor_mbs.models.lagrange import ensemble_samples, taylor
 from rotor_mbs.models.lagrange.compile_lock import one_at_a_time
+from rotor_mbs.models.lagrange.derived import Derived, Numbers, numbers_of
 from rotor_mbs.models.lagrange.ensemble_samples import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
+from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.lagrange.system import build_system, set_parameters
 from rotor_mbs.models.lagrange.torque import stretches
 from rotor_mbs.scenario.scene import Scene
@@ -30,10 +31,11 @@ _UNROLLED_BLADES = 4
 
 
 class _Ready(threading.local):
-    """Compiled integrators, which hold a state: each thread has its own."""
+    """Compiled code, which holds a state: each thread has its own."""
 
     def __init__(self) -> None:
         self.integrators: dict[tuple[tuple[int, ...], float], Any] = {}
+        self.derived: dict[tuple[int, ...], Derived] = {}
 
 
 _ready = _Ready()
@@ -41,11 +43,11 @@ _ready = _Ready()
 
 @dataclass(frozen=True)
 class _Machine:
-    """What runs of one machine share: the equations' structure, their numbers, and the energies' coefficients."""
+    """What runs of one machine share: the equations' structure and numbers, and those of tips and energies."""
 
     structure: tuple[int, ...]
     parameters: Array
-    form: RotorForm
+    derived: Numbers
     moving: tuple[int, ...]
     is_smooth: bool
 
@@ -63,15 +65,11 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
     machines = _machines(scenes)
     block = ensemble_samples.empty_block(scenes)
     for numbers in _groups(machines):
-        group, first = [scenes[i] for i in numbers], machines[numbers[0]]
-        if not first.is_smooth:
-            for i in numbers:
-                ensemble_samples.put_single(block, i, _single(scenes[i], tolerance))
+        if machines[numbers[0]].is_smooth:
+            _propagate(block, [(i, scenes[i], machines[i]) for i in numbers], tolerance)
             continue
-        parameters = np.stack([machines[i].parameters for i in numbers], axis=1)
-        states, words = _propagate(group, first, parameters, tolerance)
-        forms = [machines[i].form for i in numbers]
-        ensemble_samples.put_states(block, numbers, group, forms, first.moving, states, words)
+        for i in numbers:
+            ensemble_samples.put_single(block, i, _single(scenes[i], tolerance))
     return block
 
 
@@ -104,7 +102,7 @@ def _machine(scene: Scene) -> _Machine:
     return _Machine(
         (*parameters.structure, equations),
         array_of(parameters.values, quad=False),
-        rotor_form(scene),
+        numbers_of(scene),
         (0, *(1 + i for i in form.moving)),
         scene.has_constant_torque,
     )
@@ -114,7 +112,8 @@ def _groups(machines: Sequence[_Machine]) -> Iterator[list[int]]:
     """Numbers of the runs of each structure, in order."""
     found: dict[tuple[object, ...], list[int]] = {}
     for i, machine in enumerate(machines):
-        found.setdefault((machine.structure, machine.moving, machine.is_smooth), []).append(i)
+        key = (machine.structure, machine.derived.structure, machine.moving, machine.is_smooth)
+        found.setdefault(key, []).append(i)
     yield from found.values()
 
 
@@ -123,66 +122,101 @@ def _single(scene: Scene, tolerance: float) -> Any:
     return solve("lagrange/taylor", taylor, scene, {"tolerance": tolerance})
 
 
-def _compiled(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
+def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
     """The integrator of this structure, compiled once per machine (engine's cache on disk), made once per thread."""
     cache = _ready.integrators
     if (structure, tolerance) not in cache:
         engine = heyoka()
         system = build_system(example)
-        compact = len(example.blades) > _UNROLLED_BLADES
         state = np.zeros((len(system.equations), lanes()))
         with one_at_a_time("rotor_mbs-heyoka"):
             cache[structure, tolerance] = engine.taylor_adaptive_batch(
-                system.equations, state=state, tol=tolerance, compact_mode=compact, high_accuracy=True
+                system.equations, state=state, tol=tolerance, compact_mode=_is_compact(example), high_accuracy=True
             )
     return cache[structure, tolerance]
 
 
-def _propagate(
-    scenes: Sequence[Scene], machine: _Machine, parameters: Array, tolerance: float
-) -> tuple[Array, list[Integration]]:
-    """States (variables, runs, samples), NaN after a run broke off, and the engine's word on each run."""
-    integrator = _compiled(machine.structure, tolerance, _without_start(scenes[0]))
-    initial = _initial(scenes, machine.moving, integrator.state.shape[0])
-    times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), scenes[0].samples)
-    states = np.empty((len(initial), len(scenes), scenes[0].samples))
-    words: list[Integration] = []
+def _derived(structure: tuple[int, ...], example: Scene) -> Derived:
+    """The same for tips and energies."""
+    cache = _ready.derived
+    if structure not in cache:
+        with one_at_a_time("rotor_mbs-heyoka"):
+            cache[structure] = Derived(example, compact=_is_compact(example))
+    return cache[structure]
+
+
+def _is_compact(scene: Scene) -> bool:
+    return len(scene.blades) > _UNROLLED_BLADES
+
+
+@dataclass(frozen=True)
+class _Starts:
+    """What differs between the runs of a group, a column for each.
+
+    initial      (variables, k) state; times: (samples, k) s
+    parameters   (parameters, k) of the equations; numbers: (parameters, k) of tips and energies
+    """
+
+    initial: Array
+    times: Array
+    parameters: Array
+    numbers: Array
+
+
+def _propagate(block: Block, group: Sequence[tuple[int, Scene, _Machine]], tolerance: float) -> None:
+    """Runs of one structure into the block: (place in it, scene, machine) of each."""
+    _, scene, machine = group[0]
+    example = _without_start(scene)
+    integrator = _integrator(machine.structure, tolerance, example)
+    derived = _derived(machine.derived.structure, example)
+    starts = _starts([(scene, machine) for _, scene, machine in group], integrator.state.shape[0])
     width = integrator.state.shape[1]
-    for first in range(0, len(scenes), width):
-        runs = list(range(first, min(first + width, len(scenes))))
-        told = _batch(integrator, times, parameters, initial, runs, states)
-        if any(word.message for word in told):
+    for first in range(0, len(group), width):
+        columns = list(range(first, min(first + width, len(group))))
+        states, words = _batch(integrator, starts, columns)
+        done = [(columns, states, words)]
+        if any(word.message for word in words):
             # One lane's failure ends all lanes: each runs again with itself alone in every lane.
-            told = [_batch(integrator, times, parameters, initial, [run], states)[0] for run in runs]
-        words += told
+            done = [([column], *_batch(integrator, starts, [column])) for column in columns]
+        for those, states, words in done:
+            found = derived(states, starts.numbers[:, _padded(those, width)])
+            for lane, (column, word) in enumerate(zip(those, words, strict=True)):
+                place, scene, _ = group[column]
+                ensemble_samples.put_lane(block, place, scene, machine.moving, states[:, lane], found[:, lane], word)
+
+
+def _padded(columns: Sequence[int], width: int) -> list[int]:
+    """As many as there are lanes; spare ones repeat the last."""
+    return [*columns, *[columns[-1]] * (width - len(columns))]
+
+
+def _batch(integrator: Any, starts: _Starts, columns: Sequence[int]) -> tuple[Array, list[Integration]]:
+    """One integration of up to as many runs as there are lanes: states (variables, lanes, samples), NaN after a run
+    broke off, and the engine's word on each run."""
+    width = integrator.state.shape[1]
+    padded = _padded(columns, width)
+    integrator.set_time(np.zeros(width))
+    integrator.state[:] = starts.initial[:, padded]
+    set_parameters(integrator, starts.parameters[:, padded])
+    states = np.ascontiguousarray(integrator.propagate_grid(starts.times[:, padded])[1].transpose(1, 2, 0))
+    if not np.isfinite(states).all():
+        states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
+    words = []
+    for result in integrator.propagate_res[: len(columns)]:
+        message = failure(result[0])
+        words.append(Integration(not message, message, 0.0, int(result[3])))
     return states, words
 
 
-def _batch(
-    integrator: Any, times: Array, parameters: Array, initial: Array, runs: Sequence[int], states: Array
-) -> list[Integration]:
-    """One integration of up to as many runs as there are lanes, into `states`; spare lanes repeat the last one."""
-    width = integrator.state.shape[1]
-    padded = [*runs, *[runs[-1]] * (width - len(runs))]
-    integrator.set_time(np.zeros(width))
-    integrator.state[:] = initial[:, padded]
-    set_parameters(integrator, parameters[:, padded])
-    found = integrator.propagate_grid(times[:, padded])[1]
-    filled = states[:, runs[0] : runs[-1] + 1]
-    filled[:] = found.transpose(1, 2, 0)[:, : len(runs)]
-    if not np.isfinite(filled).all():
-        broken = np.maximum.accumulate(~np.isfinite(filled).all(axis=0), axis=1)
-        filled[:, broken] = np.nan
-    words = []
-    for result in integrator.propagate_res[: len(runs)]:
-        message = failure(result[0])
-        words.append(Integration(not message, message, 0.0, int(result[3])))
-    return words
-
-
-def _initial(scenes: Sequence[Scene], moving: tuple[int, ...], variables: int) -> Array:
-    columns = list(moving)
-    initial = np.zeros((variables, len(scenes)))
-    initial[: len(columns)] = np.array([scene.initial_angles for scene in scenes]).T[columns]
-    initial[len(columns) : 2 * len(columns)] = np.array([scene.initial_rates for scene in scenes]).T[columns]
-    return initial
+def _starts(runs: Sequence[tuple[Scene, _Machine]], variables: int) -> _Starts:
+    scenes, machines = [scene for scene, _ in runs], [machine for _, machine in runs]
+    moving = list(machines[0].moving)
+    held = [i for i in range(len(scenes[0].initial_angles)) if i not in moving]
+    angles = np.array([scene.initial_angles for scene in scenes]).T
+    rates = np.array([scene.initial_rates for scene in scenes]).T
+    initial = np.zeros((variables, len(runs)))
+    initial[: 2 * len(moving)] = np.concatenate([angles[moving], rates[moving]])
+    times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), scenes[0].samples)
+    numbers = np.stack([machine.derived.values for machine in machines], axis=1)
+    parameters = np.stack([machine.parameters for machine in machines], axis=1)
+    return _Starts(initial, times, parameters, np.concatenate([numbers, angles[held]]))

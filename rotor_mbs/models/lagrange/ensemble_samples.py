@@ -1,21 +1,14 @@
-"""From states of many runs to their samples, all runs at once: angles, tips, energies. Knows no integrator."""
+"""Samples of many runs in arrays of their own, and a run's way into them. Knows no integrator and no equation."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.parameters import BladeForm, RotorForm
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration, Run, Trajectory
-
-_AT_ONCE = 1 << 13  # samples
 
 
 @dataclass
@@ -72,127 +65,38 @@ def put_single(block: Block, i: int, run: Run) -> None:
     block.words[i], block.samples[i] = run.integration, n
 
 
-def put_states(
-    block: Block,
-    numbers: Sequence[int],
-    scenes: Sequence[Scene],
-    forms: Sequence[RotorForm],
-    moving: tuple[int, ...],
-    states: Array,
-    words: Sequence[Integration],
+def put_lane(
+    block: Block, i: int, scene: Scene, moving: tuple[int, ...], states: Array, found: Array, word: Integration
 ) -> None:
-    """Runs of one structure, as the runs `numbers` of the block. states: (variables, runs, samples).
+    """A run as run i of the block.
 
-    A few at a time: what is worked on then stays in the processor's cache.
+    states   (variables, samples): of the equations, NaN after it broke off
+    found    (rows, samples): each blade's tip, x y z in m; then kinetic and potential energy in J, where asked for
     """
-    at_once = max(_AT_ONCE // states.shape[2], 1)
-    for first in range(0, len(numbers), at_once):
-        part = slice(first, first + at_once)
-        _put_states(block, numbers[part], scenes[part], forms[part], moving, states[:, part], words[part])
-
-
-def _put_states(
-    block: Block,
-    numbers: Sequence[int],
-    scenes: Sequence[Scene],
-    forms: Sequence[RotorForm],
-    moving: tuple[int, ...],
-    states: Array,
-    words: Sequence[Integration],
-) -> None:
-    columns, count = list(moving), len(moving)
-    starts = np.array([scene.initial_angles for scene in scenes]).T
+    count, columns = len(moving), list(moving)
     broken = np.isnan(states[0])
-    trigonometry = _Trigonometry()
-    angles, rates = [], []
-    for i in range(starts.shape[0]):
-        k = columns.index(i) if i in columns else None
-        angles.append(_held(starts[i], broken) if k is None else states[k])
-        rates.append(_held(0.0 * starts[i], broken) if k is None else states[count + k])
-        block.angles[numbers, :, i], block.rates[numbers, :, i] = angles[i], rates[i]
+    if len(columns) < block.angles.shape[2]:  # pitches that are held
+        block.angles[i], block.rates[i] = scene.initial_angles, 0.0
+    block.angles[i][:, columns] = states[:count].T
+    block.rates[i][:, columns] = states[count : 2 * count].T
+    rows = 0
     if block.tip is not None:
-        for blade, path in _tips(scenes, angles, trigonometry):
-            for axis in range(3):
-                block.tip[numbers, :, blade, axis] = path[axis]
+        tip = block.tip[i].reshape(len(broken), -1)
+        rows = tip.shape[1]
+        tip[:] = found[:rows].T
     if block.kinetic_energy is not None and block.potential_energy is not None and block.work is not None:
-        q, qd = [angles[i] for i in columns], [rates[i] for i in columns]
-        with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200, as in `samples`
-            kinetic, potential = closed_form.energies(q, qd, _stacked(forms), trigonometry.sin, trigonometry.cos)
-        block.kinetic_energy[numbers], block.potential_energy[numbers] = kinetic, potential
+        block.kinetic_energy[i], block.potential_energy[i] = found[rows], found[rows + 1]
         has_work = len(states) > 2 * count
-        block.work[numbers] = states[2 * count] if has_work else _constant_work(scenes, angles[0])
-    samples = states.shape[2] - broken.sum(axis=1)
-    for i, word, rows in zip(numbers, words, samples.tolist(), strict=True):
-        word.time_reached = float(block.time[i, max(rows - 1, 0)])
-        block.words[i], block.samples[i] = word, rows
+        block.work[i] = states[2 * count] if has_work else _constant_work(scene, states[0])
+    samples = len(broken) - int(broken.sum())
+    for values in (block.angles, block.rates, block.tip):
+        if samples < len(broken) and values is not None:  # what is held does not feel that the run broke off
+            values[i, samples:] = np.nan
+    word.time_reached = float(block.time[i, max(samples - 1, 0)])
+    block.words[i], block.samples[i] = word, samples
 
 
-class _Trigonometry:
-    """Sines and cosines, each found once for an array: energies and tips ask for the same ones."""
-
-    def __init__(self) -> None:
-        self._sines: dict[int, tuple[Array, Array]] = {}
-        self._cosines: dict[int, tuple[Array, Array]] = {}
-
-    def turned(self, angle: Array, phase: float) -> Array:
-        """angle + phase, whose sine and cosine follow from those of the angle."""
-        s, c, turned = self.sin(angle), self.cos(angle), angle + phase
-        sin_phase, cos_phase = math.sin(phase), math.cos(phase)
-        self._sines[id(turned)] = turned, s * cos_phase + c * sin_phase
-        self._cosines[id(turned)] = turned, c * cos_phase - s * sin_phase
-        return turned
-
-    def sin(self, angle: Array) -> Array:
-        return self._found(self._sines, np.sin, angle)
-
-    def cos(self, angle: Array) -> Array:
-        return self._found(self._cosines, np.cos, angle)
-
-    @staticmethod
-    def _found(known: dict[int, tuple[Array, Array]], function: np.ufunc, angle: Array) -> Array:
-        if id(angle) not in known:
-            known[id(angle)] = angle, function(angle)  # held, so that its number stays its own
-        return known[id(angle)][1]
-
-
-def _held(values: Array, broken: NDArray[np.bool_]) -> Array:
-    """(runs, samples) of a pitch that does not move; NaN after a run broke off."""
-    return np.where(broken, np.nan, values[:, None])
-
-
-def _constant_work(scenes: Sequence[Scene], angle: Array) -> Array:
+def _constant_work(scene: Scene, angle: Array) -> Array:
     """Of a constant torque: τ·(q2 - q2(0)), exact."""
-    torque = np.array([scene.torque_at(0.0) for scene in scenes])
-    work: Array = torque[:, None] * (angle - angle[:, :1])
+    work: Array = scene.torque_at(0.0) * (angle - angle[0])
     return work
-
-
-def _tips(
-    scenes: Sequence[Scene], angles: Sequence[Array], trigonometry: _Trigonometry
-) -> Iterator[tuple[int, tuple[Any, Any, Any]]]:
-    """(blade, its tip's path (x, y, z))."""
-    sin, cos = trigonometry.sin, trigonometry.cos
-    for i, phase in enumerate(scenes[0].phases):
-        point: Any = [np.array([scene.blades[i].tip[axis] for scene in scenes])[:, None] for axis in range(3)]
-        yield i, closed_form.point_path(trigonometry.turned(angles[0], phase), angles[1 + i], point, sin, cos)
-
-
-def _stacked(forms: Sequence[RotorForm]) -> RotorForm:
-    """One form whose numbers are (runs, 1): the closed form then works on all runs at once."""
-    first = forms[0]
-    if all(form is first for form in forms):
-        return first
-    blades = tuple(
-        BladeForm(*(_column([getattr(form.blades[b], f.name) for form in forms]) for f in fields(BladeForm)))
-        for b in range(len(first.blades))
-    )
-    held = tuple(
-        (_column([form.held[h][0] for form in forms]), first.held[h][1], first.held[h][2])
-        for h in range(len(first.held))
-    )
-    inertia = _column([form.inertia for form in forms])
-    return RotorForm(blades, first.moving, held, inertia, first.shaft_damping)
-
-
-def _column(values: Sequence[float]) -> Array:
-    return np.array(values)[:, None]
