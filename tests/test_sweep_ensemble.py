@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import general, paper
 
-from rotor_mbs.cli.sweep_work import Chunk, perform
+from rotor_mbs.cli.sweep_work import Chunk, perform, rows_of
 from rotor_mbs.models.base import solve
 from rotor_mbs.models.lagrange import taylor
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
@@ -45,6 +45,34 @@ def _machines(count: int) -> list[Scene]:
     ]
 
 
+def _tips(count: int) -> list[Scene]:
+    """Tips that differ by blade and by run, one of them on the pitch axis."""
+    base = general(duration=2.0, samples=41)
+    return [
+        replace(
+            base, blades=tuple(replace(blade, tip=(0.1 * i * k, 0.0, 11.0 + i)) for k, blade in enumerate(base.blades))
+        )
+        for i in range(count)
+    ]
+
+
+def _many_blades(blades: int, count: int) -> list[Scene]:
+    """More than code is unrolled for."""
+    base = general(duration=2.0, samples=41)
+    angles, rates = 0.1 * np.arange(blades + 1), 0.2 * np.arange(blades + 1)
+    return [
+        replace(
+            base,
+            blades=tuple(replace(base.blades[k % 3], mass=900.0 + 10.0 * k) for k in range(blades)),
+            initial_angles=tuple((angles + 0.01 * i).tolist()),
+            initial_rates=tuple(rates.tolist()),
+            bearing_stiffness=(2e4,) * blades,
+            bearing_damping=(),
+        )
+        for i in range(count)
+    ]
+
+
 @pytest.mark.parametrize(
     "scenes",
     [
@@ -53,8 +81,11 @@ def _machines(count: int) -> list[Scene]:
         _machines(3),
         [replace(scene, bearing_damping=(10.0, 20.0, 30.0), shaft_damping=5.0) for scene in _machines(2)],
         [replace(scene, rotor_torque=((0.0, 0.0), (1.0, 50.0))) for scene in _machines(2)],
+        _tips(LANES + 1),
+        _many_blades(6, 2),
+        [replace(scene, gravity=0.0, bearing_stiffness=()) for scene in _machines(2)],
     ],
-    ids=["starts", "held pitch", "machines", "dampers", "torque over time"],
+    ids=["starts", "held pitch", "machines", "dampers", "torque over time", "tips", "six blades", "free"],
 )
 def test_runs_side_by_side_are_the_runs_one_by_one(scenes: list[Scene]) -> None:
     block = solve_many(scenes, _EPS)
@@ -80,6 +111,75 @@ def test_a_run_does_not_depend_on_its_neighbours() -> None:
         assert alone.words[0].steps == block.words[i].steps
 
 
+@pytest.mark.parametrize("outputs", [("angles",), ("angles", "tip"), ("angles", "energy")])
+def test_what_is_not_asked_for_is_not_made(outputs: tuple[str, ...]) -> None:
+    scenes = [replace(scene, outputs=outputs) for scene in _perturbed(paper("fig11", duration=1.0, samples=11), 2)]
+    block = solve_many(scenes, _EPS)
+    assert (block.tip is not None) == ("tip" in outputs)
+    assert (block.kinetic_energy is not None) == ("energy" in outputs)
+    assert all(word.success for word in block.words)
+
+
+def test_many_samples_are_evaluated_in_pieces() -> None:
+    scene = paper("fig11", duration=1.0, samples=2501)
+    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+    assert block.tip is not None
+    np.testing.assert_allclose(block.tip[0], single.trajectory.tip, rtol=0.0, atol=1e-10)
+
+
+# Of one scene file each: what it changes in fig11's or fig03's, the varied keys, and a row of values for each run.
+_STARTS = [[1.0 + 0.1 * i] for i in range(2 * LANES + 1)]
+_TO_SINGULARITY = [[0.5 * i] for i in range(2 * LANES + 1)]
+_CHUNKED = {
+    "starts": ({}, ["initial.angles[1]"], _STARTS),
+    "at rest": ({"gravity": 0.0, "rates": [0, 0, 0, 0]}, ["initial.angles[1]"], _STARTS),
+    "some break off": ({"blades": 1, "angles": [1.0, 1.2], "rates": [0, 0]}, ["initial.rates[1]"], _TO_SINGULARITY),
+    "some break off, no gravity": (
+        {"blades": 1, "angles": [1.0, 1.2], "rates": [0, 0], "gravity": 0.0},
+        ["initial.rates[1]"],
+        _TO_SINGULARITY,
+    ),
+    "a rotor turned by 2e14": ({}, ["initial.angles[0]"], [[0.1], [0.2], [2e14], [0.3], [0.4]]),
+    "tips and masses": ({}, ["blade.tip[0]", "blade.mass"], [[0.1 * i, 1e4 + i] for i in range(LANES + 2)]),
+}
+
+
+@pytest.mark.parametrize(("changes", "keys", "values"), _CHUNKED.values(), ids=list(_CHUNKED))
+def test_any_chunks_give_the_same_bytes(changes: dict[str, object], keys: list[str], values: list[list[float]]) -> None:
+    blade = {"mass": 15000.0, "centre_of_mass": [0.085, 0.0, 15.42], "tip": [0.085, 0.0, 33.38]}
+    tables = {
+        "title": "t",
+        "blades": changes.get("blades", 3),
+        "gravity": changes.get("gravity", 9.8),
+        "duration": 2.0,
+        "samples": 62,
+        "outputs": ["angles", "rates", "tip", "energy"],
+        "blade": blade,
+        "initial": {
+            "angles": changes.get("angles", [0.5, 0.8, 0.5, 1.6]),
+            "rates": changes.get("rates", [0.3, 0, 0, 0]),
+        },
+    }
+    variants = Variants("t", tables, keys)
+    row = row_type(variants.scene(values[0]), ("angles", "rates", "tip", "energy"), "float64")
+    whole = Chunk(variants, "lagrange/taylor", {}, row, 0, np.array(values), 60.0)
+    expected = rows_of(whole)
+    for size in (1, LANES - 1, LANES):
+        for start in range(0, len(values), size):
+            part = rows_of(whole.part(start, min(start + size, len(values))))
+            for name, found in part.items():
+                assert found.tobytes() == expected[name][start : start + size].tobytes(), (name, start, size)
+
+
+def test_a_run_that_fails_at_once_has_its_start() -> None:
+    scene = replace(
+        paper("fig03", duration=1.0, samples=11), initial_angles=(1.0, -np.pi / 2), initial_rates=(0.0, 3.0)
+    )
+    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+    assert block.samples == [1] == [len(single.trajectory.time)]
+    np.testing.assert_array_equal(block.angles[0, 0], scene.initial_angles)
+
+
 def _towards_the_singularity(count: int) -> list[Scene]:
     """One point-mass blade on a massless hub: there is no motion past ±π/2 of pitch; at rest it stays away."""
     base = paper("fig03", duration=3.0, samples=301)
@@ -87,8 +187,9 @@ def _towards_the_singularity(count: int) -> list[Scene]:
     return [still, *[replace(base, initial_angles=(1.0, 1.2), initial_rates=(0.0, 1.0 + i)) for i in range(count)]]
 
 
-def test_a_run_that_breaks_off_ends_alone() -> None:
-    scenes = _towards_the_singularity(2)
+@pytest.mark.parametrize("gravity", [9.8, 0.0])
+def test_a_run_that_breaks_off_ends_alone(gravity: float) -> None:
+    scenes = [replace(scene, gravity=gravity) for scene in _towards_the_singularity(2)]
     block = solve_many(scenes, _EPS)
     assert [word.success for word in block.words] == [True, False, False]
     assert block.samples[0] == 301
@@ -96,7 +197,8 @@ def test_a_run_that_breaks_off_ends_alone() -> None:
         n = block.samples[i]
         assert 1 < n < 301
         assert np.isfinite(block.angles[i, :n]).all()
-        assert np.isnan(block.angles[i, n:]).all()
+        for name in _NAMES:
+            assert np.isnan(getattr(block, name)[i, n:]).all(), name
         assert block.words[i].time_reached == pytest.approx(3.0 * (n - 1) / 300)
         single = solve("lagrange/taylor", taylor, scenes[i], {"tolerance": _EPS}).trajectory
         assert abs(len(single.time) - n) <= 1

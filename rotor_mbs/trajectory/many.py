@@ -21,7 +21,7 @@ _CLEAR_SHARE = 1e-6
 
 def largest(values: Array) -> Array:
     """(k,) of (k, n): the largest size of each row; samples that are not finite do not count."""
-    found: Array = np.maximum(values.max(axis=1), -values.min(axis=1))
+    found: Array = np.abs(np.maximum(values.max(axis=1), -values.min(axis=1)))  # of zeros: not -0
     if not np.isfinite(found).all():
         sizes = np.abs(values)
         found = sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))

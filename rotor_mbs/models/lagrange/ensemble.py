@@ -17,14 +17,15 @@ import numpy as np
 from rotor_mbs.models.base import solve
 from rotor_mbs.models.lagrange import ensemble_samples, taylor
 from rotor_mbs.models.lagrange.compile_lock import one_at_a_time
-from rotor_mbs.models.lagrange.derived import Derived, Numbers, numbers_of
+from rotor_mbs.models.lagrange.derived import Derived, equation_numbers, tip_numbers
 from rotor_mbs.models.lagrange.ensemble_samples import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.lagrange.system import build_system, set_parameters
-from rotor_mbs.models.lagrange.torque import stretches
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration
+
+# rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
+_HUGE = 1e13
 
 # Unrolled code is fastest, but its compile time grows with the number of blades (and with the lanes).
 _UNROLLED_BLADES = 4
@@ -43,11 +44,16 @@ _ready = _Ready()
 
 @dataclass(frozen=True)
 class _Machine:
-    """What runs of one machine share: the equations' structure and numbers, and those of tips and energies."""
+    """What runs of one machine share.
 
-    structure: tuple[int, ...]
-    parameters: Array
-    derived: Numbers
+    numbers     (parameters,) of the equations, then of the tips
+    equations, derived   structures: machines that agree in them share compiled code
+    moving      columns of the angles that move
+    """
+
+    numbers: Array
+    equations: tuple[int, ...]
+    derived: tuple[int, ...]
     moving: tuple[int, ...]
     is_smooth: bool
 
@@ -94,15 +100,14 @@ def _without_start(scene: Scene) -> Scene:
 @functools.lru_cache(maxsize=512)
 def _machine(scene: Scene) -> _Machine:
     parameters = Parameters()
-    form = rotor_form(scene, parameters)
-    torque = stretches(scene)[0].offset
-    parameters(torque)
+    form = equation_numbers(scene, parameters)
     has_work = scene.wants("energy") and scene.has_damping
-    equations = 2 * (1 + len(form.blades)) + has_work
+    equations = (*parameters.structure, 2 * (1 + len(form.blades)) + has_work)
+    tip_numbers(scene, parameters)
     return _Machine(
-        (*parameters.structure, equations),
         array_of(parameters.values, quad=False),
-        numbers_of(scene),
+        equations,
+        (*parameters.structure, scene.wants("tip"), scene.wants("energy")),
         (0, *(1 + i for i in form.moving)),
         scene.has_constant_torque,
     )
@@ -112,7 +117,7 @@ def _groups(machines: Sequence[_Machine]) -> Iterator[list[int]]:
     """Numbers of the runs of each structure, in order."""
     found: dict[tuple[object, ...], list[int]] = {}
     for i, machine in enumerate(machines):
-        key = (machine.structure, machine.derived.structure, machine.moving, machine.is_smooth)
+        key = (machine.equations, machine.derived, machine.moving, machine.is_smooth)
         found.setdefault(key, []).append(i)
     yield from found.values()
 
@@ -153,70 +158,83 @@ def _is_compact(scene: Scene) -> bool:
 class _Starts:
     """What differs between the runs of a group, a column for each.
 
-    initial      (variables, k) state; times: (samples, k) s
-    parameters   (parameters, k) of the equations; numbers: (parameters, k) of tips and energies
+    initial   (variables, k) state; times: (samples, k) s
+    numbers   (parameters, k) of the machine, then the pitches that are held
     """
 
     initial: Array
     times: Array
-    parameters: Array
     numbers: Array
 
 
 def _propagate(block: Block, group: Sequence[tuple[int, Scene, _Machine]], tolerance: float) -> None:
     """Runs of one structure into the block: (place in it, scene, machine) of each."""
-    _, scene, machine = group[0]
-    example = _without_start(scene)
-    integrator = _integrator(machine.structure, tolerance, example)
-    derived = _derived(machine.derived.structure, example)
-    starts = _starts([(scene, machine) for _, scene, machine in group], integrator.state.shape[0])
+    _, first, machine = group[0]
+    example = _without_start(first)
+    integrator = _integrator(machine.equations, tolerance, example)
+    derived = _derived(machine.derived, example)
     width = integrator.state.shape[1]
-    for first in range(0, len(group), width):
-        columns = list(range(first, min(first + width, len(group))))
-        states, words = _batch(integrator, starts, columns)
-        done = [(columns, states, words)]
-        if any(word.message for word in words):
+    starts = _starts(group, integrator.state.shape[0])
+    for i in range(0, len(group), width):
+        columns = list(range(i, min(i + width, len(group))))
+        batches = [_batch(integrator, starts, columns)]
+        if not batches[0].is_tame:
             # One lane's failure ends all lanes: each runs again with itself alone in every lane.
-            done = [([column], *_batch(integrator, starts, [column])) for column in columns]
-        for those, states, words in done:
-            found = derived(states, starts.numbers[:, _padded(those, width)])
-            for lane, (column, word) in enumerate(zip(those, words, strict=True)):
-                place, scene, _ = group[column]
-                ensemble_samples.put_lane(block, place, scene, machine.moving, states[:, lane], found[:, lane], word)
+            batches = [_batch(integrator, starts, [column]) for column in columns]
+        for batch in batches:
+            found = derived(batch.states, starts.numbers[:, batch.columns])
+            for lane, word in enumerate(batch.words):
+                place, scene, _ = group[batch.columns[lane]]
+                states = batch.states[:, lane]
+                ensemble_samples.put_lane(block, place, scene, machine.moving, states, found[:, lane], word)
 
 
-def _padded(columns: Sequence[int], width: int) -> list[int]:
-    """As many as there are lanes; spare ones repeat the last."""
-    return [*columns, *[columns[-1]] * (width - len(columns))]
+@dataclass(frozen=True)
+class _Batch:
+    """One integration.
+
+    columns   of the runs, one per lane; spare lanes repeat the last
+    states    (variables, lanes, samples), NaN after a run broke off
+    words     the engine's word on each run
+    is_tame   whether no lane can have had an effect on another
+    """
+
+    columns: list[int]
+    states: Array
+    words: list[Integration]
+    is_tame: bool
 
 
-def _batch(integrator: Any, starts: _Starts, columns: Sequence[int]) -> tuple[Array, list[Integration]]:
-    """One integration of up to as many runs as there are lanes: states (variables, lanes, samples), NaN after a run
-    broke off, and the engine's word on each run."""
+def _batch(integrator: Any, starts: _Starts, runs: Sequence[int]) -> _Batch:
+    """Up to as many runs as there are lanes."""
     width = integrator.state.shape[1]
-    padded = _padded(columns, width)
+    columns = [*runs, *[runs[-1]] * (width - len(runs))]
+    initial = starts.initial[:, columns]
     integrator.set_time(np.zeros(width))
-    integrator.state[:] = starts.initial[:, padded]
-    set_parameters(integrator, starts.parameters[:, padded])
-    states = np.ascontiguousarray(integrator.propagate_grid(starts.times[:, padded])[1].transpose(1, 2, 0))
-    if not np.isfinite(states).all():
+    integrator.state[:] = initial
+    set_parameters(integrator, starts.numbers[:, columns])
+    states = np.ascontiguousarray(integrator.propagate_grid(starts.times[:, columns])[1].transpose(1, 2, 0))
+    states[:, :, 0] = initial  # which a run that fails in its first step has, too
+    angles = states[: len(states) // 2]
+    is_tame = bool(np.isfinite(states).all() and max(angles.max(), -angles.min()) < _HUGE)
+    if not is_tame:
         states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
     words = []
-    for result in integrator.propagate_res[: len(columns)]:
+    for result in integrator.propagate_res[: len(runs)]:
         message = failure(result[0])
         words.append(Integration(not message, message, 0.0, int(result[3])))
-    return states, words
+        is_tame = is_tame and not message
+    return _Batch(columns, states, words, is_tame)
 
 
-def _starts(runs: Sequence[tuple[Scene, _Machine]], variables: int) -> _Starts:
-    scenes, machines = [scene for scene, _ in runs], [machine for _, machine in runs]
+def _starts(group: Sequence[tuple[int, Scene, _Machine]], variables: int) -> _Starts:
+    scenes, machines = [scene for _, scene, _ in group], [machine for _, _, machine in group]
     moving = list(machines[0].moving)
     held = [i for i in range(len(scenes[0].initial_angles)) if i not in moving]
     angles = np.array([scene.initial_angles for scene in scenes]).T
     rates = np.array([scene.initial_rates for scene in scenes]).T
-    initial = np.zeros((variables, len(runs)))
+    initial = np.zeros((variables, len(group)))
     initial[: 2 * len(moving)] = np.concatenate([angles[moving], rates[moving]])
     times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), scenes[0].samples)
-    numbers = np.stack([machine.derived.values for machine in machines], axis=1)
-    parameters = np.stack([machine.parameters for machine in machines], axis=1)
-    return _Starts(initial, times, parameters, np.concatenate([numbers, angles[held]]))
+    numbers = np.stack([machine.numbers for machine in machines], axis=1)
+    return _Starts(initial, times, np.concatenate([numbers, angles[held]]))

@@ -10,6 +10,8 @@ import numpy as np
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration, Run, Trajectory
 
+_COLUMNS = ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work")
+
 
 @dataclass
 class Block:
@@ -58,7 +60,7 @@ def empty_block(scenes: Sequence[Scene]) -> Block:
 def put_single(block: Block, i: int, run: Run) -> None:
     """A run of its own as run i of the block."""
     n = len(run.trajectory.time)
-    for name in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
+    for name in _COLUMNS:
         values, target = getattr(run.trajectory, name), getattr(block, name)
         if target is not None and values is not None:
             target[i, :n], target[i, n:] = values, np.nan
@@ -89,9 +91,11 @@ def put_lane(
         has_work = len(states) > 2 * count
         block.work[i] = states[2 * count] if has_work else _constant_work(scene, states[0])
     samples = len(broken) - int(broken.sum())
-    for values in (block.angles, block.rates, block.tip):
-        if samples < len(broken) and values is not None:  # what is held does not feel that the run broke off
-            values[i, samples:] = np.nan
+    if samples < len(broken):  # some numbers do not feel it: what is held, or a term that vanishes
+        for name in _COLUMNS:
+            values = getattr(block, name)
+            if values is not None:
+                values[i, samples:] = np.nan
     word.time_reached = float(block.time[i, max(samples - 1, 0)])
     block.words[i], block.samples[i] = word, samples
 

@@ -54,17 +54,19 @@ class Parameters:
     def __init__(self) -> None:
         self.values: list[Fraction] = []
         self.structure: list[int] = []
+        self._known: dict[Fraction, int] = {}
 
     def __call__(self, value: Fraction) -> Any:
         if value == 0:
             self.structure.append(-1)
             return 0.0
-        if value not in self.values:
+        if value not in self._known:
+            self._known[value] = len(self.values)
             self.values.append(value)
-        return self._parameter(self.values.index(value))
+        return self._parameter(self._known[value])
 
     def own(self, value: Fraction) -> Any:
-        """A parameter of its own, even when zero or equal to another: for what changes during a run."""
+        """A parameter of its own, even when zero or equal to another: for what changes during a run, or with it."""
         self.values.append(value)
         return self._parameter(len(self.values) - 1)
 
