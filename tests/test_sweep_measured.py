@@ -163,7 +163,7 @@ def test_a_sweep_costs_a_fifth_of_the_bare_integrator_one_by_one(rates: Rates) -
     assert rates["loop over bare heyoka, 201 samples"][0] > 5.0 * rates["sweep, 201 samples"][1]
 
 
-@pytest.mark.xfail(reason="0.6 s of it are start and end: 4.1 times at 201 samples; 690 MB to write: 3.6 at 1,001")
+@pytest.mark.xfail(reason="0.6 s of it are start and end: 4.0 times at 201 samples; 690 MB to write: 3.6 at 1,001")
 @pytest.mark.parametrize("samples", _SAMPLES)
 def test_so_does_the_whole_command(rates: Rates, samples: int) -> None:
     """The same with the sweep's start and end, and with every sample of the figure."""

@@ -142,11 +142,10 @@ def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) ->
 
 
 def _derived(structure: tuple[int, ...], example: Scene) -> Derived:
-    """The same for tips and energies."""
+    """The same for tips and energies, which compile so fast that nobody need wait for another process."""
     cache = _ready.derived
     if structure not in cache:
-        with one_at_a_time("rotor_mbs-heyoka"):
-            cache[structure] = Derived(example, compact=_is_compact(example))
+        cache[structure] = Derived(example, compact=_is_compact(example))
     return cache[structure]
 
 
