@@ -295,6 +295,30 @@ def test_bad_usage_is_one_line_and_status_2_within_ten_seconds(tmp_path: Path, m
     assert time.monotonic() - start < 10.0
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (
+            'methods = ["lagrange/tailor"]',
+            "s.toml:1: methods: unknown method 'lagrange/tailor'; allowed: printed/ode45, ",
+        ),
+        (
+            'methods = ["lagrange/taylor"]\nsettings = { tolerence = 1e-15 }',
+            "s.toml:2: settings.tolerence: is no setting of lagrange/taylor; allowed: tolerance",
+        ),
+    ],
+)
+def test_methods_and_settings_of_the_file_are_told_with_their_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, words: str
+) -> None:
+    path = _file(tmp_path)
+    path.write_text(line + path.read_text().replace('methods = ["lagrange/dop853"]\n', ""))
+    assert main(["sweep", str(path), "-o", str(tmp_path / "o.h5")]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 1
+    assert words in told[0]
+
+
 def test_a_sweep_too_large_by_mistake_is_asked_for_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sweep", str(_file(tmp_path, draws=600_000)), "-o", str(tmp_path / "o.h5")]) == 2
     assert "1,200,000 runs; allowed without --yes" in capsys.readouterr().err

@@ -151,13 +151,24 @@ class Work:
         }
 
 
+def _chosen(sweep: Sweep, methods: Sequence[str]) -> tuple[str, ...]:
+    """Those of the command line, else those of the file. Raises InputError."""
+    if methods:
+        return check_names(methods)
+    try:
+        return check_names(sweep.methods)
+    except InputError as exc:
+        raise InputError([sweep.fault(("methods",), f"methods: {words}") for words in exc.problems]) from exc
+
+
 def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> Work:
     """The runs of part k of n (1, 1 for all). Raises InputError, MethodRefusal where a method cannot do them."""
-    chosen = check_names(methods or sweep.methods)
+    chosen = _chosen(sweep, methods)
     known = {key for method in chosen for key in find_method(method).DEFAULTS}
-    unknown = sorted(set(sweep.settings) - known)
+    unknown = [key for key in sweep.settings if key not in known]
     if unknown:
-        raise InputError(f"settings: {', '.join(unknown)}: no setting of {', '.join(chosen)}; allowed: {sorted(known)}")
+        words = f"is no setting of {', '.join(chosen)}; allowed: {', '.join(sorted(known)) or 'none'}"
+        raise InputError([sweep.fault(("settings", key), f"settings.{key}: {words}") for key in unknown])
     for method in chosen:
         # The fast path's engine refuses nothing, where it is there: this process need not load it.
         if method != ENSEMBLE_METHOD or find_spec("heyoka") is None:

@@ -21,7 +21,7 @@ def open_cluster(address: str) -> Engine:
     try:
         from distributed import Client, KilledWorker
     except ImportError as exc:
-        raise InputError("--engine dask: dask is not installed; pip install 'rotor_mbs[dask]'") from exc
+        raise InputError("--engine dask: dask is not installed; pip install distributed") from exc
     if not _answers(address):
         raise InputError(f"--engine dask:{address}: no dask scheduler answers there; allowed: {ENGINE_FORMS}")
     make: Any = Client

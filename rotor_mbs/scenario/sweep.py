@@ -35,7 +35,7 @@ class Sweep:
     units       of every axis' key
     outputs     what is stored of each run's samples; () for metrics alone
     validation  share of the rows marked for validation, 0 for no mark
-    text        the TOML text it was read from
+    text        the TOML text it was read from; path: of the file, as it is shown
     """
 
     name: str
@@ -52,10 +52,15 @@ class Sweep:
     file_bytes: int
     picture: str | None
     text: str
+    path: str
 
     @property
     def keys(self) -> tuple[str, ...]:
         return tuple(axis.key for axis in self.design.axes)
+
+    def fault(self, key: KeyPath, words: str) -> str:
+        """A line about what the file says at `key`, for an InputError: for faults that the scenes cannot show."""
+        return f"{self.path}:{line_of(find_lines(self.text), key)}: {words}"
 
     def variants(self) -> Variants:
         """From rows to scenes. They always ask for the energy: every run's balance is checked."""
@@ -120,6 +125,7 @@ class _Reader:
             file_bytes=int(table.file_bytes),
             picture=table.picture,
             text=self._text,
+            path=shown_path(self._path),
         )
         return self._with_checked_rows(sweep)
 
