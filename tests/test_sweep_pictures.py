@@ -135,6 +135,7 @@ def test_the_figures_show_what_was_found() -> None:
     text = map_figure(found, "a map")
     assert "kx (rad)" in text
     assert "ky (N)" in text
+    assert "10 times its start" in text
     assert text == map_figure(found, "a map")
 
 

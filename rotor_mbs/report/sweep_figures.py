@@ -43,6 +43,8 @@ def map_figure(found: StabilityMap, title: str) -> str:
                            vmax=np.log10(_MOST_GROWTH), rasterized=True)  # fmt: skip
     if found.unstable.any() and not found.unstable.all():
         axes.contour(found.x, found.y, levels, levels=[np.log10(GROWN)], colors=[_ACCENT], linewidths=1.0)
+        axes.plot([], [], color=_ACCENT, lw=1.0, label=f"{GROWN:g} times its start")
+        axes.legend(loc="upper right")
     axes.grid(visible=False)
     axes.ticklabel_format(style="plain")
     axes.set_ylabel(f"{found.y_key} ({found.y_unit})")
