@@ -12,35 +12,30 @@ import numpy as np
 
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, heyoka
-from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
-from rotor_mbs.models.lagrange.torque import stretches
+from rotor_mbs.models.lagrange.system import equation_numbers
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array
 
 _AT_ONCE = 1024  # samples of a run; bounds what the numbers take, which are needed once for every sample
 
 
-def equation_numbers(scene: Scene, parameters: Parameters) -> RotorForm:
-    """Takes the numbers of a scene's equations of motion into `parameters`, in their order."""
-    form = rotor_form(scene, parameters)
-    parameters(stretches(scene)[0].offset)
-    return form
-
-
 def tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
-    """And those of its tips, which come after them: (blades, 3); [] where no tips are asked for."""
+    """(blades, 3) its tips in m, numbers that come after those of the equations; [] where none are asked for."""
     if not scene.wants("tip"):
         return []
     return [[parameters(Fraction(x)) for x in blade.tip] for blade in scene.blades]
 
 
 class Derived:
-    """The code for scenes with the numbers' structure of `example`."""
+    """The code for scenes with the numbers' structure of `example`. Raises MethodRefusal where heyoka is not installed.
+
+    Source: `closed_form.point_path` and `closed_form.energies`, evaluated in symbols.
+    """
 
     def __init__(self, example: Scene, *, compact: bool) -> None:
         engine = heyoka()
         parameters = Parameters()
-        form = equation_numbers(example, parameters)
+        form, _ = equation_numbers(example, parameters)
         points = tip_numbers(example, parameters)
         count = 1 + len(form.blades)
         symbols = engine.make_vars(*[f"q{i}" for i in range(count)], *[f"w{i}" for i in range(count)])

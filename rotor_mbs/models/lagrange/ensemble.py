@@ -17,10 +17,10 @@ import numpy as np
 from rotor_mbs.models.base import solve
 from rotor_mbs.models.lagrange import ensemble_samples, taylor
 from rotor_mbs.models.lagrange.compile_lock import one_at_a_time
-from rotor_mbs.models.lagrange.derived import Derived, equation_numbers, tip_numbers
+from rotor_mbs.models.lagrange.derived import Derived, tip_numbers
 from rotor_mbs.models.lagrange.ensemble_samples import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.system import build_system, set_parameters
+from rotor_mbs.models.lagrange.system import build_system, equation_numbers, set_parameters
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration
 
@@ -100,7 +100,7 @@ def _without_start(scene: Scene) -> Scene:
 @functools.lru_cache(maxsize=512)
 def _machine(scene: Scene) -> _Machine:
     parameters = Parameters()
-    form = equation_numbers(scene, parameters)
+    form, _ = equation_numbers(scene, parameters)
     has_work = scene.wants("energy") and scene.has_damping
     equations = (*parameters.structure, 2 * (1 + len(form.blades)) + has_work)
     tip_numbers(scene, parameters)

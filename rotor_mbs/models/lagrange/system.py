@@ -13,7 +13,7 @@ import numpy as np
 from rotor_mbs.models import deadline
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
 from rotor_mbs.models.lagrange.torque import Stretch, stretches
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.trajectory.record import Array, Integration
@@ -43,23 +43,27 @@ def build_system(scene: Scene) -> System:
     """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed."""
     engine = heyoka()
     parameters = Parameters()
-    form = rotor_form(scene, parameters)
+    form, torque = equation_numbers(scene, parameters)
     pieces = stretches(scene)
-    changing = len(pieces) > 1
-    has_work = scene.wants("energy") and (changing or scene.has_damping)
+    has_work = scene.wants("energy") and (len(pieces) > 1 or scene.has_damping)
     count = 1 + len(form.blades)
     names = [f"q{i}" for i in range(count)] + [f"w{i}" for i in range(count)]
     symbols = engine.make_vars(*names)
     angles, rates = symbols[:count], symbols[count:]
-    if changing:
-        torque = parameters.own(pieces[0].offset) + parameters.own(pieces[0].slope) * engine.time
-    else:
-        torque = parameters(pieces[0].offset)
     found = closed_form.accelerations(angles, rates, form, torque, engine.sin, engine.cos)
     equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
     if has_work:
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, torque)))
     return System(equations, parameters, (0, *(1 + i for i in form.moving)), has_work, pieces)
+
+
+def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, Any]:
+    """Form, and torque in N m; takes the scene's numbers into `parameters`, in the order that integrators have them."""
+    form = rotor_form(scene, parameters)
+    pieces = stretches(scene)
+    if len(pieces) > 1:
+        return form, parameters.own(pieces[0].offset) + parameters.own(pieces[0].slope) * heyoka().time
+    return form, parameters(pieces[0].offset)
 
 
 def initial_state(scene: Scene, system: System) -> list[Fraction]:
