@@ -15,7 +15,6 @@ import pytest
 from rotor_mbs.cli import main
 
 pytest.importorskip("distributed")
-pytestmark = pytest.mark.slow
 
 _SWEEP = """
 title = "starts"

@@ -281,7 +281,7 @@ def test_a_second_sweep_on_one_output_is_refused_with_one_line(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--engine", "dask:tcp://127.0.0.1:9"], "--engine dask:"),
+        (["--engine", "dask:tcp://127.0.0.1:9"], "--engine dask:tcp://127.0.0.1:9: no dask scheduler answers there"),
         (["--engine", "slurm"], "no such engine; allowed: local, or dask:tcp://host:port"),
         (["-m", "lagrange/nothing"], "unknown method"),
     ],
