@@ -2,7 +2,8 @@
 
     python -m pytest -m slow -s tests/test_sweep_measured.py
 
-prints the table of the README: medians of five rounds, everything in turn. It skips itself where the machine is busy.
+prints the table of the README (medians of five rounds, everything in turn) and what a run costs beside its integration.
+It skips itself where the machine is busy.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,11 +25,15 @@ from comparison_dop853 import straightforward
 from scenes import paper
 from scipy.integrate import solve_ivp
 
+from rotor_mbs.cli.sweep_plan import plan_work
+from rotor_mbs.cli.sweep_work import Chunk, rows_of
 from rotor_mbs.models.base import solve
-from rotor_mbs.models.lagrange import taylor
+from rotor_mbs.models.lagrange import ensemble, ensemble_samples, taylor
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of, heyoka
 from rotor_mbs.models.lagrange.system import build_system
+from rotor_mbs.runner.engines import open_engine
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.sweep import load_sweep
 
 pytestmark = pytest.mark.slow
 
@@ -119,12 +125,16 @@ def _scenes(samples: int, count: int) -> list[Scene]:
     return [replace(base, initial_angles=(q0, q1 + a, q2 + b, q3)) for a, b in moved.tolist()]
 
 
+def _skip_where_busy() -> None:
+    if os.getloadavg()[0] > _IDLE_LOAD:
+        pytest.skip("the machine is busy: nothing would be learnt")
+
+
 @pytest.fixture(scope="module")
 def rates(tmp_path_factory: pytest.TempPathFactory) -> Rates:
     """s a run of every contestant, medians of all rounds. Skips where the machine is busy."""
     pytest.importorskip("heyoka")
-    if os.getloadavg()[0] > _IDLE_LOAD:
-        pytest.skip("the machine is busy: nothing would be learnt")
+    _skip_where_busy()
     folder = tmp_path_factory.mktemp("measured")
     contestants: dict[str, Callable[[], tuple[float, ...]]] = {}
     for samples in _SAMPLES:
@@ -168,3 +178,73 @@ def test_a_sweep_costs_a_fifth_of_the_bare_integrator_one_by_one(rates: Rates) -
 def test_so_does_the_whole_command(rates: Rates, samples: int) -> None:
     """The same with the sweep's start and end, and with every sample of the figure."""
     assert rates[f"loop over bare heyoka, {samples} samples"][0] > 5.0 * rates[f"sweep, {samples} samples"][0]
+
+
+class _Timed:
+    """An integrator that tells how long it integrated, in s."""
+
+    def __init__(self, integrator: Any) -> None:
+        self._integrator, self.spent = integrator, 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._integrator, name)
+
+    def propagate_grid(self, times: Any) -> Any:
+        start = time.perf_counter()
+        found = self._integrator.propagate_grid(times)
+        self.spent += time.perf_counter() - start
+        return found
+
+
+def _shares(chunks: Sequence[Chunk]) -> tuple[float, float]:
+    """Of the time of all their runs: what is not integration, and of that what fills the arrays."""
+    made: list[_Timed] = []
+    filling = [0.0]
+    integrator, put_lane = ensemble._integrator, ensemble_samples.put_lane
+
+    def timed(*arguments: Any) -> Any:
+        made.append(_Timed(integrator(*arguments)))
+        return made[-1]
+
+    def timed_put(*arguments: Any) -> None:
+        start = time.perf_counter()
+        put_lane(*arguments)
+        filling[0] += time.perf_counter() - start
+
+    ensemble._integrator, ensemble_samples.put_lane = timed, timed_put
+    try:
+        start = time.perf_counter()
+        for chunk in chunks:
+            rows_of(chunk)
+        spent = time.perf_counter() - start
+    finally:
+        ensemble._integrator, ensemble_samples.put_lane = integrator, put_lane
+    return 1.0 - sum(one.spent for one in made) / spent, filling[0] / spent
+
+
+def test_a_fast_run_is_integration_and_arrays_but_for_a_tenth(tmp_path: Path) -> None:
+    """In a worker, from parameters to rows: scenes, tips, energies, judgement. The parent's share is not in it."""
+    _skip_where_busy()
+    work = plan_work(load_sweep(_file(tmp_path, 201, 1024, "lagrange/taylor")), ("lagrange/taylor",), (1, 1), 60.0)
+    chunks = list(work.chunks([(0, 1024)]))
+    engine = open_engine("local", 1)
+    try:
+        shares = [engine.submit(_shares, chunks, 60.0).result() for _ in range(1 + _ROUNDS)]
+    finally:
+        engine.stop()
+    beside, filling = np.median(shares[1:], axis=0)  # the first one compiles
+    print(f"\nbeside integration: {100 * beside:.1f} % of a fast run, with {100 * filling:.1f} % that fill arrays")
+    assert beside - filling < 0.10
+
+
+def test_a_run_of_another_method_costs_15_ms_beside_its_integration(tmp_path: Path) -> None:
+    """A thousand runs of two samples on one worker, whose integration is nearly nothing; all of the command counted."""
+    _skip_where_busy()
+    path = _file(tmp_path, 2, 1000, "exudyn_tree/rk67")
+    path.write_text(path.read_text().replace("seed = 1", "seed = 1\nchange = { duration = 1e-3 }"))
+    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-m", "exudyn_tree/rk67", "-j", "1"]
+    start = time.perf_counter()
+    subprocess.run([*command, "-o", str(tmp_path / "o.h5")], capture_output=True, check=True)
+    spent = (time.perf_counter() - start) / 1000
+    print(f"\nexudyn_tree/rk67: {1e3 * spent:.1f} ms a run in all")
+    assert spent < 0.015
