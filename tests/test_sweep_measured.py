@@ -200,7 +200,7 @@ def _shares(chunks: Sequence[Chunk]) -> tuple[float, float]:
     """Of the time of all their runs: what is not integration, and of that what fills the arrays."""
     made: list[_Timed] = []
     filling = [0.0]
-    integrator, put_lane = ensemble._integrator, ensemble_samples.put_lane
+    integrator, put = ensemble._integrator, ensemble_samples.put
 
     def timed(*arguments: Any) -> Any:
         made.append(_Timed(integrator(*arguments)))
@@ -208,17 +208,17 @@ def _shares(chunks: Sequence[Chunk]) -> tuple[float, float]:
 
     def timed_put(*arguments: Any) -> None:
         start = time.perf_counter()
-        put_lane(*arguments)
+        put(*arguments)
         filling[0] += time.perf_counter() - start
 
-    ensemble._integrator, ensemble_samples.put_lane = timed, timed_put
+    ensemble._integrator, ensemble_samples.put = timed, timed_put
     try:
         start = time.perf_counter()
         for chunk in chunks:
             rows_of(chunk)
         spent = time.perf_counter() - start
     finally:
-        ensemble._integrator, ensemble_samples.put_lane = integrator, put_lane
+        ensemble._integrator, ensemble_samples.put = integrator, put
     return 1.0 - sum(one.spent for one in made) / spent, filling[0] / spent
 
 

@@ -51,6 +51,7 @@ class Derived:
         # Where all terms of a row vanish, the closed form gives a plain zero: the engine asks for an expression.
         rows = [engine.expression(0.0) + row for row in found]
         self._function = engine.cfunc(rows, symbols, compact_mode=compact) if rows else None
+        self._last: tuple[tuple[bytes, int], Array] = ((b"", 0), np.empty((0, 0)))
 
     def __call__(self, states: Array, numbers: Array) -> Array:
         """(rows, runs, samples): x y z in m of each blade's tip, then kinetic and potential energy in J, as far as the
@@ -69,9 +70,17 @@ class Derived:
     def _evaluated(self, states: Array, numbers: Array) -> Array:
         assert self._function is not None
         inputs, numbers = states[: self._function.nvars], numbers[: self._function.nparams]
-        spread = np.broadcast_to(numbers[:, :, None], (*numbers.shape, states.shape[2]))
-        found: Array = self._function(_in_rows(inputs), pars=_in_rows(spread), batch_parallel=False)
+        spread = self._spread(numbers, states.shape[2])
+        found: Array = self._function(_in_rows(inputs), pars=spread, batch_parallel=False)
         return found.reshape(-1, *states.shape[1:])
+
+    def _spread(self, numbers: Array, samples: int) -> Array:
+        """(parameters, runs · samples): the function wants its numbers anew for every sample. Runs of one machine, a
+        chunk of a sweep, have the same."""
+        key = (numbers.tobytes(), samples)
+        if self._last[0] != key:
+            self._last = key, _in_rows(np.broadcast_to(numbers[:, :, None], (*numbers.shape, samples)))
+        return self._last[1]
 
 
 def _in_rows(values: Array) -> Array:

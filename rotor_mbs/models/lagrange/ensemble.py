@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.models.base import solve
 from rotor_mbs.models.lagrange import ensemble_samples, taylor
@@ -26,6 +27,9 @@ from rotor_mbs.trajectory.record import Array, Integration
 
 # rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
 _HUGE = 1e13
+
+# Samples of all runs side by side: what is worked on stays near the processor.
+_AT_ONCE = 4096
 
 # Unrolled code is fastest, but its compile time grows with the number of blades (and with the lanes).
 _UNROLLED_BLADES = 4
@@ -72,7 +76,8 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
     block = ensemble_samples.empty_block(scenes)
     for numbers in _groups(machines):
         if machines[numbers[0]].is_smooth:
-            _propagate(block, [(i, scenes[i], machines[i]) for i in numbers], tolerance)
+            alike = [scenes[i] for i in numbers], [machines[i] for i in numbers]
+            _propagate(block, _group(numbers, *alike, tolerance))
             continue
         for i in numbers:
             ensemble_samples.put_single(block, i, _single(scenes[i], tolerance))
@@ -154,86 +159,90 @@ def _is_compact(scene: Scene) -> bool:
 
 
 @dataclass(frozen=True)
-class _Starts:
-    """What differs between the runs of a group, a column for each.
+class _Group:
+    """Runs of one structure, and the compiled code for them.
 
-    initial   (variables, k) state; times: (samples, k) s
-    numbers   (parameters, k) of the machine, then the pitches that are held
+    places, scenes   of each run, in the block
+    moving      columns of the angles that move
+    initial     (variables, k) state; times: (samples, k) s
+    numbers     (parameters, k) of the machine, then the pitches that are held
     """
 
+    integrator: Any
+    derived: Derived
+    places: list[int]
+    scenes: list[Scene]
+    moving: tuple[int, ...]
     initial: Array
     times: Array
     numbers: Array
 
+    def solve(self, columns: Sequence[int]) -> tuple[Array, list[Integration]]:
+        """(variables, columns, samples) states, and the engine's word on each; they fill the lanes in turn."""
+        width = self.integrator.state.shape[1]
+        initial, times, numbers = self.initial[:, columns], self.times[:, columns], self.numbers[:, columns]
+        states = np.empty((len(initial), len(columns), len(times)))
+        words = []
+        for i in range(0, len(columns), width):
+            lanes = slice(i, i + width)
+            self.integrator.set_time(np.zeros(width))
+            self.integrator.state[:] = initial[:, lanes]
+            set_parameters(self.integrator, numbers[:, lanes])
+            states[:, lanes] = self.integrator.propagate_grid(times[:, lanes])[1].transpose(1, 2, 0)
+            for result in self.integrator.propagate_res:
+                message = failure(result[0])
+                words.append(Integration(not message, message, 0.0, int(result[3])))
+        states[:, :, 0] = initial  # which a run that fails in its first step has, too
+        return states, words
 
-def _propagate(block: Block, group: Sequence[tuple[int, Scene, _Machine]], tolerance: float) -> None:
-    """Runs of one structure into the block: (place in it, scene, machine) of each."""
-    _, first, machine = group[0]
-    example = _without_start(first)
-    integrator = _integrator(machine.equations, tolerance, example)
-    derived = _derived(machine.derived, example)
-    width = integrator.state.shape[1]
-    starts = _starts(group, integrator.state.shape[0])
-    for i in range(0, len(group), width):
-        columns = list(range(i, min(i + width, len(group))))
-        batches = [_batch(integrator, starts, columns)]
-        if not batches[0].is_tame:
+    def put(self, block: Block, columns: Sequence[int], states: Array, words: Sequence[Integration]) -> None:
+        """The runs of the first len(words) columns into the block, with their tips and energies."""
+        found = self.derived(states, self.numbers[:, columns])
+        runs = len(words)
+        places, scenes = [self.places[i] for i in columns[:runs]], [self.scenes[i] for i in columns[:runs]]
+        ensemble_samples.put(block, places, scenes, self.moving, states[:, :runs], found[:, :runs], words)
+
+
+def _propagate(block: Block, group: _Group) -> None:
+    """All its runs into the block."""
+    width = group.integrator.state.shape[1]
+    runs = len(group.scenes)
+    at_once = max(_AT_ONCE // len(group.times) // width, 1) * width
+    for start in range(0, runs, at_once):
+        columns = list(range(start, min(start + at_once, runs)))
+        padded = columns + [columns[-1]] * (-len(columns) % width)
+        states, words = group.solve(padded)
+        group.put(block, padded, states, words[: len(columns)])
+        wild = {i // width for i in np.flatnonzero(~_are_tame(states, words)).tolist()}
+        for i in [i for i in range(len(columns)) if i // width in wild]:
             # One lane's failure ends all lanes: each runs again with itself alone in every lane.
-            batches = [_batch(integrator, starts, [column]) for column in columns]
-        for batch in batches:
-            found = derived(batch.states, starts.numbers[:, batch.columns])
-            for lane, word in enumerate(batch.words):
-                place, scene, _ = group[batch.columns[lane]]
-                states = batch.states[:, lane]
-                ensemble_samples.put_lane(block, place, scene, machine.moving, states, found[:, lane], word)
+            alone = [columns[i]] * width
+            states, words = group.solve(alone)
+            states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
+            group.put(block, alone, states, words[:1])
 
 
-@dataclass(frozen=True)
-class _Batch:
-    """One integration.
-
-    columns   of the runs, one per lane; spare lanes repeat the last
-    states    (variables, lanes, samples), NaN after a run broke off
-    words     the engine's word on each run
-    is_tame   whether no lane can have had an effect on another
-    """
-
-    columns: list[int]
-    states: Array
-    words: list[Integration]
-    is_tame: bool
+def _are_tame(states: Array, words: Sequence[Integration]) -> NDArray[np.bool_]:
+    """(columns,) whether a run can have had no effect on another lane's."""
+    sizes = np.maximum(states.max(axis=2), -states.min(axis=2))  # NaN where a sample is
+    angles = sizes[: len(sizes) // 2]
+    tame = (angles < _HUGE).all(axis=0) & np.isfinite(sizes).all(axis=0)
+    found: NDArray[np.bool_] = tame & np.array([word.success for word in words])
+    return found
 
 
-def _batch(integrator: Any, starts: _Starts, runs: Sequence[int]) -> _Batch:
-    """Up to as many runs as there are lanes."""
-    width = integrator.state.shape[1]
-    columns = [*runs, *[runs[-1]] * (width - len(runs))]
-    initial = starts.initial[:, columns]
-    integrator.set_time(np.zeros(width))
-    integrator.state[:] = initial
-    set_parameters(integrator, starts.numbers[:, columns])
-    states = np.ascontiguousarray(integrator.propagate_grid(starts.times[:, columns])[1].transpose(1, 2, 0))
-    states[:, :, 0] = initial  # which a run that fails in its first step has, too
-    angles = states[: len(states) // 2]
-    is_tame = bool(np.isfinite(states).all() and max(angles.max(), -angles.min()) < _HUGE)
-    if not is_tame:
-        states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
-    words = []
-    for result in integrator.propagate_res[: len(runs)]:
-        message = failure(result[0])
-        words.append(Integration(not message, message, 0.0, int(result[3])))
-        is_tame = is_tame and not message
-    return _Batch(columns, states, words, is_tame)
-
-
-def _starts(group: Sequence[tuple[int, Scene, _Machine]], variables: int) -> _Starts:
-    scenes, machines = [scene for _, scene, _ in group], [machine for _, _, machine in group]
-    moving = list(machines[0].moving)
+def _group(places: list[int], scenes: list[Scene], machines: Sequence[_Machine], tolerance: float) -> _Group:
+    """Of runs whose machines have one structure."""
+    first = machines[0]
+    example = _without_start(scenes[0])
+    integrator = _integrator(first.equations, tolerance, example)
+    moving = list(first.moving)
     held = [i for i in range(len(scenes[0].initial_angles)) if i not in moving]
     angles = np.array([scene.initial_angles for scene in scenes]).T
     rates = np.array([scene.initial_rates for scene in scenes]).T
-    initial = np.zeros((variables, len(group)))
+    initial = np.zeros((integrator.state.shape[0], len(scenes)))
     initial[: 2 * len(moving)] = np.concatenate([angles[moving], rates[moving]])
     times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), scenes[0].samples)
-    numbers = np.stack([machine.numbers for machine in machines], axis=1)
-    return _Starts(initial, times, np.concatenate([numbers, angles[held]]))
+    numbers = np.concatenate([np.stack([machine.numbers for machine in machines], axis=1), angles[held]])
+    derived = _derived(first.derived, example)
+    return _Group(integrator, derived, places, scenes, first.moving, initial, times, numbers)

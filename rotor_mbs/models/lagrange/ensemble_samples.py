@@ -67,40 +67,60 @@ def put_single(block: Block, i: int, run: Run) -> None:
     block.words[i], block.samples[i] = run.integration, n
 
 
-def put_lane(
-    block: Block, i: int, scene: Scene, moving: tuple[int, ...], states: Array, found: Array, word: Integration
+def put(
+    block: Block,
+    places: Sequence[int],
+    scenes: Sequence[Scene],
+    moving: Sequence[int],
+    states: Array,
+    found: Array,
+    words: Sequence[Integration],
 ) -> None:
-    """A run as run i of the block.
+    """Runs of one structure as runs `places` of the block; k of them.
 
-    states   (variables, samples): of the equations, NaN after it broke off
-    found    (rows, samples): each blade's tip, x y z in m; then kinetic and potential energy in J, where asked for
+    states   (variables, k, samples): of the equations, NaN after a run broke off
+    found    (rows, k, samples): each blade's tip, x y z in m; then kinetic and potential energy in J, where asked for
     """
-    count, columns = len(moving), list(moving)
-    broken = np.isnan(states[0])
-    if len(columns) < block.angles.shape[2]:  # pitches that are held
-        block.angles[i], block.rates[i] = scene.initial_angles, 0.0
-    block.angles[i][:, columns] = states[:count].T
-    block.rates[i][:, columns] = states[count : 2 * count].T
+    count, length = len(moving), states.shape[2]
+    where = _span(places)
+    if count < block.angles.shape[2]:  # pitches that are held
+        block.angles[where] = np.array([scene.initial_angles for scene in scenes])[:, None]
+        block.rates[where] = 0.0
+    for i, column in enumerate(moving):
+        block.angles[where, :, column], block.rates[where, :, column] = states[i], states[count + i]
     rows = 0
     if block.tip is not None:
-        tip = block.tip[i].reshape(len(broken), -1)
-        rows = tip.shape[1]
-        tip[:] = found[:rows].T
+        tip = block.tip.reshape(len(block.tip), length, -1)
+        rows = tip.shape[2]
+        tip[where] = found[:rows].transpose(1, 2, 0)
     if block.kinetic_energy is not None and block.potential_energy is not None and block.work is not None:
-        block.kinetic_energy[i], block.potential_energy[i] = found[rows], found[rows + 1]
+        block.kinetic_energy[where], block.potential_energy[where] = found[rows], found[rows + 1]
         has_work = len(states) > 2 * count
-        block.work[i] = states[2 * count] if has_work else _constant_work(scene, states[0])
-    samples = len(broken) - int(broken.sum())
-    if samples < len(broken):  # some numbers do not feel it: what is held, or a term that vanishes
-        for name in _COLUMNS:
-            values = getattr(block, name)
-            if values is not None:
-                values[i, samples:] = np.nan
-    word.time_reached = float(block.time[i, max(samples - 1, 0)])
-    block.words[i], block.samples[i] = word, samples
+        block.work[where] = states[2 * count] if has_work else _constant_work(scenes, states[0])
+    samples = length - np.isnan(states[0]).sum(axis=1)
+    for i, word, n in zip(places, words, samples.tolist(), strict=True):
+        if n < length:
+            _cut(block, i, n)
+        word.time_reached = float(block.time[i, max(n - 1, 0)])
+        block.words[i], block.samples[i] = word, n
 
 
-def _constant_work(scene: Scene, angle: Array) -> Array:
-    """Of a constant torque: τ·(q2 - q2(0)), exact."""
-    work: Array = scene.torque_at(0.0) * (angle - angle[0])
+def _span(places: Sequence[int]) -> slice | list[int]:
+    """Of runs that lie side by side, which NumPy finds faster than one by one."""
+    first, last = places[0], places[-1]
+    return slice(first, last + 1) if last - first == len(places) - 1 else list(places)
+
+
+def _cut(block: Block, i: int, samples: int) -> None:
+    """Some numbers do not feel that a run broke off: what is held, or a term that vanishes."""
+    for name in _COLUMNS:
+        values = getattr(block, name)
+        if values is not None:
+            values[i, samples:] = np.nan
+
+
+def _constant_work(scenes: Sequence[Scene], angles: Array) -> Array:
+    """Of constant torques: τ·(q2 - q2(0)), exact."""
+    torques = np.array([scene.torque_at(0.0) for scene in scenes])
+    work: Array = torques[:, None] * (angles - angles[:, :1])
     return work
