@@ -15,12 +15,17 @@ _MODULES = {
     "printed_e2": "rotor_mbs.models.printed.method",
     "printed_e3": "rotor_mbs.models.printed.method",
     "lagrange": "rotor_mbs.models.lagrange.methods",
-    "reference": "rotor_mbs.models.lagrange.methods",
     "exudyn_tree": "rotor_mbs.models.multibody.methods",
     "exudyn_chain": "rotor_mbs.models.multibody.methods",
 }
 
 REFERENCE = "reference"
+
+# Modules that are a method each.
+_METHODS = {
+    "lagrange/taylor": "rotor_mbs.models.lagrange.taylor",
+    REFERENCE: "rotor_mbs.models.lagrange.reference",
+}
 
 METHOD_NAMES = (
     "printed/ode45",
@@ -57,6 +62,9 @@ def available_defaults() -> tuple[str, ...]:
 
 def find_method(name: str) -> Method:
     """The method called `name` ("model/integrator" or "reference")."""
+    if name in _METHODS:
+        method: Method = importlib.import_module(_METHODS[name])
+        return method
     table: dict[str, Method] = importlib.import_module(_MODULES[name.split("/")[0]]).METHODS
     return table[name]
 

@@ -151,14 +151,18 @@ def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
     ]
 
 
+_ONE = 10**60  # of whole numbers that stand for fractions
+
+
 @functools.lru_cache(maxsize=4096)
 def _cosine_of_turn(turn: Fraction) -> Fraction:
     """cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
-    square = (angle * angle).limit_denominator(10**60)
-    term, total, k = Fraction(1), Fraction(1), 0
-    while abs(term) > Fraction(1, 10**55):
-        k += 2
-        term = (-term * square / (k * (k - 1))).limit_denominator(10**60)
-        total += term
-    return total.limit_denominator(10**50)
+    square = int(angle * angle * _ONE)
+    term = total = _ONE
+    k, sign = 0, 1
+    while term:
+        k, sign = k + 2, -sign
+        term = term * square // (k * (k - 1) * _ONE)
+        total += sign * term
+    return Fraction(total, _ONE).limit_denominator(10**50)
