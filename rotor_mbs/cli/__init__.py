@@ -9,12 +9,14 @@ import sys
 from collections.abc import Sequence
 
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, StoreError
+from rotor_mbs.runner.collector import collect_seldom
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command; returns the exit status of the contract (0, 1, 2, 130)."""
+    collect_seldom()
     from rotor_mbs.cli.arguments import parse
 
     atexit.register(gc.freeze)  # the system frees a process at once; the collector would look through it first: 0.05 s

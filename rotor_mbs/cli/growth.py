@@ -14,8 +14,7 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import growth_exponent
 from rotor_mbs.cli.bench_points import Findings, judge_all, rows, time_points
-from rotor_mbs.cli.bench_work import Point, TimingProcess
-from rotor_mbs.models.registry import load_engine
+from rotor_mbs.cli.bench_work import Point, TimingProcess, only_time
 from rotor_mbs.runner.servant import Servant, last_core
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -82,8 +81,7 @@ class _MakeProcess:
     methods: tuple[str, ...]
 
     def __call__(self) -> TimingProcess:
-        for method in self.methods:
-            load_engine(method)
+        only_time(self.methods)
         return TimingProcess(self._scene_of)
 
     def _scene_of(self, point: Point) -> tuple[Scene, Trajectory | None]:

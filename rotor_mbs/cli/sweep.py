@@ -20,9 +20,8 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def _engine(arguments: argparse.Namespace) -> Iterator[Engine]:
-    engine = open_engine(arguments.engine, arguments.jobs)
+    engine = open_engine(arguments.engine, arguments.jobs, "rotor_mbs.cli.sweep_work:prepare")
     try:
-        engine.prepare("rotor_mbs.cli.sweep_work:prepare")
         yield engine
     finally:
         engine.stop()

@@ -86,7 +86,7 @@ class Work:
             for first, last in self._by_method(*gap):
                 method = self.methods[first // self.rows]
                 while first < last:
-                    end = min(first + self._chunk_size(method, row.itemsize, left // (4 * workers)), last)
+                    end = min(first + self._chunk_size(method, row.itemsize, left // (2 * workers)), last)
                     yield self._chunk(variants, method, row, first, end)
                     first, left = end, left - (end - first)
 

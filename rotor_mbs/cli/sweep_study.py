@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.cli.sweep_plan import Work, estimate_seconds, plan_work
-from rotor_mbs.cli.sweep_work import Chunk, lost, perform
+from rotor_mbs.cli.sweep_work import ENSEMBLE_METHOD, Chunk, lost, perform
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.runner.engines import Engine
@@ -36,6 +36,7 @@ def sweep_on(engine: Engine, arguments: argparse.Namespace) -> int:
     study = load_sweep(arguments.file)
     work = plan_work(study, arguments.method or (), arguments.part, arguments.timeout)
     runs = work.last - work.first
+    engine.begin(set(work.methods) == {ENSEMBLE_METHOD})
     if arguments.dry_run:
         return _tell_estimate(work, engine, arguments)
     if runs > _MANY and not arguments.yes:

@@ -9,15 +9,20 @@ from typing import Any, TypeVar
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.runner.engines import ENGINE_FORMS, Engine
+from rotor_mbs.runner.worker import call
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 _CONNECT_S = 3.0
+_PREPARE_S = 60.0
 
 
-def open_cluster(address: str) -> Engine:
-    """The cluster whose scheduler is at `address`, tcp://host:port. Raises InputError where none answers."""
+def open_cluster(address: str, prepare: str = "") -> Engine:
+    """The cluster whose scheduler is at `address`, tcp://host:port. Raises InputError where none answers.
+
+    prepare   "module:name", a function to call on it before there are tasks
+    """
     try:
         from distributed import Client, KilledWorker
     except ImportError as exc:
@@ -36,7 +41,10 @@ def open_cluster(address: str) -> Engine:
     def cause(error: BaseException) -> str:
         return "worker_died" if isinstance(error, KilledWorker) else "error"
 
-    return Engine(_Limited(executor), workers, cause, client.close)
+    limited = _Limited(executor)
+    for _ in range(workers if prepare else 0):
+        limited.submit(call, prepare, _PREPARE_S)
+    return Engine(limited, workers, cause, client.close)
 
 
 def _answers(address: str) -> bool:

@@ -34,14 +34,14 @@ class Queue(Generic[T, R]):
     def run(self, tasks: Iterable[T]) -> Iterator[list[Finished[T, R]]]:
         """Tasks as they end, all that have ended since the last look together."""
         suspects: list[T] = []
-        yield from self._pass(iter(tasks), suspects)
-        yield from self._pass(iter(suspects), None)
+        yield from self._pass(iter(tasks), suspects, _PER_WORKER * self.engine.workers)
+        yield from self._pass(iter(suspects), None, 1)  # alone: two tasks may share a process
 
-    def _pass(self, tasks: Iterator[T], suspects: list[T] | None) -> Iterator[list[Finished[T, R]]]:
+    def _pass(self, tasks: Iterator[T], suspects: list[T] | None, most: int) -> Iterator[list[Finished[T, R]]]:
         waiting: dict[Future[R], T] = {}
         more = True
         while more or waiting:
-            while more and len(waiting) < _PER_WORKER * self.engine.workers:
+            while more and len(waiting) < most:
                 task = next(tasks, None)
                 more = task is not None
                 if task is not None:

@@ -1,22 +1,31 @@
-"""One process of its own that answers requests one at a time, each within a time limit; for timing undisturbed.
+"""A process of its own that answers requests, each within a time limit.
 
 Knows nothing of scenes, models or files: it is given a picklable function that makes the answering object.
 """
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import multiprocessing
 import os
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any, Self
 
-from rotor_mbs.runner.pool import ONE_THREAD
+from rotor_mbs.runner.collector import collect_seldom
 
 Answer = Callable[[Any], Any]
+
+# One thread per process: the processes are the parallelism, and timings must not depend on a library's threads.
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+_START_S = 120.0  # for a process to load its code
+_LONGEST_S = 2e6  # that a system can be told to wait: its milliseconds have 32 bits
+_DEATH_S = 1.0  # for one whose line is broken to end by itself, so that it tells its exit code
 
 
 class NoAnswerError(Exception):
@@ -27,36 +36,57 @@ class NoAnswerError(Exception):
         self.timed_out = timed_out
 
 
-class Servant:
-    """`make()` is called in the new process, on one core if the system allows; what it returns answers requests."""
+@dataclass
+class _Line:
+    """To one hand of a process; is_ready: whether it has told that its code is loaded."""
 
-    def __init__(self, make: Callable[[], Answer], core: int | None = None) -> None:
-        self._make, self._core = make, core
+    end: Connection
+    is_ready: bool = False
+
+
+class Servant:
+    """`make()` is called in the new process, on one core if the system allows; what it returns answers requests.
+
+    The process is started afresh (spawn), watches its parent and ends with it, and leaves Ctrl-C to it.
+
+    hands   how many requests it answers at once: the first in its main thread, the others in threads beside it
+    """
+
+    def __init__(self, make: Callable[[], Answer], core: int | None = None, hands: int = 1) -> None:
+        self._make, self._core, self._hands = make, core, hands
         self._context = multiprocessing.get_context("spawn")
         self._process: Any = None
-        self._line: Connection | None = None
+        self._lines: list[_Line] = []
+        self._is_closed = False
+        self._lock = threading.Lock()
 
-    def ask(self, request: object, limit_s: float) -> Any:
-        """The answer. Raises NoAnswerError where none comes within `limit_s`, RuntimeError with the servant's error."""
-        line = self._line or self._start()
-        line.send(request)
-        if not line.poll(limit_s):
-            self.close()
-            raise NoAnswerError(f"ended after {limit_s:g} s", timed_out=True)
-        try:
-            failure, value = line.recv()
-        except EOFError as exc:
-            code = self._ended()
-            raise NoAnswerError(f"its process died (exit code {code})", timed_out=False) from exc
+    def start(self) -> None:
+        """Starts the process, where there is none, and returns at once: it loads its code by itself."""
+        with self._lock:
+            if self._process is None and not self._is_closed:
+                self._start()
+
+    def ask(self, request: object, limit_s: float, hand: int = 0) -> Any:
+        """The answer. Raises NoAnswerError where none comes within `limit_s` of a process that is ready, RuntimeError
+        with the servant's error. No hand may be asked by two threads at once."""
+        self.start()
+        with self._lock:
+            if self._process is None:
+                raise NoAnswerError("its process was ended", timed_out=False)
+            process, line = self._process, self._lines[hand]
+        if not line.is_ready:
+            self._received(process, line.end, _START_S)
+            line.is_ready = True
+        failure, value = self._received(process, line.end, limit_s, request)
         if failure:
             raise RuntimeError(failure)
         return value
 
     def close(self) -> None:
-        """Ends the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._ended()
+        """Ends the process for good; from any thread, whoever waits for an answer has a NoAnswerError."""
+        with self._lock:
+            self._is_closed = True
+            self._end()
 
     def __enter__(self) -> Self:
         return self
@@ -66,23 +96,43 @@ class Servant:
     ) -> None:
         self.close()
 
-    def _start(self) -> Connection:
+    def _start(self) -> None:
         for name in ONE_THREAD:
             os.environ.setdefault(name, "1")
-        line, far_end = self._context.Pipe()
-        self._process = self._context.Process(target=_serve, args=(far_end, self._make, self._core), daemon=True)
+        pipes = [self._context.Pipe() for _ in range(self._hands)]
+        far_ends = [far_end for _, far_end in pipes]
+        self._process = self._context.Process(target=_serve, args=(far_ends, self._make, self._core), daemon=True)
         self._process.start()
-        far_end.close()
-        self._line = line
-        return line
+        self._lines = [_Line(end) for end, _ in pipes]
+        for far_end in far_ends:
+            far_end.close()
 
-    def _ended(self) -> int | None:
-        self._process.join()
-        code: int | None = self._process.exitcode
-        if self._line is not None:
-            self._line.close()
-        self._process = self._line = None
-        return code
+    def _received(self, process: Any, line: Connection, limit_s: float, *requests: object) -> Any:
+        try:
+            for request in requests:
+                line.send(request)
+            if line.poll(min(limit_s, _LONGEST_S)):
+                return line.recv()
+        except (EOFError, OSError) as exc:  # a broken line: it died before the request, or amid its answer
+            process.join(_DEATH_S)
+            code = self._replaced(process)
+            raise NoAnswerError(f"its process died (exit code {code})", timed_out=False) from exc
+        self._replaced(process)
+        raise NoAnswerError(f"ended after {limit_s:g} s", timed_out=True)
+
+    def _replaced(self, process: Any) -> int | None:
+        """Ends this process, where another hand has not done so, and makes room for the next: its exit code."""
+        with self._lock:
+            if self._process is process:
+                self._end()
+            code: int | None = process.exitcode
+            return code
+
+    def _end(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+        self._process, self._lines = None, []
 
 
 def last_core() -> int | None:
@@ -90,16 +140,43 @@ def last_core() -> int | None:
     return max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
 
 
-def _serve(line: Connection, make: Callable[[], Answer], core: int | None) -> None:
+def _serve(lines: Sequence[Connection], make: Callable[[], Answer], core: int | None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
+    collect_seldom()
     answer = make()
     gc.freeze()
-    gc.disable()
-    with contextlib.suppress(EOFError, KeyboardInterrupt):  # the other side has closed, or everything is interrupted
-        while True:
+    for line in lines[1:]:
+        threading.Thread(target=_answer_or_die, args=(line, answer), daemon=True).start()
+    _answer_all(lines[0], answer)
+
+
+def _answer_all(line: Connection, answer: Answer) -> None:
+    line.send(("", None))  # ready
+    while True:
+        try:
             request = line.recv()
-            try:
-                line.send(("", answer(request)))
-            except Exception as exc:
-                line.send((f"{type(exc).__name__}: {exc}", None))
+        except EOFError:  # the other side has closed
+            return
+        try:
+            line.send(("", answer(request)))
+        except Exception as exc:
+            line.send((f"{type(exc).__name__}: {exc}", None))
+
+
+def _answer_or_die(line: Connection, answer: Answer) -> None:
+    """A thread that ends leaves its line open, on which the other side would wait."""
+    try:
+        _answer_all(line, answer)
+    finally:
+        os._exit(1)
+
+
+def _end_with_parent() -> None:
+    """A killed parent closes nothing: who is at work would go on without it."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+    os._exit(1)
