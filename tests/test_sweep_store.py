@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -17,7 +18,10 @@ import pytest
 from scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.store import hdf5
+from rotor_mbs.store.chunk_index import ChunkIndex
 from rotor_mbs.store.journal import Journal
+from rotor_mbs.store.layout import Quantity
 from rotor_mbs.store.lock import FolderLock
 from rotor_mbs.store.sweep_layout import Plan, empty_rows
 from rotor_mbs.store.sweep_memory import SparseFile
@@ -334,3 +338,46 @@ def test_a_second_sweep_is_refused_until_the_first_one_ends_however_it_ends(tmp_
         holder.kill()
         holder.wait()
         FolderLock(tmp_path, Path("s.h5")).release()
+
+
+# 64 chunks fill a leaf of the index; 5,000 make a tree of three levels.
+@pytest.mark.parametrize("rows", [1, 64, 65, 5000])
+def test_places_read_from_the_index_are_those_that_the_library_tells(rows: int) -> None:
+    memory = SparseFile()
+    file = hdf5.new_file_in(memory)
+    shapes = {"wide": (rows, 7, 4), "one": (rows, 7), "another": (rows, 7), "deep": (rows, 2, 3, 3), "flat": (rows,)}
+    scale = Quantity((), "1", "")
+    datasets = {name: hdf5.put_empty(file, name, shape, "f8", scale) for name, shape in shapes.items()}
+    file.flush()
+    index = ChunkIndex(memory.extents())
+    for name, dataset in datasets.items():
+        found = hdf5.places(dataset, index)
+        for row in {0, rows // 2, rows - 1} if dataset.chunks else ():
+            told = dataset.id.get_chunk_info_by_coord((row, *[0] * (dataset.ndim - 1)))
+            assert found[row] == told.byte_offset, (name, row)
+        size = dataset.dtype.itemsize * int(np.prod(dataset.shape[1:]))
+        assert (np.diff(np.sort(found)) >= size).all(), name  # no two overlap
+        np.testing.assert_array_equal(found, hdf5.places(dataset, ChunkIndex([])), err_msg=name)
+
+
+def test_an_index_that_is_cut_or_of_another_kind_tells_nothing() -> None:
+    memory = SparseFile()
+    file = hdf5.new_file_in(memory)
+    dataset = hdf5.put_empty(file, "a", (300, 5), "f8", Quantity((), "1", ""))
+    file.flush()
+    first = dataset.id.get_chunk_info_by_coord((0, 0)).byte_offset
+    extents = list(memory.extents())
+    assert ChunkIndex(extents).places(first, 300, 2) is not None
+    assert ChunkIndex(extents).places(first, 301, 2) is None
+    assert ChunkIndex(extents).places(first, 299, 2) is None
+    assert ChunkIndex(extents).places(first + 1, 300, 2) is None
+    assert ChunkIndex(extents).places(first, 300, 3) is None
+    leaves = [
+        (place + match.start(), match.group())
+        for place, content in extents
+        for match in re.finditer(rb"TREE\x01\x00.*?(?=TREE|$)", content, re.DOTALL)
+    ]
+    assert ChunkIndex(leaves).places(first, 300, 2) is not None
+    for i in range(len(leaves)):
+        assert ChunkIndex(leaves[:i] + leaves[i + 1 :]).places(first, 300, 2) is None
+    assert ChunkIndex([(place, content[:40]) for place, content in leaves]).places(first, 300, 2) is None

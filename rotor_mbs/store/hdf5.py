@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.store.chunk_index import ChunkIndex
 from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Quantity
 
 if TYPE_CHECKING:
@@ -181,14 +182,19 @@ def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity
     return dataset
 
 
-def places(dataset: Any) -> NDArray[np.int64]:
-    """(rows,) where in the file each row of a dataset of `put_empty` begins, in bytes."""
+def places(dataset: Any, index: ChunkIndex) -> NDArray[np.int64]:
+    """(rows,) where in the file each row of a dataset of `put_empty` begins, in bytes; index: of the file, flushed."""
     if dataset.chunks is None:
         return np.arange(len(dataset)) * int(dataset.dtype.itemsize) + int(dataset.id.get_offset())
+    first = dataset.id.get_chunk_info_by_coord((0,) * dataset.ndim).byte_offset
+    found = index.places(first, len(dataset), dataset.ndim)
+    return _told_places(dataset) if found is None else found
+
+
+def _told_places(dataset: Any) -> NDArray[np.int64]:
+    """The same of any chunked dataset, by the library."""
+    chunks: list[Any] = []
+    dataset.id.chunk_iter(chunks.append)
     found = np.empty(len(dataset), np.int64)
-
-    def note(chunk: Any) -> None:
-        found[chunk.chunk_offset[0]] = chunk.byte_offset
-
-    dataset.id.chunk_iter(note)
+    found[[chunk.chunk_offset[0] for chunk in chunks]] = [chunk.byte_offset for chunk in chunks]
     return found

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.store import hdf5, sweep_layout
+from rotor_mbs.store.chunk_index import ChunkIndex
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.sweep_layout import Plan
 from rotor_mbs.store.sweep_memory import SparseFile
@@ -31,8 +32,10 @@ class SweepFile:
         hdf5.put_attributes(self._file, {**plan.attributes, "sweep_identity": plan.identity, "runs": last - first})
         _put_columns(self._file, plan, np.arange(first, last))
         datasets = _put_datasets(self._file, plan, last - first)
+        self._file.flush()
+        index = ChunkIndex(self._memory.extents())
         self._first = first
-        self._places = {name: hdf5.places(dataset) for name, dataset in datasets.items()}
+        self._places = {name: hdf5.places(dataset, index) for name, dataset in datasets.items()}
         self._sizes = {name: plan.row[name].itemsize for name in datasets}
 
     def places(self, path: Path) -> Places:
