@@ -145,9 +145,11 @@ def _serve(lines: Sequence[Connection], make: Callable[[], Answer], core: int | 
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
+    often = gc.get_threshold()
     collect_seldom()
     answer = make()
     gc.freeze()
+    gc.set_threshold(*often)
     for line in lines[1:]:
         threading.Thread(target=_answer_or_die, args=(line, answer), daemon=True).start()
     _answer_all(lines[0], answer)
