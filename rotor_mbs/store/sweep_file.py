@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.store import hdf5, sweep_layout
 from rotor_mbs.store.chunk_index import ChunkIndex
+from rotor_mbs.store.interrupts import interrupts_put_off
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.sweep_layout import Plan
 from rotor_mbs.store.sweep_memory import SparseFile
@@ -26,6 +27,7 @@ class SweepFile:
     filled in any order, by anyone, ends with the same bytes.
     """
 
+    @interrupts_put_off()
     def __init__(self, plan: Plan, first: int, last: int) -> None:
         self._memory = SparseFile()
         self._file = hdf5.new_file_in(self._memory)
@@ -42,6 +44,7 @@ class SweepFile:
         """Of all its runs, in the file that is to be."""
         return Places(path, self._first, self._places, self._sizes)
 
+    @interrupts_put_off()
     def complete(self, file: BinaryIO, messages: Mapping[int, str]) -> None:
         """Writes all that is not a run's around the runs. May be done again if it breaks off. Raises OSError."""
         if messages:
@@ -52,6 +55,7 @@ class SweepFile:
             write_at(file, place, content)
         file.truncate(self._memory.size)
 
+    @interrupts_put_off()
     def close(self) -> None:
         self._file.close()
 
