@@ -389,6 +389,7 @@ def test_places_read_from_the_index_are_those_that_the_library_tells(rows: int) 
         for row in {0, rows // 2, rows - 1} if dataset.chunks else ():
             told = dataset.id.get_chunk_info_by_coord((row, *[0] * (dataset.ndim - 1)))
             assert found[row] == told.byte_offset, (name, row)
+            assert index.places(int(found[0]), rows, dataset.ndim) is not None, name
         size = dataset.dtype.itemsize * int(np.prod(dataset.shape[1:]))
         assert (np.diff(np.sort(found)) >= size).all(), name  # no two overlap
         np.testing.assert_array_equal(found, hdf5.places(dataset, ChunkIndex([])), err_msg=name)

@@ -17,10 +17,10 @@ EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command; returns the exit status of the contract (0, 1, 2, 130)."""
     collect_seldom()
-    from rotor_mbs.cli.arguments import parse
-
     atexit.register(gc.freeze)  # the system frees a process at once; the collector would look through it first: 0.05 s
     try:
+        from rotor_mbs.cli.arguments import parse
+
         arguments = parse(sys.argv[1:] if argv is None else argv)
         return int(arguments.command(arguments))
     except (InputError, MethodRefusal, StoreError) as exc:

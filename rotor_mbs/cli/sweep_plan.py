@@ -50,6 +50,11 @@ class Work:
     def rows(self) -> int:
         return self.sweep.design.count
 
+    @property
+    def in_threads(self) -> bool:
+        """Whether two of its tasks may share a process: the fast path leaves the interpreter's lock alone."""
+        return self.methods == (ENSEMBLE_METHOD,)
+
     @cached_property
     def plan(self) -> Plan:
         sweep = self.sweep

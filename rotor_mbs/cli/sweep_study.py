@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.cli.sweep_plan import Work, estimate_seconds, plan_work
-from rotor_mbs.cli.sweep_work import ENSEMBLE_METHOD, Chunk, lost, perform
+from rotor_mbs.cli.sweep_work import Chunk, lost, perform
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.runner.engines import Engine
@@ -36,7 +36,7 @@ def sweep_on(engine: Engine, arguments: argparse.Namespace) -> int:
     study = load_sweep(arguments.file)
     work = plan_work(study, arguments.method or (), arguments.part, arguments.timeout)
     runs = work.last - work.first
-    engine.begin(set(work.methods) == {ENSEMBLE_METHOD})
+    engine.begin(work.in_threads)
     if arguments.dry_run:
         return _tell_estimate(work, engine, arguments)
     if runs > _MANY and not arguments.yes:
@@ -67,7 +67,7 @@ def execute(
     work: Work, engine: Engine, store: SweepStore, meter: Meter, perform: Callable[[Chunk], Rows | Receipt] = perform
 ) -> None:
     """Runs all that the store misses. Raises StoreError, InputError, MethodRefusal, KeyboardInterrupt."""
-    queue = Queue(engine, perform, Chunk.parts, _hard_limit)
+    queue = Queue(engine, perform, Chunk.parts, _hard_limit, 1 if work.in_threads else engine.workers)
     for ended in queue.run(_placed(work, engine, store)):
         receipts = [_receipt(end, store) for end in ended]
         store.note(receipts)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any, Generic, TypeVar
 
+from rotor_mbs.runner.interrupts import interrupts_put_off
 from rotor_mbs.runner.servant import NoAnswerError, Servant
 from rotor_mbs.runner.worker import Worker
 
@@ -56,11 +57,16 @@ class ProcessPool(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Ends the processes: now with cancel_futures, else when all is done, if that is waited for."""
-        self._threads.shutdown(wait and not cancel_futures, cancel_futures=cancel_futures)
-        if wait or cancel_futures:
-            for servant in self._servants:
-                servant.close()
+        if not cancel_futures:
             self._threads.shutdown(wait)
+        if wait or cancel_futures:
+            with interrupts_put_off():
+                self._threads.shutdown(wait=False, cancel_futures=True)
+                for servant in self._servants:
+                    servant.kill()
+                for servant in self._servants:
+                    servant.close()
+                self._threads.shutdown(wait)
 
     def _add(self, processes: int) -> None:
         for _ in range(processes):
@@ -72,6 +78,8 @@ class ProcessPool(Executor):
         servant, hand = self._free.get()
         try:
             result, error = servant.ask((work, task), timeout_s, hand)
+        except NoAnswerError as exc:
+            raise exc.with_traceback(None) from None  # it would hold the process's lines as long as the future is kept
         finally:
             self._free.put((servant, hand))
         if error is not None:

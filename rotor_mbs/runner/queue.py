@@ -24,18 +24,19 @@ _PER_WORKER = 2
 @dataclass(frozen=True)
 class Queue(Generic[T, R]):
     """work: what is done with a task; parts: a task in parts to be tried alone, [] where it is one run;
-    timeout_s: a task's time limit."""
+    timeout_s: a task's time limit; alone: how many tasks may be tried again at once, none sharing a process."""
 
     engine: Engine
     work: Callable[[T], R]
     parts: Callable[[T], Sequence[T]]
     timeout_s: Callable[[T], float]
+    alone: int
 
     def run(self, tasks: Iterable[T]) -> Iterator[list[Finished[T, R]]]:
         """Tasks as they end, all that have ended since the last look together."""
         suspects: list[T] = []
         yield from self._pass(iter(tasks), suspects, _PER_WORKER * self.engine.workers)
-        yield from self._pass(iter(suspects), None, 1)  # alone: two tasks may share a process
+        yield from self._pass(iter(suspects), None, self.alone)
 
     def _pass(self, tasks: Iterator[T], suspects: list[T] | None, most: int) -> Iterator[list[Finished[T, R]]]:
         waiting: dict[Future[R], T] = {}

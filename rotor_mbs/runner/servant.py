@@ -10,8 +10,11 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any, Self
@@ -25,6 +28,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _START_S = 120.0  # for a process to load its code
 _LONGEST_S = 2e6  # that a system can be told to wait: its milliseconds have 32 bits
+_AGAIN_S = 1.0  # for the system to find room for a process
 _DEATH_S = 1.0  # for one whose line is broken to end by itself, so that it tells its exit code
 
 
@@ -61,31 +65,40 @@ class Servant:
         self._lock = threading.Lock()
 
     def start(self) -> None:
-        """Starts the process, where there is none, and returns at once: it loads its code by itself."""
-        with self._lock:
+        """Starts the process, where there is none, and returns at once: it loads its code by itself. Where the system
+        has no room for it, the first request tries again."""
+        with self._lock, suppress(OSError):
             if self._process is None and not self._is_closed:
                 self._start()
 
     def ask(self, request: object, limit_s: float, hand: int = 0) -> Any:
         """The answer. Raises NoAnswerError where none comes within `limit_s` of a process that is ready, RuntimeError
         with the servant's error. No hand may be asked by two threads at once."""
-        self.start()
-        with self._lock:
-            if self._process is None:
-                raise NoAnswerError("its process was ended", timed_out=False)
-            process, line = self._process, self._lines[hand]
+        process, line = self._begun(hand)
         if not line.is_ready:
-            self._received(process, line.end, _START_S)
+            try:
+                self._received(process, line.end, _START_S)
+            except NoAnswerError as exc:  # the request was not begun: it is not late
+                exc.timed_out = False
+                raise
             line.is_ready = True
         failure, value = self._received(process, line.end, limit_s, request)
         if failure:
             raise RuntimeError(failure)
         return value
 
-    def close(self) -> None:
-        """Ends the process for good; from any thread, whoever waits for an answer has a NoAnswerError."""
+    def kill(self) -> None:
+        """Ends the process for good, without waiting for its end; from any thread. Whoever waits for an answer has a
+        NoAnswerError."""
         with self._lock:
             self._is_closed = True
+            if self._process is not None:
+                self._process.kill()
+
+    def close(self) -> None:
+        """The same, and waits for it."""
+        self.kill()
+        with self._lock:
             self._end()
 
     def __enter__(self) -> Self:
@@ -96,28 +109,45 @@ class Servant:
     ) -> None:
         self.close()
 
+    def _begun(self, hand: int) -> tuple[Any, _Line]:
+        try:
+            with self._lock:
+                if self._is_closed:
+                    raise NoAnswerError("its process was ended", timed_out=False)
+                if self._process is None:
+                    self._start()
+                return self._process, self._lines[hand]
+        except OSError as exc:
+            time.sleep(_AGAIN_S)  # there may be room then; and who asks again and again is not told so at once
+            raise NoAnswerError(f"its process could not be started ({exc.strerror})", timed_out=False) from None
+
     def _start(self) -> None:
         for name in ONE_THREAD:
             os.environ.setdefault(name, "1")
         pipes = [self._context.Pipe() for _ in range(self._hands)]
         far_ends = [far_end for _, far_end in pipes]
-        self._process = self._context.Process(target=_serve, args=(far_ends, self._make, self._core), daemon=True)
-        self._process.start()
-        self._lines = [_Line(end) for end, _ in pipes]
+        process: Any = self._context.Process(target=_serve, args=(far_ends, self._make, self._core), daemon=True)
+        with _deaf_to_ctrl_c():
+            process.start()
+        self._process, self._lines = process, [_Line(end) for end, _ in pipes]
         for far_end in far_ends:
             far_end.close()
 
     def _received(self, process: Any, line: Connection, limit_s: float, *requests: object) -> Any:
+        is_broken = False
         try:
             for request in requests:
                 line.send(request)
             if line.poll(min(limit_s, _LONGEST_S)):
                 return line.recv()
-        except (EOFError, OSError) as exc:  # a broken line: it died before the request, or amid its answer
+        except (EOFError, OSError):  # it died before the request, or amid its answer
+            is_broken = True
+        line.close()
+        if is_broken:
             process.join(_DEATH_S)
-            code = self._replaced(process)
-            raise NoAnswerError(f"its process died (exit code {code})", timed_out=False) from exc
-        self._replaced(process)
+        code = self._replaced(process)
+        if is_broken:
+            raise NoAnswerError(f"its process died (exit code {code})", timed_out=False)
         raise NoAnswerError(f"ended after {limit_s:g} s", timed_out=True)
 
     def _replaced(self, process: Any) -> int | None:
@@ -133,6 +163,20 @@ class Servant:
             self._process.kill()
             self._process.join()
         self._process, self._lines = None, []
+
+
+@contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """A process started in the block hears it not even while it loads Python, of which it would print where it was."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # in the block it would start itself, and let the signal through after that
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def last_core() -> int | None:
@@ -160,8 +204,11 @@ def _answer_all(line: Connection, answer: Answer) -> None:
     while True:
         try:
             request = line.recv()
-        except EOFError:  # the other side has closed
+        except (EOFError, OSError):  # the other side has closed
             return
+        except Exception as exc:  # it came whole, but is nothing that could be made here
+            line.send((f"{type(exc).__name__}: {exc}", None))
+            continue
         try:
             line.send(("", answer(request)))
         except Exception as exc:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -21,7 +23,8 @@ class Worker:
 
     def __call__(self) -> Callable[[tuple[Callable[[Any], Any], Any]], Answer]:
         if self.prepare:
-            call(self.prepare)
+            with suppress(Exception):  # the first task meets it again, and tells it
+                call(self.prepare)
         return _answer
 
 
@@ -36,4 +39,13 @@ def _answer(request: tuple[Callable[[Any], Any], Any]) -> Answer:
     try:
         return work(task), None
     except Exception as exc:
-        return None, exc
+        return None, _sendable(exc)
+
+
+def _sendable(error: Exception) -> Exception:
+    """The error itself, where it arrives as it is sent."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error

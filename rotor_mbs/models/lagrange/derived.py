@@ -51,7 +51,7 @@ class Derived:
         # Where all terms of a row vanish, the closed form gives a plain zero: the engine asks for an expression.
         rows = [engine.expression(0.0) + row for row in found]
         self._function = engine.cfunc(rows, symbols, compact_mode=compact) if rows else None
-        self._last: tuple[tuple[bytes, int], Array] = ((b"", 0), np.empty((0, 0)))
+        self._last: tuple[tuple[object, ...], Array] = ((), np.empty((0, 0)))
 
     def __call__(self, states: Array, numbers: Array) -> Array:
         """(rows, runs, samples): x y z in m of each blade's tip, then kinetic and potential energy in J, as far as the
@@ -59,7 +59,7 @@ class Derived:
 
         states    (variables, runs, samples): angles and rates that move, rad and rad/s
         numbers   (parameters, runs): of equations and tips, then the pitches that are held
-        There must be as many runs as the processor has lanes: what is left over would be rounded by other instructions.
+        The runs must fill the processor's lanes, once or more: what is left over is rounded by other instructions.
         """
         _, runs, samples = states.shape
         if self._function is None:
@@ -77,7 +77,7 @@ class Derived:
     def _spread(self, numbers: Array, samples: int) -> Array:
         """(parameters, runs · samples): the function wants its numbers anew for every sample. Runs of one machine, a
         chunk of a sweep, have the same."""
-        key = (numbers.tobytes(), samples)
+        key = (numbers.tobytes(), numbers.shape, samples)
         if self._last[0] != key:
             self._last = key, _in_rows(np.broadcast_to(numbers[:, :, None], (*numbers.shape, samples)))
         return self._last[1]

@@ -1,4 +1,5 @@
-"""Ctrl-C and SIGTERM, put off. Raised amid what the HDF5 library calls back to us, they end in its crash."""
+"""Ctrl-C and SIGTERM, put off: amid what the HDF5 library calls back to us they end in its crash, and amid the end of
+other processes they leave some of them alive."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 @contextmanager
@@ -17,11 +19,13 @@ def interrupts_put_off() -> Iterator[None]:
         return
     came: list[int] = []
     numbers = (signal.SIGINT, signal.SIGTERM)
-    before = {number: signal.signal(number, lambda number, _: came.append(number)) for number in numbers}
+    before: dict[signal.Signals, Any] = {}
     try:
+        for one in numbers:
+            before[one] = signal.signal(one, lambda number, _: came.append(number))
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for one, handler in before.items():
+            signal.signal(one, signal.SIG_DFL if handler is None else handler)
         if came:
             signal.raise_signal(came[0])
