@@ -8,4 +8,5 @@ _SELDOM = 50_000
 
 
 def collect_seldom() -> None:
+    """From now on, in this process; `gc.set_threshold` undoes it."""
     gc.set_threshold(_SELDOM)
