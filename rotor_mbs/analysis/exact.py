@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.trajectory.record import Array
+from rotor_mbs.solution.record import Array
 
 
 def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array
+from rotor_mbs.solution.record import Array
 
 
 def tip_paths(scene: Scene, angles: Array) -> Array:

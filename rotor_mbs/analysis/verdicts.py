@@ -14,14 +14,14 @@ import numpy as np
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
-from rotor_mbs.analysis.restore import Restored, restore
+from rotor_mbs.analysis.rehydrate import Restored, restore
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import energy_slack, is_held, judge
+from rotor_mbs.solution.metrics import compare, energy_scale
+from rotor_mbs.solution.record import Array, Solution, Trajectory
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import Results, StoredRun, StoredScene
-from rotor_mbs.trajectory.compare import compare, energy_scale
-from rotor_mbs.trajectory.outcome import energy_slack, is_held, judge
-from rotor_mbs.trajectory.record import Array, Run, Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def _of_run(run: StoredRun, bounds: Bounds, restored: Restored, motion_ends: boo
             yield from _of_right_model(run, bounds, restored, restored.run.trajectory)
 
 
-def _status(run: StoredRun, bounds: Bounds, restored: Restored, recorded: Run) -> Verdict:
+def _status(run: StoredRun, bounds: Bounds, restored: Restored, recorded: Solution) -> Verdict:
     judged = judge(restored.scene, recorded, restored.reference)
     claimed = bool(run.attributes.get("false_success", 0))
     faults = (judged.status != run.status) + (judged.false_success != claimed)
@@ -107,7 +107,7 @@ def _status(run: StoredRun, bounds: Bounds, restored: Restored, recorded: Run) -
     return _make("status", run, "status", float(faults), bounds, "faults", look)
 
 
-def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Run) -> Iterator[Verdict]:
+def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution) -> Iterator[Verdict]:
     """What the samples say of each other, whatever equations moved them."""
     trajectory = recorded.trajectory
     times = np.linspace(0.0, scene.duration, scene.samples)[: len(trajectory.time)]

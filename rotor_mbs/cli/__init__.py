@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, StoreError
-from rotor_mbs.runner.collector import collect_seldom
+from rotor_mbs.execution.collector import collect_seldom
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 

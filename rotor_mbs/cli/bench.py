@@ -11,18 +11,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rotor_mbs.cli.batch import Batch, execute
-from rotor_mbs.cli.bench_points import Plan, bench_hash, measure
-from rotor_mbs.cli.bench_work import able, prepared_scene
 from rotor_mbs.errors import InputError
-from rotor_mbs.models.ladders import Ladder, ladders
-from rotor_mbs.models.registry import check_names
-from rotor_mbs.runner.environment import machine, versions
+from rotor_mbs.execution.environment import machine, versions
+from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.methods.ladders import Ladder, ladders
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.load import scene_hash
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.bench import read_curves, write_curves
 from rotor_mbs.store.merge import merge
+from rotor_mbs.studies.batch import Batch, execute
+from rotor_mbs.studies.bench_points import Plan, bench_hash, measure
+from rotor_mbs.studies.bench_work import able, prepared_scene
 
 # An hour of simulated time, or 48 blades, costs what several scenes do.
 _GROWTH_BUDGETS = 3.0
@@ -102,7 +102,7 @@ def _collect(output: Path) -> None:
 
 
 def _measure_growth(output: Path, arguments: argparse.Namespace) -> None:
-    from rotor_mbs.cli.growth import measure_growth, studies
+    from rotor_mbs.studies.cost_scaling import measure_growth, studies
 
     for study in studies():
         budget = _GROWTH_BUDGETS * arguments.budget

@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rotor_mbs.analysis.verdicts import Verdict, verdicts
-from rotor_mbs.cli.batch import Batch, execute
-from rotor_mbs.cli.check_runs import PROBES, SPEED_PROBES, Measured, Probe, measure
 from rotor_mbs.errors import StoreError
-from rotor_mbs.models.registry import METHOD_NAMES, REFERENCE, available_defaults, check_names
+from rotor_mbs.execution.pool import run_tasks
+from rotor_mbs.methods.catalogue import METHOD_NAMES, REFERENCE, available_defaults, check_names
 from rotor_mbs.report import verdict_formats
-from rotor_mbs.runner.pool import run_tasks
 from rotor_mbs.scenario.bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.resources import reference_folder
@@ -27,6 +25,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.digests import touched
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import open_results
+from rotor_mbs.studies.batch import Batch, execute
+from rotor_mbs.studies.check_runs import PROBES, SPEED_PROBES, Measured, Probe, measure
 
 # The chain takes as long as all else together: four scenes of the paper tell what it has to tell.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")

@@ -12,16 +12,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rotor_mbs.cli import EXIT_BAD_INPUT
-from rotor_mbs.cli.batch import Batch, Report, default_methods, execute
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.models.choice import choose
-from rotor_mbs.models.registry import ERRATA_METHODS, available_defaults, check_names
-from rotor_mbs.runner.environment import numerics_fingerprint
+from rotor_mbs.execution.environment import numerics_fingerprint
+from rotor_mbs.methods.catalogue import ERRATA_METHODS, available_defaults, check_names
+from rotor_mbs.methods.selection import choose
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.errata import errata_fingerprint, write_errata
 from rotor_mbs.store.merge import refuse_other_kinds
 from rotor_mbs.store.read import open_results
+from rotor_mbs.studies.batch import Batch, Report, default_methods, execute
 
 
 def run(arguments: argparse.Namespace) -> int:

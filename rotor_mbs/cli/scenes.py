@@ -12,7 +12,7 @@ from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Scene
 
 if TYPE_CHECKING:  # numpy behind it is too heavy for `list`
-    from rotor_mbs.trajectory.record import Item
+    from rotor_mbs.solution.record import Item
 
 
 def list_all(arguments: argparse.Namespace) -> int:
@@ -99,7 +99,7 @@ class _Model:
 
 
 def _models(scene: Scene) -> list[_Model]:
-    from rotor_mbs.models.registry import METHOD_NAMES, find_method
+    from rotor_mbs.methods.catalogue import METHOD_NAMES, find_method
 
     models: dict[str, _Model] = {}
     for name in METHOD_NAMES:

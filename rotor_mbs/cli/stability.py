@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rotor_mbs.analysis.stability import Cell, cells, summary_lines, unreached
-from rotor_mbs.cli.batch import Batch, default_methods, execute
-from rotor_mbs.cli.stability_records import complete_records
-from rotor_mbs.models.registry import METHOD_NAMES
+from rotor_mbs.methods.catalogue import METHOD_NAMES
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.trajectory.outcome import is_held
+from rotor_mbs.solution.judgement import is_held
+from rotor_mbs.studies.batch import Batch, default_methods, execute
+from rotor_mbs.studies.stability_records import complete_records
 
 SUITE = ("stiff", "extreme")
 

@@ -7,7 +7,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rotor_mbs.runner.engines import Engine, open_engine
+from rotor_mbs.execution.engines import Engine, open_engine
 
 
 def sweep(arguments: argparse.Namespace) -> int:
@@ -20,7 +20,7 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def _engine(arguments: argparse.Namespace) -> Iterator[Engine]:
-    engine = open_engine(arguments.engine, arguments.jobs, "rotor_mbs.cli.sweep_work:prepare")
+    engine = open_engine(arguments.engine, arguments.jobs, "rotor_mbs.studies.sweep_work:prepare")
     try:
         yield engine
     finally:

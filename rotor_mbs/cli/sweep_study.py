@@ -13,19 +13,19 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.cli.sweep_plan import Work, estimate_seconds, plan_work
-from rotor_mbs.cli.sweep_work import Chunk, lost, perform
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.execution.engines import Engine
+from rotor_mbs.execution.meter import Meter
+from rotor_mbs.execution.pool import Finished
+from rotor_mbs.execution.queue import Queue
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
-from rotor_mbs.runner.engines import Engine
-from rotor_mbs.runner.meter import Meter
-from rotor_mbs.runner.pool import Finished
-from rotor_mbs.runner.queue import Queue
 from rotor_mbs.scenario.sweep import load_sweep
+from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.sweep_layout import SWEEP_STATUSES
 from rotor_mbs.store.sweep_rows import Receipt, Rows
 from rotor_mbs.store.sweep_store import SweepStore, runs_per_file
-from rotor_mbs.trajectory.outcome import is_held
+from rotor_mbs.studies.sweep_plan import Work, estimate_seconds, plan_work
+from rotor_mbs.studies.sweep_work import Chunk, lost, perform
 
 _MANY = 1_000_000  # runs that are not started without being asked for twice
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached

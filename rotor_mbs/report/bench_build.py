@@ -19,7 +19,7 @@ from rotor_mbs.report.files import INDEX, page_names, write_pages
 from rotor_mbs.report.names import GREY, Look, look_of
 from rotor_mbs.report.pages import render
 from rotor_mbs.report.parts import Picture, Sample, Section, mark_sample, run_sample
-from rotor_mbs.report.vector import embedded
+from rotor_mbs.report.svg import embedded
 from rotor_mbs.store.bench import GROWTH, Curve, read_curves
 from rotor_mbs.store.read import open_results
 

@@ -16,7 +16,7 @@ from rotor_mbs.analysis import methods, published
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.analysis.order import natural
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report import metrics, paper_set, said
+from rotor_mbs.report import claim_tables, metrics, paper_set
 from rotor_mbs.report.errata_page import errata_page
 from rotor_mbs.report.files import ERRATA, INDEX, WALK, page_names, write_pages
 from rotor_mbs.report.index_page import index_page
@@ -138,7 +138,7 @@ def _tasks(
         yield SceneTask(
             name,
             tuple(claim for claim in said_of if name in claim.published.scenes),
-            tuple(said.conditions_of(name, conditions)),
+            tuple(claim_tables.conditions_of(name, conditions)),
             has_errata,
             files[names[i - 1]] if i else "",
             files[names[i + 1]] if i + 1 < len(names) else "",

@@ -8,7 +8,7 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import finding
-from rotor_mbs.report import metrics, said
+from rotor_mbs.report import claim_tables, metrics
 from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import name_of
 from rotor_mbs.report.numbers import number, prefixed, quantity
@@ -34,14 +34,14 @@ def index_page(
     has_numbers = any(claim.published.is_number for claim in claims)
     sections = [
         Section("scenes", texts.SCENES, tables=[scene_table(scenes, files)], notes=[texts.HORIZON_NOTE]),
-        Section("numbers", texts.NUMBERS, tables=[said.number_table(claims)], notes=[texts.QUOTE_NOTE]),
-        Section("claims", texts.CLAIMS, tables=[said.claim_table(claims)]),
+        Section("numbers", texts.NUMBERS, tables=[claim_tables.number_table(claims)], notes=[texts.QUOTE_NOTE]),
+        Section("claims", texts.CLAIMS, tables=[claim_tables.claim_table(claims)]),
         Section("errata", texts.ERRATA, tables=[_errata_table(errata)]),
     ]
     if has_numbers:
         sections[1] = Section(
             "numbers", texts.NUMBERS, tables=sections[1].tables,
-            notes=[texts.QUOTE_NOTE, *said.general_conditions(conditions)],
+            notes=[texts.QUOTE_NOTE, *claim_tables.general_conditions(conditions)],
         )  # fmt: skip
     machine = [(name, str(results.attributes[name])) for name in _MACHINE if results.attributes.get(name)]
     return IndexPage(

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from rotor_mbs.analysis import methods
-from rotor_mbs.analysis.pitch import escape_rate
+from rotor_mbs.analysis.escape_rate import escape_rate
 from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import name_of
 from rotor_mbs.report.numbers import number, prefixed
 from rotor_mbs.report.parts import Cell, Table, without_empty_columns
+from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
-from rotor_mbs.trajectory.outcome import is_held
 
 
 def status_cell(run: StoredRun) -> Cell:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import canvas, figures, metrics, said, vector
+from rotor_mbs.report import canvas, claim_tables, figures, metrics, svg
 from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import GREY, Look, coordinate_look, look_of, name_of
 from rotor_mbs.report.parts import Picture, Sample, Section, line_sample, mark_sample, run_sample
@@ -78,7 +78,7 @@ def lead(scene: StoredScene) -> list[str]:
 def sections(scene: StoredScene, claims: Sequence[Claim], conditions: Sequence[str]) -> list[Section]:
     """All sections that have something to show, in their order on the page."""
     drawn = Drawn.of(scene)
-    tables = [said.number_table(claims), said.claim_table(claims)]
+    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims)]
     found = [
         Section("said", texts.PAPER_SAYS, tables=[table for table in tables if table.rows], notes=conditions),
         paths(drawn),
@@ -296,8 +296,8 @@ def _horizon_sample(drawn: Drawn) -> Iterator[Sample]:
 
 def _picture(panels: canvas.Panels, name: str, caption: str, described: str, notes: Iterable[str] = ()) -> Picture:
     """Draws it. `name` is unique on the page; `described` says what one would see."""
-    svg = vector.embedded(canvas.svg_text(panels.figure), name, caption, described)
-    return Picture(Markup(svg), caption, [note for note in notes if note])
+    text = svg.embedded(canvas.svg_text(panels.figure), name, caption, described)
+    return Picture(Markup(text), caption, [note for note in notes if note])
 
 
 def source_comment(scene: StoredScene) -> str:

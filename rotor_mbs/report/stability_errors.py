@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.report import canvas, figures, vector
+from rotor_mbs.report import canvas, figures, svg
 from rotor_mbs.report import stability_texts as words
 from rotor_mbs.report.figures import Series
 from rotor_mbs.report.names import look_of, name_of
@@ -66,8 +66,8 @@ def error_over_step(ladders: Sequence[Record]) -> Section:
 
 
 def picture(panels: canvas.Panels, name: str, caption: str) -> Picture:
-    svg = vector.embedded(canvas.svg_text(panels.figure), name, caption, caption)
-    return Picture(Markup(svg), caption)
+    text = svg.embedded(canvas.svg_text(panels.figure), name, caption, caption)
+    return Picture(Markup(text), caption)
 
 
 def _differences(scene: StoredScene, runs: Runs) -> Curves:

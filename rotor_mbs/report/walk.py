@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from markupsafe import Markup
 
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import canvas, vector
+from rotor_mbs.report import canvas, svg
 from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import coordinate_look, name_of
 from rotor_mbs.report.numbers import fixed
@@ -106,8 +106,8 @@ def _swing(runs: Mapping[str, StoredRun]) -> dict[str, float]:
 
 def _embedded(panels: canvas.Panels, name: str, heading: str, method: str, figure: str, message: str) -> Picture:
     title = texts.walk_picture(figure, heading)
-    svg = vector.embedded(canvas.svg_text(panels.figure), name, title, message)
-    return Picture(Markup(svg), method.capitalize() if method.startswith(heading.lower()) else f"{heading}: {method}")
+    text = svg.embedded(canvas.svg_text(panels.figure), name, title, message)
+    return Picture(Markup(text), method.capitalize() if method.startswith(heading.lower()) else f"{heading}: {method}")
 
 
 def _number(claim: Claim) -> str:

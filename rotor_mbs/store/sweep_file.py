@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.runner.interrupts import interrupts_put_off
+from rotor_mbs.execution.interrupts import interrupts_put_off
 from rotor_mbs.store import hdf5, sweep_layout
 from rotor_mbs.store.chunk_index import ChunkIndex
 from rotor_mbs.store.read import open_results

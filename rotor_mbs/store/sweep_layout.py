@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import STATUSES
 from rotor_mbs.store.layout import QUANTITIES, SCALES, Quantity
 from rotor_mbs.store.sweep_rows import MESSAGE, Rows
-from rotor_mbs.trajectory.outcome import STATUSES
 
 SWEEP_STATUSES = (*STATUSES, "worker_died")
 MESSAGE_BYTES = 200

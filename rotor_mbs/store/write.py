@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import energy_error
+from rotor_mbs.solution.record import Solution, Trajectory
 from rotor_mbs.store import hdf5, layout
-from rotor_mbs.trajectory.compare import energy_error
-from rotor_mbs.trajectory.record import Run, Trajectory
 
 
-def write_run(path: Path, scene: Scene, scene_hash: str, run: Run, attributes: Mapping[str, object]) -> None:
+def write_run(path: Path, scene: Scene, scene_hash: str, run: Solution, attributes: Mapping[str, object]) -> None:
     """One run of one scene as a results file of its own, atomically.
 
     attributes: what is known of the run beyond its record (status, metrics, hash). Raises StoreError.
@@ -27,7 +27,7 @@ def write_run(path: Path, scene: Scene, scene_hash: str, run: Run, attributes: M
         hdf5.put_attributes(group, {**_facts(run), **attributes})
 
 
-def _facts(run: Run) -> dict[str, object]:
+def _facts(run: Solution) -> dict[str, object]:
     facts: dict[str, object] = {
         "time_reached": run.integration.time_reached,
         "engine_success": run.integration.success,

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from devtools import PROGRAM, Page
-from scenes import paper
-from stored import Made, rotor, store
+from support.devtools import PROGRAM, Page
+from support.scenes import paper
+from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
 

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.models.base import solve
+from rotor_mbs.methods.base import solve
 from rotor_mbs.models.lagrange import ensemble_samples, taylor
 from rotor_mbs.models.lagrange.compile_lock import one_at_a_time
-from rotor_mbs.models.lagrange.derived import Derived, tip_numbers
 from rotor_mbs.models.lagrange.ensemble_samples import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
+from rotor_mbs.models.lagrange.observables import Derived, tip_numbers
 from rotor_mbs.models.lagrange.system import build_system, equation_numbers, set_parameters
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array, Integration
+from rotor_mbs.solution.record import Array, Integration
 
 # rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
 _HUGE = 1e13

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array, Integration, Run, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Solution, Trajectory
 
 _COLUMNS = ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work")
 
@@ -57,7 +57,7 @@ def empty_block(scenes: Sequence[Scene]) -> Block:
     return Block(time, angles, rates, tip, kinetic, potential, work, words, [0] * runs)
 
 
-def put_single(block: Block, i: int, run: Run) -> None:
+def put_single(block: Block, i: int, run: Solution) -> None:
     """A run of its own as run i of the block."""
     n = len(run.trajectory.time)
     for name in _COLUMNS:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotor_mbs.models import deadline
+from rotor_mbs.methods import time_limit as deadline
+from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models import ode45 as matlab
-from rotor_mbs.models.deadline import OutOfTimeError
-from rotor_mbs.models.lagrange.plain import Advance, Integrator, RightHandSide
-from rotor_mbs.trajectory.record import Array
+from rotor_mbs.models.lagrange.ode_solvers import Advance, Integrator, RightHandSide
+from rotor_mbs.solution.record import Array
 
 
 def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: float) -> Integrator:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from rotor_mbs.models.base import Method
+from rotor_mbs.methods.base import Method
 from rotor_mbs.models.lagrange.integrators import ode45_integrator, scipy_integrator
-from rotor_mbs.models.lagrange.plain import PlainMethod
+from rotor_mbs.models.lagrange.ode_solvers import PlainMethod
 
 METHODS: dict[str, Method] = {
     "lagrange/ode45": PlainMethod(ode45_integrator, 1e-6, 1e-9),

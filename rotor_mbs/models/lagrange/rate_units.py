@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array
+from rotor_mbs.solution.record import Array
 
 # Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).
 _PLAIN = 100.0

@@ -9,12 +9,12 @@ from types import MappingProxyType
 import numpy as np
 
 from rotor_mbs.models.lagrange import samples
+from rotor_mbs.models.lagrange.fallback_reference import StandInReference
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of, heyoka, is_available
 from rotor_mbs.models.lagrange.rate_units import rate_units
-from rotor_mbs.models.lagrange.stand_in import StandInReference
 from rotor_mbs.models.lagrange.system import Propagation, System, build_system, compiled, initial_state, set_parameters
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array, Integration, Item, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
 
 # The second run's tolerance is a thousandth of the first one's: their distance bounds the first one's error, and the
 # second one, a thousand times better or at quad round-off, is kept.

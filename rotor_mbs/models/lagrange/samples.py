@@ -7,7 +7,7 @@ import numpy as np
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array, Item, Trajectory
+from rotor_mbs.solution.record import Array, Item, Trajectory
 
 
 def trajectory(scene: Scene, time: Array, states: Array, moving: tuple[int, ...]) -> Trajectory:

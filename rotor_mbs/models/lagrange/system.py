@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.models import deadline
+from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
 from rotor_mbs.models.lagrange.torque import Stretch, stretches
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array, Integration
+from rotor_mbs.solution.record import Array, Integration
 
 
 @dataclass

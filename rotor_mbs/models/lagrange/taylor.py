@@ -11,7 +11,7 @@ from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of, heyoka
 from rotor_mbs.models.lagrange.system import Propagation, build_system, compiled, initial_state, set_parameters
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Integration, Item, Trajectory
+from rotor_mbs.solution.record import Integration, Item, Trajectory
 
 DEFAULTS: Mapping[str, object] = MappingProxyType({"tolerance": float(np.finfo(float).eps)})
 

@@ -16,7 +16,7 @@ from rotor_mbs.models.printed.blades import PointMassRotor, point_mass_rotor
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.trajectory.record import Array, Integration, Item, Refined, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Item, Refined, Trajectory
 
 # (torque in N m, angles and rates) -> accelerations; all of the coordinates that move.
 Accelerations = Callable[[float, Sequence[float]], Sequence[float]]

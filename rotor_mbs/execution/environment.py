@@ -1,0 +1,60 @@
+"""What the results depend on besides scene and method: versions, machine, and the text of our own numerics."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.metadata
+import os
+import platform
+from pathlib import Path
+
+import rotor_mbs
+
+_PACKAGES = ("exudyn", "heyoka", "numpy", "scipy", "h5py")
+_NUMERICS = ("scenario", "solution", "methods", "models")
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Of this package, of the engines and libraries ("not installed" where one is missing), and of Python."""
+    found = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+@functools.cache
+def machine() -> dict[str, str]:
+    """Operating system and processor, as told by the machine."""
+    return {"platform": platform.platform(), "cpu": f"{_processor()}, {os.cpu_count()} cores"}
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        for line in information.read_text(errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def numerics_fingerprint() -> str:
+    """Of the sources that decide a run's numbers: a changed model makes stored runs stale."""
+    return fingerprint(*_NUMERICS)
+
+
+@functools.cache
+def fingerprint(*folders: str) -> str:
+    """sha256 over every file of this package's `folders`."""
+    package = Path(rotor_mbs.__file__).parent
+    digest = hashlib.sha256()
+    for folder in folders:
+        for path in sorted((package / folder).rglob("*")):
+            if path.is_file() and path.suffix != ".pyc":
+                digest.update(str(path.relative_to(package)).encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()

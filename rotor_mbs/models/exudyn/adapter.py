@@ -1,0 +1,213 @@
+"""The one place that imports Exudyn: builds a system from its parts, runs it leg by leg, hands out recorded rows.
+
+Knows no rotor. The engine runs without window, console output or files, in its fast build (no range checks).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.methods.time_limit import words as out_of_time
+from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref
+from rotor_mbs.models.exudyn.schemes import Scheme
+from rotor_mbs.models.exudyn.timetable import Leg, steps_and_rows
+from rotor_mbs.solution.record import Array, Integration
+
+os.environ.setdefault("EXUDYN_SUPPRESS_UI_WINDOW_OPEN", "1")
+os.environ.setdefault("EXUDYN_MODULE", "fast")
+with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
+    import exudyn
+    from exudyn import itemInterface
+
+# The engine's type stubs lag behind it.
+_engine: Any = exudyn
+_engine.config.printToConsole = False
+_engine.config.suppressWarnings = True
+
+
+class _StuckError(Exception):
+    """The engine makes no headway."""
+
+
+class System:
+    """An assembled system of the engine. Each `integrate` starts from the initial state the parts were given.
+
+    Raises MethodRefusal, with the engine's reason, where the engine does not take the parts.
+    """
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        self._container = _engine.SystemContainer()
+        self._mbs = self._container.AddSystem()
+        self._numbers: dict[Ref, object] = {}
+        try:
+            for part in parts:
+                self._add(part)
+            self._mbs.Assemble()
+        except _engine.ExudynError as exc:
+            raise MethodRefusal(f"Exudyn does not take this model: {_one_line(str(exc))}") from exc
+        self._initial_state = self._mbs.systemData.GetSystemState(_engine.ConfigurationType.Initial)
+
+    def _add(self, part: Part) -> None:
+        arguments = {key: self._argument(key, value) for key, value in part.parameters.items()}
+        item = getattr(itemInterface, part.type)(name=part.name, **arguments)
+        add = getattr(self._mbs, f"Add{part.kind.capitalize()}")
+        self._numbers[Ref(part.kind, part.name)] = add(item)
+
+    def _argument(self, key: str, value: Any) -> object:
+        if isinstance(value, Ref):
+            return self._numbers[value]
+        if isinstance(value, Frame):
+            return _engine.HT(rotation=value.rotation, translation=value.position)
+        if isinstance(value, tuple) and value and isinstance(value[0], Ref):
+            return [self._numbers[ref] for ref in value]
+        return _TRANSLATIONS.get(key, _as_is)(value)
+
+    def counts(self) -> dict[str, int]:
+        """How many nodes, objects, markers, loads and sensors the engine holds."""
+        data = self._mbs.systemData
+        return {kind: getattr(data, f"NumberOf{kind.capitalize()}s")() for kind in _KINDS}
+
+    def rows(self, sensor: str) -> Array:
+        """(n, 1 + k) rows a sensor kept in the last integration: time in s, then its k values."""
+        stored = self._mbs.GetSensorStoredData(self._numbers[Ref("sensor", sensor)])
+        return np.array(stored, dtype=float, ndmin=2)
+
+    def integrate(
+        self, scheme: Scheme, legs: Sequence[Leg], rows_between: bool, before_leg: Callable[[Leg], None]
+    ) -> Integration:
+        """From the initial state to the end of the last leg, or to the first failure, which is told and not raised.
+
+        rows_between: keep rows between samples too. before_leg is called with each leg first.
+        Raises KeyboardInterrupt if interrupted.
+        """
+        self._mbs.systemData.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
+        settings = _settings(scheme)
+        trials = self._limit_trials(scheme) if scheme.trial_steps else []
+        total = Integration(True, "", 0.0, 0, 0)
+        for leg in legs:
+            before_leg(leg)
+            trials.clear()
+            settings.solution.sensors.append = leg is not legs[0]
+            _schedule(settings, scheme, leg, rows_between)
+            solver = _engine.MainSolverExplicit() if scheme.stages else _engine.MainSolverImplicitSecondOrder()
+            failure = self._solve(solver, settings)
+            _count(total, scheme, leg, solver.it, failure)
+            if failure:
+                break
+            self._keep_state()
+            settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, leg.end - leg.start)
+        return total
+
+    def _solve(self, solver: Any, settings: Any) -> str:
+        """Why the engine says it failed; empty where it says it did not."""
+        try:
+            if solver.SolveSystem(self._mbs, settings):
+                return ""
+            reason = ""
+        except (_engine.ExudynError, RuntimeError, SystemError, _StuckError) as exc:
+            if _caused_by(exc, KeyboardInterrupt):
+                raise KeyboardInterrupt from exc
+            if _caused_by(exc, OutOfTimeError):
+                return out_of_time()
+            reason = _one_line(str(exc))
+        return reason or _one_line(solver.GetErrorString()) or "the engine gave no reason"
+
+    def _keep_state(self) -> None:
+        data = self._mbs.systemData
+        data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
+
+    def _limit_trials(self, scheme: Scheme) -> list[float]:
+        trials: list[float] = []
+
+        def before_trial(_system: object, time: float) -> bool:
+            trials.append(time)
+            if len(trials) > scheme.trial_steps:
+                raise _StuckError(f"no headway in {scheme.trial_steps} trial steps near t = {time:.6g} s")
+            return True
+
+        self._mbs.SetPreStepUserFunction(before_trial)
+        return trials
+
+
+def _settings(scheme: Scheme) -> Any:
+    settings = _engine.SimulationSettings()
+    settings.solution.file.write = False
+    settings.displayStatistics = settings.displayComputationTime = False
+    integration = settings.timeIntegration
+    integration.verboseMode = 0
+    integration.solverType = getattr(_engine.DynamicSolverType, scheme.solver)
+    # A step the engine halves by itself leaves the sample times: a fixed step is fixed, or fails.
+    integration.adaptiveStep = False
+    for path, value in scheme.options.items():
+        *groups, name = path.split(".")
+        target = integration
+        for group in groups:
+            target = getattr(target, group)
+        setattr(target, name, value)
+    settings.linearSolver.solverType = _engine.LinearSolverType.EigenDense
+    return settings
+
+
+def _schedule(settings: Any, scheme: Scheme, leg: Leg, rows_between: bool) -> None:
+    integration = settings.timeIntegration
+    span = (leg.end - leg.start) / leg.intervals
+    steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
+    integration.startTime, integration.endTime = leg.start, leg.end
+    integration.numberOfSteps = steps * leg.intervals
+    every_step = scheme.step is None and rows_between
+    # The engine adds up periods: shortened by a tenth of a step over the whole leg, rounding makes none come late.
+    period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
+    settings.solution.sensors.writePeriod = 0.0 if every_step else period
+
+
+def _count(total: Integration, scheme: Scheme, leg: Leg, it: Any, failure: str) -> None:
+    """Add one leg's outcome; an implicit step evaluates its residual once more than it iterates.
+
+    The engine's index is one ahead of the steps it took, and two where the last one failed.
+    """
+    steps = max(0, it.currentStepIndex - (2 if failure else 1))
+    tried = steps + it.rejectedAutomaticStepSizeSteps
+    total.steps = (total.steps or 0) + steps
+    evaluations = tried * scheme.stages if scheme.stages else it.newtonStepsCount + steps
+    total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
+    total.success, total.message = not failure, failure
+    total.out_of_time = failure == out_of_time()
+    total.time_reached = max(leg.start, it.currentTime - it.currentStepSize) if failure else leg.end
+
+
+def _caused_by(exc: BaseException | None, kind: type[BaseException]) -> bool:
+    while exc is not None:
+        if isinstance(exc, kind):
+            return True
+        exc = exc.__cause__ or exc.__context__
+    return False
+
+
+def _one_line(text: str) -> str:
+    lines = [line.strip(" =*+\t") for line in text.splitlines()]
+    return "; ".join(line for line in lines if line)[:300]
+
+
+def _as_is(value: object) -> object:
+    return value
+
+
+_KINDS = ("node", "object", "marker", "load", "sensor")
+
+# What the engine wants in its own types, by the name of the argument.
+_TRANSLATIONS: dict[str, Callable[[Any], object]] = {
+    "outputVariableType": lambda name: getattr(_engine.OutputVariableType, name),
+    "jointTypes": lambda names: [getattr(_engine.JointType, name) for name in names],
+    "jointTransformations": _engine.Matrix3DList,
+    "linkInertiasCOM": _engine.Matrix3DList,
+    "jointOffsets": _engine.Vector3DList,
+    "linkCOMs": _engine.Vector3DList,
+}

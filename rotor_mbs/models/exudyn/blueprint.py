@@ -1,0 +1,49 @@
+"""What a model consists of, as plain data: it is listed, counted, and handed to the engine, and so cannot differ.
+
+Knows the engine's item names as words only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rotor_mbs.solution.record import Item
+
+
+@dataclass(frozen=True)
+class Ref:
+    """The number the engine gave to another part, by kind and name."""
+
+    kind: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's frame."""
+
+    rotation: object
+    position: object
+
+
+@dataclass(frozen=True)
+class Part:
+    """One item: `type` is the engine's name of it, `parameters` its arguments, with Ref where they name other parts."""
+
+    kind: str
+    name: str
+    type: str
+    parameters: Mapping[str, object] = field(default_factory=dict)
+    detail: str = ""
+
+
+def sensor(name: str, type_: str, quantity: str, detail: str = "", **where: object) -> Part:
+    """A sensor that keeps `quantity` (the engine's name of an output) in memory."""
+    stored = {"outputVariableType": quantity, "storeInternal": True, "writeToFile": False, **where}
+    return Part("sensor", name, type_, stored, detail or quantity)
+
+
+def items(parts: Sequence[Part]) -> list[Item]:
+    """The parts as a reader wants them listed."""
+    return [Item(part.kind, part.name, f"{part.type}: {part.detail}" if part.detail else part.type) for part in parts]

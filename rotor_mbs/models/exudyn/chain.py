@@ -1,0 +1,190 @@
+"""The rotor as a chain of free bodies held together by joints: ground, hub, blades; redundant coordinates.
+
+Knows the engine through the blueprint alone. Every node stands at its body's centre of mass, so masses and inertias
+go in as the scene tells them. A hub without mass or inertia is a body with none: its joints fix it, the constrained
+system is regular, and no inertia has to be invented for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref, sensor
+from rotor_mbs.models.exudyn.geometry import (
+    Body,
+    blade_body,
+    fixed_blade_rotation,
+    hub_body,
+    mounting,
+    pitching,
+    quaternion,
+    quaternion_rate,
+    rotation_vector,
+    rotation_y,
+    rotation_z,
+)
+from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Array
+
+NODES = ("euler_parameters", "rotation_vector")
+
+# Columns are the joint frame's x, y, z: its z is the shaft.
+_ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A body at the start: turn about the shaft and pitch in rad, (3,) angular velocity in rad/s, base frame."""
+
+    name: str
+    body: Body
+    about_shaft: float
+    pitch: float
+    omega: Array
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3) body frame to base frame."""
+        return rotation_y(np.cos(self.about_shaft), np.sin(self.about_shaft)) @ rotation_z(self.pitch)
+
+
+def placed_bodies(scene: Scene) -> list[Placed]:
+    """Hub and pitching blades as forward kinematics puts them at the start: positions and velocities fit the joints."""
+    rotor, rate = scene.initial_angles[0], scene.initial_rates[0]
+    spin = np.array([0.0, rate, 0.0])
+    out = [Placed("hub", hub_body(scene), rotor, 0.0, spin)]
+    for i in pitching(scene):
+        pitch, pitch_rate = scene.initial_angles[1 + i], scene.initial_rates[1 + i]
+        about_shaft = rotor + scene.phases[i]
+        axis = np.array([np.sin(about_shaft), 0.0, np.cos(about_shaft)])
+        body = blade_body(scene.blades[i])
+        out.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, spin + pitch_rate * axis))
+    return out
+
+
+def parts(scene: Scene, torque: RotorTorque, node: str) -> list[Part]:
+    """Everything the engine holds for this scene, in the order it is built; `node` is one of NODES."""
+    hub, *blades = placed_bodies(scene)
+    built = [Part("object", "ground", "ObjectGround")]
+    for placed in (hub, *blades):
+        built += _body(placed, node)
+        if scene.gravity != 0.0 and placed.body.mass:
+            built += _gravity(placed, scene.gravity)
+    built += _bearing("shaft bearing", _on_ground(), _on_body(hub, "at shaft", _ALONG_SHAFT))
+    for i, blade in zip(pitching(scene), blades, strict=True):
+        seat = _on_body(hub, f"at bearing {i + 1}", mounting(i, len(scene.blades)))
+        built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
+        built += _pitch_spring(scene, i, seat.name, f"{blade.name} at bearing")
+    if scene.shaft_damping:
+        built.append(_spring("shaft damper", "ground at shaft", "hub at shaft", damping=scene.shaft_damping))
+    if scene.has_torque:
+        built.append(_rotor_torque(scene, torque))
+    return built + _sensors(scene, [hub, *blades])
+
+
+def _body(placed: Placed, node: str) -> list[Part]:
+    body, name = placed.body, placed.name
+    position = placed.rotation @ body.com
+    velocity = np.cross(placed.omega, position)
+    p = quaternion(placed.about_shaft, placed.pitch)
+    if node == "euler_parameters":
+        type_, pose, motion = "NodeRigidBodyEP", p, quaternion_rate(p, placed.omega)
+    else:  # its velocity coordinates are the angular velocity in the body's frame
+        type_, pose, motion = "NodeRigidBodyRotVecLG", rotation_vector(p), placed.rotation.T @ placed.omega
+    parameters = {
+        "referenceCoordinates": [*position, *pose],
+        "initialCoordinates": [0.0] * (3 + len(pose)),
+        "initialVelocities": [*velocity, *motion],
+    }
+    tensor = body.inertia
+    inertia = {
+        "nodeNumber": Ref("node", name),
+        "mass": body.mass,
+        "inertia": [*np.diag(tensor), tensor[1, 2], tensor[0, 2], tensor[0, 1]],  # the engine's order
+    }
+    what = f"{body.mass:g} kg" if body.mass else "no mass of its own"
+    return [
+        Part("node", name, type_, parameters, "at the centre of mass"),
+        Part("object", name, "ObjectRigidBody", inertia, what),
+    ]
+
+
+def _gravity(placed: Placed, gravity: float) -> list[Part]:
+    marker = Part("marker", f"{placed.name} mass", "MarkerBodyMass", {"bodyNumber": Ref("object", placed.name)})
+    load = {"markerNumber": Ref("marker", marker.name), "loadVector": [0.0, 0.0, -gravity]}
+    return [marker, Part("load", f"gravity on {placed.name}", "LoadMassProportional", load)]
+
+
+def _on_ground() -> Part:
+    parameters = {"bodyNumber": Ref("object", "ground"), "localHT": Frame(_ALONG_SHAFT, np.zeros(3))}
+    return Part("marker", "ground at shaft", "MarkerBodyRigid", parameters)
+
+
+def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
+    """A marker at the hub centre, fixed on the body."""
+    frame = Frame(rotation, -placed.body.com)
+    parameters = {"bodyNumber": Ref("object", placed.name), "localHT": frame}
+    return Part("marker", f"{placed.name} {where}", "MarkerBodyRigid", parameters)
+
+
+def _bearing(name: str, first: Part, second: Part) -> list[Part]:
+    """A joint that leaves the two markers free to turn about their common z."""
+    markers = (Ref("marker", first.name), Ref("marker", second.name))
+    return [first, second, Part("object", name, "ObjectJointRevoluteZ", {"markerNumbers": markers})]
+
+
+def _pitch_spring(scene: Scene, blade: int, seat: str, root: str) -> list[Part]:
+    stiffness = scene.bearing_stiffness[blade] if scene.bearing_stiffness else 0.0
+    damping = scene.bearing_damping[blade] if scene.bearing_damping else 0.0
+    name = f"pitch spring {blade + 1}"
+    if not stiffness:
+        return [_spring(name, seat, root, damping=damping)] if damping else []
+    turns = {"initialCoordinates": [scene.initial_angles[1 + blade]], "numberOfDataCoordinates": 1}
+    counter = Part("node", f"turns of {name}", "NodeGenericData", turns, "the angle over many turns")
+    return [counter, _spring(name, seat, root, counter.name, stiffness=stiffness, damping=damping)]
+
+
+def _spring(name: str, first: str, second: str, counter: str = "", **constants: float) -> Part:
+    parameters: dict[str, object] = {"markerNumbers": (Ref("marker", first), Ref("marker", second)), **constants}
+    if counter:
+        parameters["nodeNumber"] = Ref("node", counter)
+    detail = ", ".join(f"{key} {value:g}" for key, value in constants.items())
+    return Part("object", name, "ObjectConnectorTorsionalSpringDamper", parameters, detail)
+
+
+def _rotor_torque(scene: Scene, torque: RotorTorque) -> Part:
+    load: dict[str, object] = {
+        "markerNumber": Ref("marker", "hub at shaft"),
+        "loadVector": [0.0, scene.rotor_torque[0][1], 0.0],
+    }
+    if not scene.has_constant_torque:
+        load["loadVectorUserFunction"] = torque.vector
+    detail = "constant" if scene.has_constant_torque else "over time"
+    return Part("load", "rotor torque", "LoadTorqueVector", load, detail)
+
+
+def _sensors(scene: Scene, placed: list[Placed]) -> list[Part]:
+    out = []
+    for each in placed:
+        name, node = each.name, Ref("node", each.name)
+        out.append(sensor(f"{name} position", "SensorNode", "Position", nodeNumber=node))
+        out.append(sensor(f"{name} rotation", "SensorNode", "RotationMatrix", nodeNumber=node))
+        out.append(sensor(f"{name} spin", "SensorNode", "AngularVelocityLocal", nodeNumber=node))
+        if scene.wants("energy") and each.body.mass:
+            out.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=node))
+    if scene.wants("tip"):
+        out += [_tip_sensor(scene, blade, placed[0].body) for blade in range(len(scene.blades))]
+    return out
+
+
+def _tip_sensor(scene: Scene, blade: int, hub: Body) -> Part:
+    tip = np.array(scene.blades[blade].tip)
+    if blade in pitching(scene):
+        name, point = f"blade {blade + 1}", tip - np.array(scene.blades[blade].centre_of_mass)
+    else:
+        name, point = "hub", fixed_blade_rotation(scene, blade) @ tip - hub.com
+    body = Ref("object", name)
+    return sensor(f"tip {blade + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=list(point))

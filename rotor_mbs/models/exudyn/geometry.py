@@ -1,0 +1,123 @@
+"""Rotations and rigid bodies of the rotor, from raw scene data. Knows neither the engine nor any other model.
+
+Base frame: z up, the shaft along y. Blade i stands in the hub frame turned by its phase about y, and turns by its
+pitch about its own z: R_i = Ry(rotor + phase_i) Rz(pitch_i).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.record import Array
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body in its own frame, whose origin is the hub centre.
+
+    mass kg; com (3,) m; inertia (3, 3) kg m² about the centre of mass.
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+
+
+def rotation_y(cosine: float, sine: float) -> Array:
+    """(3, 3) turn about the shaft; its y row and column are exact, which keeps exact zeros out of plane."""
+    return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+
+
+def rotation_z(angle: float) -> Array:
+    """(3, 3) turn about the pitch axis, angle in rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def mounting(index: int, count: int) -> Array:
+    """(3, 3) rotation from hub frame to the zero-pitch frame of blade `index` (from 0) of `count`."""
+    return rotation_y(*_turn(index, count))
+
+
+def _turn(part: int, whole: int) -> tuple[float, float]:
+    """Cosine and sine of 2π part/whole, folded into the first half quadrant: blades that balance do so exactly."""
+    quarter, rest = divmod(4 * part, whole)
+    cosine, sine = _cos_sin(min(rest, whole - rest) / whole)
+    if 2 * rest > whole:
+        cosine, sine = sine, cosine
+    return [(cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine)][quarter % 4]
+
+
+def _cos_sin(quarters: float) -> tuple[float, float]:
+    angle = 0.5 * math.pi * quarters
+    sine = 0.5 if math.isclose(quarters, 1.0 / 3.0, rel_tol=1e-15) else math.sin(angle)
+    return math.cos(angle), sine
+
+
+def quaternion(about_shaft: float, pitch: float) -> Array:
+    """(4,) Euler parameters of Ry(about_shaft) Rz(pitch), scalar first."""
+    c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    return np.array([c * cp, s * sp, s * cp, c * sp])
+
+
+def quaternion_rate(p: Array, omega: Array) -> Array:
+    """(4,) time derivative of Euler parameters `p` at angular velocity `omega` (3,) rad/s in the base frame."""
+    e0, e = p[0], p[1:]
+    return 0.5 * np.concatenate([[-(e @ omega)], e0 * omega + np.cross(omega, e)])
+
+
+def rotation_vector(p: Array) -> Array:
+    """(3,) rad: axis times angle, at most π long, of the rotation with Euler parameters `p`."""
+    p = p if p[0] >= 0.0 else -p
+    length = float(np.linalg.norm(p[1:]))
+    return 2.0 * p[1:] if length == 0.0 else p[1:] * (2.0 * math.atan2(length, p[0]) / length)
+
+
+def pitching(scene: Scene) -> tuple[int, ...]:
+    """Indices (from 0) of the blades that resist pitching; the others are rigidly part of the hub."""
+    return tuple(i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia)
+
+
+def fixed_blade_rotation(scene: Scene, index: int) -> Array:
+    """(3, 3) rotation from hub frame to the frame of a blade held at its initial pitch."""
+    return mounting(index, len(scene.blades)) @ rotation_z(scene.initial_angles[1 + index])
+
+
+def blade_body(blade: Blade) -> Body:
+    """The blade as the scene tells it."""
+    xx, yy, zz, xy, xz, yz = blade.inertia
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Body(blade.mass, np.array(blade.centre_of_mass), tensor)
+
+
+def hub_body(scene: Scene) -> Body:
+    """The hub as a thin disc about the shaft, with every blade that cannot pitch made part of it.
+
+    A hub that turns about its principal axis y only feels its axial inertia; the disc's other two, half of it, make
+    it a body that can exist.
+    """
+    half = 0.5 * scene.hub_inertia
+    parts = [Body(0.0, np.zeros(3), np.diag([half, scene.hub_inertia, half]))]
+    for index, blade in enumerate(scene.blades):
+        if not blade.has_pitch_inertia:
+            parts.append(_turned(blade_body(blade), fixed_blade_rotation(scene, index)))
+    return _joined(parts)
+
+
+def _turned(body: Body, rotation: Array) -> Body:
+    return Body(body.mass, rotation @ body.com, rotation @ body.inertia @ rotation.T)
+
+
+def _joined(parts: list[Body]) -> Body:
+    mass = sum(part.mass for part in parts)
+    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / mass if mass else np.zeros(3)
+    inertia = np.zeros((3, 3))
+    for part in parts:
+        r = part.com - com
+        inertia += part.inertia + part.mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return Body(mass, com, inertia)

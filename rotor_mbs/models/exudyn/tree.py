@@ -1,0 +1,129 @@
+"""The rotor as a kinematic tree: hub and blades as links, rotor angle and pitch angles as the only coordinates.
+
+Knows the engine through the blueprint alone. Exact zeros stay exact: no coordinate is ever computed from another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
+from rotor_mbs.models.exudyn.geometry import (
+    Body,
+    blade_body,
+    fixed_blade_rotation,
+    hub_body,
+    mounting,
+    pitching,
+)
+from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Array
+
+_TREE = Ref("object", "rotor")
+_NODE = Ref("node", "joint angles")
+
+
+def parts(scene: Scene, torque: RotorTorque) -> list[Part]:
+    """Everything the engine holds for this scene, in the order it is built."""
+    built = [_node(scene), _tree(scene)]
+    if scene.has_torque:
+        built += _rotor_torque(scene, torque)
+    built += [
+        sensor("angles", "SensorNode", "Coordinates", "joint angles", nodeNumber=_NODE),
+        sensor("rates", "SensorNode", "Coordinates_t", "joint rates", nodeNumber=_NODE),
+    ]
+    if scene.wants("tip"):
+        built += [_tip_sensor(scene, blade) for blade in range(len(scene.blades))]
+    if scene.wants("energy"):
+        for link, body in enumerate(bodies(scene)):
+            built += _energy_sensors(link, body)
+    return built
+
+
+def bodies(scene: Scene) -> list[Body]:
+    """The links in order: hub, then the blades that pitch."""
+    return [hub_body(scene), *(blade_body(scene.blades[i]) for i in pitching(scene))]
+
+
+def link_name(link: int) -> str:
+    """The hub, or link k for the k-th blade that pitches."""
+    return f"link {link}" if link else "hub"
+
+
+def _node(scene: Scene) -> Part:
+    moving = [0, *(1 + i for i in pitching(scene))]
+    parameters = {
+        "referenceCoordinates": [0.0] * len(moving),
+        "initialCoordinates": [scene.initial_angles[j] for j in moving],
+        "initialCoordinates_t": [scene.initial_rates[j] for j in moving],
+        "numberOfODE2Coordinates": len(moving),
+    }
+    return Part("node", _NODE.name, "NodeGenericODE2", parameters, f"{len(moving)} coordinates")
+
+
+def _tree(scene: Scene) -> Part:
+    blades, links = pitching(scene), bodies(scene)
+    parameters: dict[str, object] = {
+        "nodeNumber": _NODE,
+        "jointTypes": ["RevoluteY", *("RevoluteZ" for _ in blades)],
+        "linkParents": [-1, *(0 for _ in blades)],
+        "jointTransformations": [np.eye(3), *(mounting(i, len(scene.blades)) for i in blades)],
+        "jointOffsets": [[0.0, 0.0, 0.0] for _ in links],
+        "linkMasses": [link.mass for link in links],
+        "linkCOMs": [list(link.com) for link in links],
+        "linkInertiasCOM": [link.inertia for link in links],
+    }
+    detail = f"{len(links)} links"
+    if scene.gravity != 0.0:
+        parameters["gravity"] = [0.0, 0.0, -scene.gravity]
+        detail += ", gravity"
+    if any(stiffness := [_of_blade(scene.bearing_stiffness, i) for i in blades]):
+        parameters["jointPControlVector"] = [0.0, *stiffness]
+        parameters["jointPositionOffsetVector"] = [0.0 for _ in links]
+        detail += ", bearing stiffness"
+    damping = [scene.shaft_damping, *(_of_blade(scene.bearing_damping, i) for i in blades)]
+    if any(damping):
+        parameters["jointDControlVector"] = damping
+        parameters["jointVelocityOffsetVector"] = [0.0 for _ in links]
+        detail += ", damping"
+    return Part("object", _TREE.name, "ObjectKinematicTree", parameters, detail)
+
+
+def _of_blade(values: Sequence[float], blade: int) -> float:
+    return values[blade] if values else 0.0
+
+
+def _rotor_torque(scene: Scene, torque: RotorTorque) -> list[Part]:
+    marker = Part("marker", "rotor angle", "MarkerNodeCoordinate", {"nodeNumber": _NODE, "coordinate": 0})
+    load: dict[str, object] = {"markerNumber": Ref("marker", marker.name), "load": scene.rotor_torque[0][1]}
+    if not scene.has_constant_torque:
+        load["loadUserFunction"] = torque.scalar
+    detail = "constant" if scene.has_constant_torque else "over time"
+    return [marker, Part("load", "rotor torque", "LoadCoordinate", load, detail)]
+
+
+def _tip_sensor(scene: Scene, blade: int) -> Part:
+    blades = pitching(scene)
+    if blade in blades:
+        link, point = 1 + blades.index(blade), np.array(scene.blades[blade].tip)
+    else:
+        link, point = 0, fixed_blade_rotation(scene, blade) @ np.array(scene.blades[blade].tip)
+    return _link_sensor(f"tip {blade + 1}", "Position", link, point)
+
+
+def _energy_sensors(link: int, body: Body) -> list[Part]:
+    """What this link's energies need: a hub without mass needs no path of its centre of mass."""
+    name, sensors = link_name(link), []
+    if body.mass:
+        sensors.append(_link_sensor(f"{name} position", "Position", link, body.com))
+        sensors.append(_link_sensor(f"{name} velocity", "Velocity", link, body.com))
+    if np.any(body.inertia):
+        sensors.append(_link_sensor(f"{name} spin", "AngularVelocityLocal", link, np.zeros(3)))
+    return sensors
+
+
+def _link_sensor(name: str, quantity: str, link: int, point: Array) -> Part:
+    return sensor(name, "SensorKinematicTree", quantity, objectNumber=_TREE, linkNumber=link, localPosition=list(point))

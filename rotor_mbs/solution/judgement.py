@@ -1,0 +1,232 @@
+"""The one judgement of a run, from its state: runner, bench, check and report all use it. Knows no engine, no results.
+
+What a method is held to stands in reference/accuracy.toml alone, where `check` reads it too: a status and a verdict
+cannot be true to different numbers.
+
+An engine's word counts only against it: a run it calls failed is never ok, a run it calls good is looked at all the
+same. The printed model is not held to the reference or to its energy: that it departs from them is the finding.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from rotor_mbs.scenario.bounds import shipped_bounds
+from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.metrics import Metrics, compare
+from rotor_mbs.solution.record import Array, Solution, Trajectory
+
+STATUSES = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out")
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """What a method's runs are held to.
+
+    angle    relative error (of the largest angle, at least 1 rad) per unit of error growth: the scene's own growth,
+             which is not the method's fault, carries every local error on (samples before the horizon)
+    energy   of the scene's energy scale, over the whole run; see `energy_conditioning`
+    gap      of the longest arm: the largest opening of a joint; 0 where the model has no joints that can open
+    """
+
+    angle: float
+    energy: float
+    gap: float
+
+
+# Share of the rotor's inertia that is left once every pitch is free: below this a run that broke off broke off there.
+_SINGULAR_SHARE = 1e-3
+
+# Round-off of a run's state, what it becomes over some hundred steps; magnified it may add to the energy error.
+_ROUND_OFF = 1e-14
+
+# A hundredth: of the energy scale, of the longest arm, or of the largest angle beyond what the scene itself makes of
+# an error at the start.
+_RESEMBLES = 1e-2
+
+# Below this share the last bit of a pitch decides the rotor's inertia: (π/2 known to 1e-16)², a hundredfold. What comes
+# after such a sample follows from round-off alone, however well an engine likes it.
+_NO_INERTIA = 1e-30
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """status: one of STATUSES; message: one line, "" where all is well; false_success: the engine claimed too much."""
+
+    status: str
+    message: str
+    false_success: bool
+    metrics: Metrics
+
+
+@functools.cache
+def allowed_of(method: str) -> Allowed | None:
+    """What "model/integrator" is held to; None for methods that are not held to anything (the printed model)."""
+    angle, energy, gap = (shipped_bounds().find(check, method) for check in ("agreement", "energy", "gap"))
+    if angle is None or energy is None:
+        return None
+    return Allowed(angle.value, energy.value, gap.value if gap else 0.0)
+
+
+def is_held(method: str) -> bool:
+    """Whether the method claims to solve the right equations, so that anything but "ok" is a failure."""
+    return not method.startswith("printed")
+
+
+def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Verdict:
+    """Finite? End reached? Through a singularity? Energy balance, joints, reference? The first no names the status."""
+    metrics = compare(scene, run.trajectory, reference)
+    status, message = _broken_off(scene, run)
+    if not status and is_held(run.method):
+        status, message = _through_singularity(scene, run, reference)
+    if not status:
+        status, message = _inaccurate(scene, run, metrics)
+    false_success = run.integration.success and not _is_close(scene, status, metrics)
+    return Verdict(status, message, false_success, metrics)
+
+
+def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
+    """Whether a claim of success may stand: the end reached, and off by no more than a coarse step is.
+
+    An inaccurate run is no false success as long as it resembles the motion; a wrong one is.
+    """
+    if status != "inaccurate":
+        return status == "ok"
+    errors = [metrics.get(name, 0.0) for name in ("energy_drift_max", "angle_error_per_growth")]
+    return all(error <= _RESEMBLES for error in [*errors, _open_share(scene, metrics)])
+
+
+def _open_share(scene: Scene, metrics: Metrics) -> float:
+    """The largest opening of a joint, of the longest arm; 0 where the model has no joints that can open."""
+    return metrics.get("constraint_error_max", 0.0) / max(math.hypot(*blade.centre_of_mass) for blade in scene.blades)
+
+
+def _broken_off(scene: Scene, run: Solution) -> tuple[str, str]:
+    """Runs that did not get to the end, or were called failed by their engine; ("", "") for the others."""
+    integration, samples = run.integration, len(run.trajectory.time)
+    complete = samples == scene.samples
+    if complete and integration.success:
+        return "", ""
+    reached = f"at t = {run.trajectory.time[-1]:.6g} s of {scene.duration:g} s" if samples else "at the start"
+    if integration.out_of_time:
+        return "timed_out", f"{integration.message}, {reached}"
+    said = integration.message or ("the engine reported success" if integration.success else "no reason given")
+    if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
+        return "singular", f"every pitch at ±π/2 leaves the rotor next to no inertia, {reached}; {said}"
+    if integration.success:
+        return "diverged", f"no finite sample after the last one {reached}; {said}"
+    return "solver_failed", f"{said}; {reached}"
+
+
+def _through_singularity(scene: Scene, run: Solution, reference: Trajectory | None) -> tuple[str, str]:
+    """Complete runs of a motion that does not exist: from a singular state, or past the time where it ends."""
+    share = rotor_inertia_shares(scene, run.trajectory.angles[:1])[0]
+    if share < _NO_INERTIA:
+        return "singular", "every pitch at ±π/2 leaves the rotor no inertia, from the start on"
+    if reference is None or not 0 < len(reference.time) < scene.samples:
+        return "", ""
+    if smallest_rotor_inertia_share(scene, reference) < _SINGULAR_SHARE:
+        return "singular", f"the motion ends in a singularity after t = {reference.time[-1]:.6g} s; the run went on"
+    return "", ""
+
+
+def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str]:
+    allowed = allowed_of(run.method)
+    if allowed is None:
+        return "ok", ""
+    energy = allowed.energy + energy_slack(scene, run.trajectory)
+    if not metrics.get("energy_drift_max", 0.0) <= energy:
+        return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of its scale, allowed {energy:.0e}"
+    gap = _open_share(scene, metrics)
+    if not gap <= allowed.gap:
+        return "inaccurate", f"a joint opens by {gap:.1e} of the longest arm, allowed {allowed.gap:.0e}"
+    if not metrics.get("angle_error_per_growth", 0.0) <= allowed.angle:
+        return "inaccurate", (
+            f"angle error {metrics['angle_error_max']:.1e} rad before the horizon, "
+            f"{metrics['angle_error_per_growth']:.1e} per unit of error growth, allowed {allowed.angle:.0e}"
+        )
+    return "ok", ""
+
+
+def energy_slack(scene: Scene, run: Trajectory) -> float:
+    """Of the energy scale: what magnified round-off may add to a method's own energy error."""
+    return _ROUND_OFF * (energy_conditioning(scene, run) - 1.0)
+
+
+def energy_conditioning(scene: Scene, run: Trajectory) -> float:
+    """By how much the energy magnifies round-off of the state, beyond the ordinary; at least 1.
+
+    Near a pitch of π/2 the rates grow like 1/√share while the energy stays: the terms that sum up to it are 1/√share
+    times larger than it. A pitch that moves less than a right angle between samples is looked at on its way, too.
+    """
+    steps = np.abs(np.diff(run.angles[:, 1:], axis=0)).max(initial=0.0)
+    shares = rotor_inertia_shares(scene, run.angles)
+    if steps < 0.5 * np.pi:
+        shares = np.concatenate([shares, _shares_at_quarter_turns(scene, run.angles)])
+    smallest = max(float(shares.min(initial=1.0)), _NO_INERTIA)
+    return max(1.0, float(np.sqrt(_SINGULAR_SHARE / smallest)))
+
+
+def _shares_at_quarter_turns(scene: Scene, angles: Array) -> Array:
+    """Where a pitch passes ±π/2 between two samples (straight way): the shares there."""
+    found = [np.empty(0)]
+    for column in range(1, angles.shape[1]):
+        quarter = np.floor(angles[:, column] / np.pi - 0.5)
+        for k in np.flatnonzero(np.diff(quarter)):
+            before, after = angles[k], angles[k + 1]
+            target = np.pi * (max(quarter[k], quarter[k + 1]) + 0.5)
+            part = (target - before[column]) / (after[column] - before[column])
+            there = before + part * (after - before)
+            there[column] = target
+            found.append(rotor_inertia_shares(scene, there[None, :]))
+    return np.concatenate(found)
+
+
+def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
+    """Smallest S / (rotor inertia) at the last sample and on the straight way on to the next one.
+
+    S = J_hub + Σ (a - b²/Jzz) is the Schur complement of the mass matrix: with every pitch free to give way, the
+    rotor's remaining inertia. For point-mass blades it is m (c² + d²) cos²θ.
+    """
+    if not len(run.time):
+        angles = np.array([scene.initial_angles])
+    else:
+        step = scene.duration / (scene.samples - 1)
+        angles = run.angles[-1] + np.linspace(0.0, step, 65)[:, None] * run.rates[-1]
+    return float(rotor_inertia_shares(scene, angles).min())
+
+
+def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
+    """(n,) S / (rotor inertia) for (n, 1 + blades) rad."""
+    remaining = np.full(len(angles), scene.hub_inertia)
+    whole = np.full(len(angles), scene.hub_inertia)
+    for i, blade in enumerate(scene.blades):
+        s, c = np.sin(angles[:, 1 + i]), np.cos(angles[:, 1 + i])
+        free, held = _shaft_inertia_forms(blade)
+        remaining += free[0] * s * s + free[1] * c * c + free[2] * s * c
+        whole += held[0] * s * s + held[1] * c * c + held[2] * s * c
+    shares: Array = remaining / whole
+    return shares
+
+
+@functools.lru_cache(maxsize=512)
+def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]]:
+    """Coefficients of s², c², s c (s, c of the pitch) in S and in the inertia about the shaft, kg m².
+
+    In exact arithmetic until the end: for a point mass the first vanishes, and its rounding must not pass for inertia.
+    """
+    m = Fraction(blade.mass)
+    x, y, z = map(Fraction, blade.centre_of_mass)
+    xx, yy, zz, xy, xz, yz = map(Fraction, blade.inertia)
+    xx, yy, zz = xx + m * (y * y + z * z), yy + m * (x * x + z * z), zz + m * (x * x + y * y)
+    xy, xz, yz = xy - m * x * y, xz - m * x * z, yz - m * y * z
+    held = [xx, yy, 2 * xy]
+    taken = [xz * xz, yz * yz, 2 * xz * yz] if blade.has_pitch_inertia else [Fraction(0)] * 3
+    free = [a - b / zz if b else a for a, b in zip(held, taken, strict=True)]
+    return [float(value) for value in free], [float(value) for value in held]

@@ -1,0 +1,133 @@
+"""How far a run is from a reference, and from its own energy: one set of metrics for runner, report and checks.
+
+Knows samples only; no engine, no file, no bound (those are in `outcome`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Array, Trajectory
+
+HORIZON_GROWTH = 1e5  # a scene's horizon: when an error of the initial state may have grown this many times
+
+Metrics = dict[str, float]
+
+# A pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
+# far below what a plot shows.
+_LEFT_ZERO = 1e-9
+
+
+def running_growth(reference: Trajectory) -> Array:
+    """(n,) the largest error growth so far, at least 1."""
+    if reference.growth is None:
+        return np.ones(len(reference.time))
+    return np.maximum(np.maximum.accumulate(reference.growth), 1.0)
+
+
+def horizon_samples(reference: Trajectory) -> int:
+    """How many samples lie before the horizon (all where the growth stays below HORIZON_GROWTH)."""
+    beyond = running_growth(reference) >= HORIZON_GROWTH
+    return int(np.argmax(beyond)) if beyond.any() else len(beyond)
+
+
+def horizon(reference: Trajectory) -> float:
+    """Time in s of the last sample before the error growth reaches HORIZON_GROWTH, or of the last sample."""
+    return float(reference.time[max(horizon_samples(reference) - 1, 0)])
+
+
+def angle_error(run: Trajectory, reference: Trajectory) -> Array:
+    """(common samples,) rad: largest over the coordinates. Angles are unwrapped: a lost turn is an error of 2π."""
+    n = min(len(run.time), len(reference.time))
+    error: Array = np.abs(run.angles[:n] - reference.angles[:n]).max(axis=1)
+    return error
+
+
+def tip_error(run: Trajectory, reference: Trajectory) -> Array | None:
+    """(common samples,) m: largest distance of a tip from its reference; None where either has no tips."""
+    if run.tip is None or reference.tip is None:
+        return None
+    n = min(len(run.tip), len(reference.tip))
+    distance: Array = np.linalg.norm(run.tip[:n] - reference.tip[:n], axis=2).max(axis=1)
+    return distance
+
+
+def energy_error(run: Trajectory) -> Array | None:
+    """(n,) J: total energy less work, less its value at the start; None where energies were not asked for."""
+    if run.kinetic_energy is None or run.potential_energy is None or run.work is None:
+        return None
+    total = run.kinetic_energy + run.potential_energy - run.work
+    error: Array = total - total[:1]  # of a run without a sample, too
+    return error
+
+
+def energy_scale(scene: Scene, run: Trajectory) -> float:
+    """J: what an energy error is relative to: the weights at their arms, the energy at the start, the work done.
+
+    Σ m g |r| + kinetic energy and spring energy at the start + largest |work|. Zero only where nothing moves.
+    """
+    weights = sum(b.mass * scene.gravity * float(np.linalg.norm(b.centre_of_mass)) for b in scene.blades)
+    springs = sum(
+        0.5 * k * angle**2 for k, angle in zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False)
+    )
+    kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0
+    work = float(np.abs(run.work).max(initial=0.0)) if run.work is not None else 0.0
+    return weights + springs + kinetic + work
+
+
+def compare(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
+    """The metrics stored with a run, by the names of the file format; those that do not exist are left out."""
+    metrics: Metrics = {}
+    if not len(run.time):
+        return metrics
+    energy = energy_error(run)
+    if energy is not None and len(energy) > 1:  # the first sample is what the others are held to
+        scale = energy_scale(scene, run)
+        metrics["energy_scale_J"] = scale
+        metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
+        metrics["energy_gain_J"] = float(energy.max())
+    if run.constraint_error is not None:
+        metrics["constraint_error_max"] = float(run.constraint_error.max())
+    if reference is not None:
+        metrics |= _against(run, reference)
+    return metrics
+
+
+def _against(run: Trajectory, reference: Trajectory) -> Metrics:
+    """Errors only where there is a second sample to tell them from: the first one is given, and right in every run."""
+    error = angle_error(run, reference)
+    until = min(horizon_samples(reference), len(error))
+    metrics = {"horizon_s": horizon(reference)}
+    if until > 1:
+        metrics["angle_error_max"] = float(error[:until].max())
+        metrics["angle_error_per_growth"] = float((error / _carried_error(reference)[: len(error)])[:until].max())
+        if (tips := tip_error(run, reference)) is not None:
+            metrics["tip_error_max"] = float(tips[:until].max())
+    if len(error) > 1:
+        metrics["angle_error_whole"] = float(error.max())
+        if len(run.time) == len(reference.time):
+            metrics["angle_error_end"] = float(error[-1])
+    return metrics | _invariant_set(run, reference)
+
+
+def _carried_error(reference: Trajectory) -> Array:
+    """(n,) What a relative error of 1 at the start would have become: growth times the largest angle (at least 1)."""
+    largest = np.maximum.accumulate(np.abs(reference.angles).max(axis=1))
+    return running_growth(reference) * np.maximum(largest, 1.0)
+
+
+def _invariant_set(run: Trajectory, reference: Trajectory) -> Metrics:
+    """Whether pitches that are exactly zero in the reference stayed so, and if not, when and how fast they left."""
+    zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
+    if not zero:
+        return {}
+    away = np.abs(run.angles[:, zero]).max(axis=1)
+    metrics = {"zero_pitch_max": float(away.max())}
+    if (away > _LEFT_ZERO).any():
+        metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > _LEFT_ZERO))])
+        linear = (away > 1e-12) & (away < 1e-2) & (np.arange(len(away)) <= int(np.argmax(away >= 1e-2) or len(away)))
+        if linear.sum() >= 10:
+            slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
+            metrics["zero_pitch_growth_per_s"] = float(slope)
+    return metrics

@@ -1,0 +1,199 @@
+"""What the timing process does: builds a point, runs it, judges the last run. One scene, engines loaded beforehand."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.methods.base import Solver
+from rotor_mbs.methods.catalogue import find_method, load_engine
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import Metrics
+from rotor_mbs.solution.record import Array, Integration, Solution, Trajectory
+from rotor_mbs.studies.work import Task, load_reference
+
+# Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
+# a bench would time the reading of samples.
+_MOST_INTERVALS = 100
+# An error as large as the motion itself: such a run is a failure, not a point on the curve.
+USELESS_RAD = 1.0
+USELESS_DRIFT = 0.1  # of the energy scale, where there is no reference
+
+
+@dataclass(frozen=True)
+class Point:
+    """One method at one setting: a rung of a curve. settings as (name, value) pairs."""
+
+    curve: str
+    method: str
+    rung: int
+    setting: float
+    settings: tuple[tuple[str, object], ...]
+
+
+@dataclass(frozen=True)
+class Request:
+    """To the timing process."""
+
+    do: Literal["prepare", "repeat", "judge"]
+    point: Point
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Seconds: of the first build (everything compiled anew), of a second one, and of one run (the warm-up)."""
+
+    setup_s: float
+    setup_again_s: float
+    run_s: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The last run of a point. same: bit for bit the warm-up's; output_s: time to read out and compute the samples."""
+
+    status: str
+    message: str
+    false_success: bool
+    same: bool
+    steps: int
+    output_s: float
+    metrics: Metrics
+
+
+def thinned(scene: Scene) -> tuple[Scene, int]:
+    """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or none."""
+    intervals = scene.samples - 1
+    k = next((k for k in range(1, intervals + 1) if intervals % k == 0 and intervals // k <= _MOST_INTERVALS), 1)
+    # A number of intervals without a fitting divisor would leave too few samples to see an error's largest.
+    k = k if intervals // k >= _MOST_INTERVALS // 5 or intervals <= _MOST_INTERVALS else 1
+    return replace(scene, samples=intervals // k + 1), k
+
+
+def thinned_reference(reference: Trajectory, k: int) -> Trajectory:
+    """Every k-th sample of everything that a comparison uses."""
+    names = ("tip", "kinetic_energy", "potential_energy", "work", "uncertainty", "growth")
+    arrays = {name: values[::k] for name in names if (values := getattr(reference, name)) is not None}
+    return Trajectory(reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays)
+
+
+class TimingProcess:
+    """Answers requests about points. A point not prepared here (a process before this one was ended) is prepared when
+    first asked for.
+
+    scene_of    the scene of a point, and its reference if there is one
+    """
+
+    def __init__(
+        self,
+        scene_of: Callable[[Point], tuple[Scene, Trajectory | None]],
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._scene_of, self._clock = scene_of, clock
+        self._solvers: dict[Point, Solver] = {}
+        self._last: dict[Point, Integration] = {}
+        self._first_angles: dict[Point, Array] = {}
+
+    def __call__(self, request: Request) -> Prepared | float | Judged:
+        point = request.point
+        if request.do == "prepare":
+            return self._prepare(point)
+        if point not in self._solvers:
+            self._prepare(point)
+        return self._timed_run(point) if request.do == "repeat" else self._judge(point)
+
+    def _prepare(self, point: Point) -> Prepared:
+        method = find_method(point.method)
+        settings = {**method.DEFAULTS, **dict(point.settings)}
+        scene, _ = self._scene_of(point)
+        setups = []
+        for _ in range(2):
+            start = self._clock()
+            self._solvers[point] = method.build(scene, settings)
+            setups.append(self._clock() - start)
+        gc.collect()  # the collector is off in the timing process
+        seconds = self._timed_run(point)
+        self._first_angles[point] = self._solvers[point].observe().angles
+        return Prepared(setups[0], setups[1], seconds)
+
+    def _timed_run(self, point: Point) -> float:
+        solver = self._solvers[point]
+        start = self._clock()
+        self._last[point] = solver.integrate()
+        return self._clock() - start
+
+    def _judge(self, point: Point) -> Judged:
+        start = self._clock()
+        trajectory = self._solvers[point].observe()
+        output = self._clock() - start
+        integration = self._last[point]
+        scene, reference = self._scene_of(point)
+        run = Solution(point.method, trajectory, integration, dict(point.settings), 0.0, [0.0], output)
+        with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
+            verdict = judge(scene, run, reference)
+        status, message = _status(verdict.status, verdict.message, verdict.metrics)
+        del self._solvers[point]
+        same = np.array_equal(trajectory.angles, self._first_angles[point])
+        false_success = integration.success and status != "ok"
+        return Judged(status, message, false_success, same, integration.steps or 0, output, verdict.metrics)
+
+
+def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[str, str]:
+    """A bench asks how large an error is: it is a failure only where nothing of the motion is right."""
+    if status not in ("ok", "inaccurate"):
+        return status, message
+    if "angle_error_max" not in metrics:  # no reference: energy alone tells
+        return ("ok", "") if metrics.get("energy_drift_max", 0.0) < USELESS_DRIFT else (status, message)
+    error = metrics["angle_error_max"]
+    if error < USELESS_RAD:
+        return "ok", ""
+    return "inaccurate", f"angle error {error:.1e} rad before the horizon: as large as the motion"
+
+
+@dataclass(frozen=True)
+class MakeTimingProcess:
+    """Makes a TimingProcess where it is to run, with its engines loaded, so that no run is charged for that."""
+
+    scene: Scene
+    scene_hash: str
+    results: Path
+    methods: tuple[str, ...]
+
+    def __call__(self) -> TimingProcess:
+        only_time(self.methods)
+        found = prepared_scene(self.scene, self.scene_hash, self.results)
+        return TimingProcess(lambda _: found)
+
+
+def only_time(methods: Iterable[str]) -> None:
+    """Makes this process one that does nothing but time them: engines loaded, collector off."""
+    for method in methods:
+        load_engine(method)
+    gc.disable()
+
+
+def prepared_scene(scene: Scene, scene_hash: str, results: Path) -> tuple[Scene, Trajectory]:
+    """The scene as it is benched, and its reference from the results file. Raises InputError where there is none."""
+    task = Task(scene, scene_hash, "", "", Path(), reference=results)
+    reference = load_reference(task)
+    if reference is None or len(reference.time) < scene.samples:
+        raise InputError(f"{scene.name}: no usable reference (it does not reach the end); a bench needs one")
+    short, k = thinned(scene)
+    return short, thinned_reference(reference, k)
+
+
+def able(method: str, scene: Scene) -> str:
+    """Why `method` cannot represent `scene`, or ""."""
+    try:
+        find_method(method).items(scene)
+    except MethodRefusal as exc:
+        return str(exc)
+    return ""

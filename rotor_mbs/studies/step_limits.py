@@ -1,0 +1,158 @@
+"""Step limits of a fixed-step method on a scene: a ladder of steps, and the largest stable step by bisection."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rotor_mbs.analysis.step_limits import STABILITY_FUNCTIONS, largest_stable_step, oscillator_modes
+from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import Verdict, judge
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.store.read import open_results
+from rotor_mbs.store.stability import STATUSES, Record
+from rotor_mbs.studies.work import reference_trajectory
+
+FIXED_STEP = (
+    "exudyn_tree/rk44",
+    "exudyn_tree/rk67",
+    "exudyn_tree/generalized_alpha",
+    "exudyn_chain/generalized_alpha",
+    "exudyn_chain/newmark_index2",
+)
+TARGET = 1e-6  # rad
+
+# A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to take this long.
+_FACTOR = 4
+_LONGEST_RUN_S = 1.5
+# A run that fails at once costs nothing, however small its step.
+_MOST_STEPS = 1e7
+# Bisection: a window of so many radians of the fastest mode; a pitch this many times its start has grown, not swung.
+_WINDOW_RADIANS = 5e3
+_GROWTH = 100.0
+_INTERVALS = 10
+
+
+@dataclass(frozen=True)
+class StepTask:
+    """kind: "steps" or "limits"; results: a file with the scene's reference; piece: where the record goes."""
+
+    kind: str
+    scene: Scene
+    method: str
+    results: Path
+    piece: Path | None = None
+
+
+def perform_steps(task: StepTask) -> Record:
+    """Errors in rad over steps in s, or the largest stable step in s, as a record."""
+    return _ladder(task) if task.kind == "steps" else _limit(task)
+
+
+def has_limit(scene: Scene, method: str) -> bool:
+    """Whether theory gives a limit: an explicit method, and a spring in every bearing."""
+    return method in STABILITY_FUNCTIONS and bool(scene.bearing_stiffness) and min(scene.bearing_stiffness) >= 1e6
+
+
+def _ladder(task: StepTask) -> Record:
+    with open_results(task.results) as results:
+        stored = results.scenes[task.scene.name].reference
+        known = stored is not None and len(stored.array("time")) > 0
+        reference = reference_trajectory(task.scene, stored) if stored is not None and known else None
+    interval = task.scene.duration / (task.scene.samples - 1)
+    rows: list[tuple[float, Verdict]] = []
+    expected, step = 0.0, interval
+    while expected <= _LONGEST_RUN_S and task.scene.duration <= _MOST_STEPS * step:
+        verdict, seconds = _judged(task, {"step": step}, reference)
+        rows.append((step, verdict))
+        if verdict.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and verdict.status == "ok":
+            break
+        expected, step = _FACTOR * seconds, step / _FACTOR
+    # A run that broke off has no error up to the horizon.
+    complete = [verdict.status in ("ok", "inaccurate") for _, verdict in rows]
+    errors = [
+        verdict.metrics.get("angle_error_max", np.nan) if ended else np.nan
+        for (_, verdict), ended in zip(rows, complete, strict=True)
+    ]
+    arrays = {
+        "step": np.array([step for step, _ in rows]),
+        "status": np.array([STATUSES.index(verdict.status) for _, verdict in rows], dtype=np.int64),
+        "angle_error_max": np.array(errors),
+        "energy_drift_max": np.array([verdict.metrics.get("energy_drift_max", np.nan) for _, verdict in rows]),
+    }
+    attributes: dict[str, object] = {"false_successes": sum(verdict.false_success for _, verdict in rows)}
+    needed = step_for(TARGET, arrays["step"], arrays["angle_error_max"])
+    if needed is not None:
+        attributes["step_for_target_s"] = needed
+    return Record("steps", f"{task.scene.name}/{task.method}", attributes, arrays)
+
+
+def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | None:
+    """s: where the error crosses `target` for good, by a straight line in logarithms; None where it does not."""
+    below = errors <= target
+    if not below.any() or not below[-1]:
+        return None
+    last = len(errors) - 1 - int(np.argmin(below[::-1])) if not below.all() else -1
+    if last < 0 or not np.isfinite(errors[last]) or errors[last + 1] == 0.0:
+        return float(steps[last + 1])
+    slope = np.log(errors[last] / errors[last + 1]) / np.log(steps[last] / steps[last + 1])
+    return float(steps[last + 1] * (target / errors[last + 1]) ** (1.0 / slope))
+
+
+def _judged(task: StepTask, settings: Mapping[str, object], reference: Trajectory | None) -> tuple[Verdict, float]:
+    """The verdict and the run time in s; a run over twice the longest one ends itself."""
+    try:
+        with time_limit(2.0 * _LONGEST_RUN_S):
+            run = solve(task.method, find_method(task.method), task.scene, settings)
+    except OutOfTimeError as exc:
+        return Verdict("timed_out", str(exc), False, {}), 2.0 * _LONGEST_RUN_S
+    return judge(task.scene, run, reference), run.run_times_s[0]
+
+
+def _limit(task: StepTask) -> Record:
+    """The largest stable step by bisection on what becomes of the pitches, beside that of the theory."""
+    scene = task.scene
+    modes = [mode for i in range(len(scene.blades)) for mode in _modes(scene, i)]
+    window = _WINDOW_RADIANS / max(abs(mode) for mode in modes)
+    short = replace(scene, duration=window, samples=_INTERVALS + 1, outputs=("angles", "rates"))
+    theory = largest_stable_step(task.method, modes, window, _GROWTH)
+    low = max(1, int(0.5 * window / theory / _INTERVALS))  # steps per interval: too few, enough
+    high = 4 * low + 1
+    if not _stays(short, task.method, high) or _stays(short, task.method, low):
+        found = float("nan")
+    else:
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if _stays(short, task.method, middle) else (middle, high)
+        found = window / (_INTERVALS * high)
+    attributes = {
+        "largest_stable_step_s": found,
+        "theory_s": theory,
+        "fastest_mode_per_s": max(abs(mode) for mode in modes),
+        "mode_damping_ratio": min(1.0, *(abs(mode.real) / abs(mode) for mode in modes)),
+    }
+    return Record("limits", f"{scene.name}/{task.method}", attributes)
+
+
+def _modes(scene: Scene, blade: int) -> tuple[complex, complex]:
+    """Of one pitch about zero, the rotor held: gravity and turning are nothing beside such a spring."""
+    x, y, _ = scene.blades[blade].centre_of_mass
+    inertia = scene.blades[blade].inertia[2] + scene.blades[blade].mass * (x * x + y * y)
+    damping = scene.bearing_damping[blade] if scene.bearing_damping else 0.0
+    return oscillator_modes(inertia, scene.bearing_stiffness[blade], damping)
+
+
+def _stays(scene: Scene, method: str, steps: int) -> bool:
+    """Whether every pitch keeps within `_GROWTH` times the largest one at the start, to the end."""
+    step = scene.duration / (_INTERVALS * steps)
+    with time_limit(20.0):
+        run = solve(method, find_method(method), scene, {"step": step})
+    pitches = np.abs(run.trajectory.angles[:, 1:])
+    complete = len(pitches) == scene.samples
+    return complete and float(pitches.max()) <= _GROWTH * max(map(abs, scene.initial_angles[1:]))

@@ -1,0 +1,207 @@
+"""From a sweep file and the command line to what is to be done: runs, chunks, the dataset's facts, an estimate."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.execution.engines import Engine
+from rotor_mbs.execution.environment import machine, numerics_fingerprint, versions
+from rotor_mbs.methods.catalogue import check_names, find_method
+from rotor_mbs.scenario.design import validation_rows
+from rotor_mbs.scenario.load import scene_hash
+from rotor_mbs.scenario.sweep import Sweep
+from rotor_mbs.scenario.variants import Variants
+from rotor_mbs.store.sweep_layout import Plan
+from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, perform
+
+# Runs handed to a worker at once by the fast path: an eighth of a second of work, fewer towards the end, so that all
+# workers end together. The least is a full batch on any processor.
+_ENSEMBLE_RUNS = 128
+_LEAST_RUNS = 8
+_CHUNK_BYTES = 1 << 23
+
+_FORMAT = 2  # of rows and columns: a sweep begun by another version is not gone on with
+
+
+@dataclass(frozen=True)
+class Work:
+    """A sweep, or one part of several, by its methods.
+
+    first, last   of its runs; run r is row r mod rows of the design, by method r div rows
+    """
+
+    sweep: Sweep
+    methods: tuple[str, ...]
+    first: int
+    last: int
+    time_limit_s: float
+
+    @property
+    def rows(self) -> int:
+        return self.sweep.design.count
+
+    @property
+    def in_threads(self) -> bool:
+        """Whether two of its tasks may share a process: the fast path leaves the interpreter's lock alone."""
+        return self.methods == (ENSEMBLE_METHOD,)
+
+    @cached_property
+    def plan(self) -> Plan:
+        sweep = self.sweep
+        splits = validation_rows(self.rows, sweep.validation, sweep.design.seed) if sweep.validation else None
+        return Plan(
+            self._identity(),
+            self._attributes(),
+            sweep.base,
+            sweep.outputs,
+            sweep.precision,
+            sweep.keys,
+            sweep.units,
+            self.methods,
+            self.rows,
+            self.values,
+            splits,
+        )
+
+    def values(self, first: int, last: int) -> NDArray[np.float64]:
+        """(last - first, keys) of these runs."""
+        pieces = [
+            self.sweep.design.rows(start % self.rows, start % self.rows + end - start)
+            for start, end in self._by_method(first, last)
+        ]
+        return np.concatenate(pieces)
+
+    def chunks(self, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
+        """The runs of `gaps`, cut into what one of `workers` does at once."""
+        variants, row = self.sweep.variants(), self.plan.row
+        for first, _ in gaps[:1]:
+            variants.prepare(self.values(first, first + 1)[0].tolist())
+        left = sum(last - first for first, last in gaps)
+        for gap in gaps:
+            for first, last in self._by_method(*gap):
+                method = self.methods[first // self.rows]
+                while first < last:
+                    end = min(first + self._chunk_size(method, row.itemsize, left // (2 * workers)), last)
+                    yield self._chunk(variants, method, row, first, end)
+                    first, left = end, left - (end - first)
+
+    def _chunk(self, variants: Variants, method: str, row: np.dtype[np.void], start: int, end: int) -> Chunk:
+        known = find_method(method).DEFAULTS
+        settings = {key: value for key, value in self.sweep.settings.items() if key in known}
+        return Chunk(variants, method, settings, row, start, self.values(start, end), self.time_limit_s)
+
+    @staticmethod
+    def _chunk_size(method: str, row_bytes: int, share: int) -> int:
+        if method != ENSEMBLE_METHOD:
+            return 1
+        return max(min(_CHUNK_BYTES // row_bytes, share, _ENSEMBLE_RUNS) // _LEAST_RUNS, 1) * _LEAST_RUNS
+
+    def _by_method(self, first: int, last: int) -> Iterator[tuple[int, int]]:
+        """Spans of runs cut where the method changes."""
+        while first < last:
+            end = min(last, (first // self.rows + 1) * self.rows)
+            yield first, end
+            first = end
+
+    def _identity(self) -> str:
+        sweep = self.sweep
+        digest = hashlib.sha256()
+        content = [
+            _FORMAT,
+            scene_hash(sweep.base),
+            sweep.keys,
+            sweep.design.combine,
+            [axis.is_drawn for axis in sweep.design.axes],
+            self.methods,
+            dict(sweep.settings),
+            sweep.outputs,
+            sweep.precision,
+            sweep.validation,
+            sweep.design.seed,
+            [self.first, self.last],
+            versions(),
+            numerics_fingerprint(),
+        ]
+        digest.update(json.dumps(content, sort_keys=True).encode())
+        for values in sweep.design.values:
+            digest.update(values.tobytes())
+        return digest.hexdigest()
+
+    def _attributes(self) -> dict[str, object]:
+        sweep = self.sweep
+        return {
+            "title": sweep.title,
+            "sweep_toml": sweep.text,
+            "base_scene": sweep.base.name,
+            "scene_toml": sweep.base.text,
+            "scene_hash": scene_hash(sweep.base),
+            "combine": sweep.design.combine,
+            "shape": json.dumps(sweep.design.shape),
+            "seed": sweep.design.seed,
+            "validation_share": sweep.validation,
+            "settings": json.dumps(dict(sweep.settings), sort_keys=True),
+            "runs_of_all_parts": self.rows * len(self.methods),
+            **versions(),
+            **machine(),
+        }
+
+
+def _chosen(sweep: Sweep, methods: Sequence[str]) -> tuple[str, ...]:
+    """Those of the command line, else those of the file. Raises InputError."""
+    if methods:
+        return check_names(methods)
+    try:
+        return check_names(sweep.methods)
+    except InputError as exc:
+        raise InputError([sweep.fault(("methods",), f"methods: {words}") for words in exc.problems]) from exc
+
+
+def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> Work:
+    """The runs of part k of n (1, 1 for all). Raises InputError, MethodRefusal where a method cannot do them."""
+    chosen = _chosen(sweep, methods)
+    known = {key for method in chosen for key in find_method(method).DEFAULTS}
+    unknown = [key for key in sweep.settings if key not in known]
+    if unknown:
+        words = f"is no setting of {', '.join(chosen)}; allowed: {', '.join(sorted(known)) or 'none'}"
+        raise InputError([sweep.fault(("settings", key), f"settings.{key}: {words}") for key in unknown])
+    for method in chosen:
+        # The fast path's engine refuses nothing, where it is there: this process need not load it.
+        if method != ENSEMBLE_METHOD or find_spec("heyoka") is None:
+            find_method(method).items(sweep.base)
+    total = sweep.design.count * len(chosen)
+    number, parts = part
+    return Work(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)
+
+
+def estimate_seconds(work: Work, engine: Engine) -> float:
+    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time."""
+    seconds = 0.0
+    for k in range(len(work.methods)):
+        runs = max(min(work.last, (k + 1) * work.rows) - max(work.first, k * work.rows), 0)
+        if runs:
+            seconds += runs * _seconds_per_run(work, k * work.rows, engine) / engine.workers
+    return seconds
+
+
+def _seconds_per_run(work: Work, first: int, engine: Engine) -> float:
+    chunk = next(work.chunks([(first, first + min(work.rows, _ENSEMBLE_RUNS))]))
+    try:
+        # The first one loads and compiles, which all others find done.
+        engine.submit(perform, chunk.part(0, 1), work.time_limit_s).result()
+        start = time.perf_counter()
+        engine.submit(perform, chunk, work.time_limit_s).result()
+    except Exception as error:
+        if engine.cause(error) == "error":
+            raise
+        return float("inf")
+    return (time.perf_counter() - start) / len(chunk.values)

@@ -1,0 +1,218 @@
+"""Claims, errata and the finding against files whose numbers are known because they were made so."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+from rotor_mbs.analysis import methods
+from rotor_mbs.analysis.claims import claims, rounds_to
+from rotor_mbs.analysis.errata import effects, entries
+from rotor_mbs.analysis.escape_rate import escape_rate
+from rotor_mbs.analysis.order import natural
+from rotor_mbs.analysis.published import Asked, Condition, Published, errata, published
+from rotor_mbs.analysis.statistics import STATISTICS, measure
+from rotor_mbs.analysis.summary import finding
+from rotor_mbs.store.errata import write_errata
+from rotor_mbs.store.read import open_results
+
+FIG11 = paper("fig11", samples=501)
+PRINTED, REFERENCE, TAYLOR = "printed/ode45", "reference", "lagrange/taylor"
+
+
+def number(statistic: str, value: float, *, quantity: str = "angle", coordinate: int = 0) -> Published:
+    asked = Asked("paper/fig11", quantity, coordinate, statistic)
+    return Published("n", "11", "number", "«»", of=asked, value=value, decimals=4)
+
+
+def claim(*tests: Condition) -> Published:
+    return Published("c", "11", "claim", "«»", "A claim.", tests=tests)
+
+
+def of(statistic: str, coordinate: int = 0, scene: str = "paper/fig11", quantity: str = "angle") -> Asked:
+    return Asked(scene, quantity, coordinate, statistic)
+
+
+@pytest.mark.parametrize(
+    ("statistic", "exact"),
+    [
+        # x = t sin(2π t) over 0..10: the extremes lie near t = n + 1/4 and n + 3/4 and are about t high.
+        ("range", 9.25 + 9.75),
+        ("reversals", 19.0),  # zero at every half second, both ends left out
+        ("net_change", 0.0),
+        ("growth", 9.75 / 4.75),  # largest |x| in either half: near t = 9.75 and 4.75
+    ],
+)
+def test_statistics_of_a_growing_oscillation(tmp_path: Path, statistic: str, exact: float) -> None:
+    made = Made(FIG11, PRINTED, rotor(lambda t: t * np.sin(2.0 * np.pi * t)))
+    with open_results(store(tmp_path / "r.h5", [made])) as results:
+        value = measure(results.scenes["paper/fig11"].methods[PRINTED], of(statistic))
+    # 50 samples a period: an extreme is missed by at most (2π/50)²/8 = 2e-3 of the amplitude of 10.
+    assert value == pytest.approx(exact, abs=0.05)
+
+
+def test_swings_are_counted_from_turning_point_to_turning_point(tmp_path: Path) -> None:
+    # Corners at 0, 2, -1, 3 s-wise: ways of 2, 3, 4; the last, unfinished one (to 0) is no swing.
+    def corners(t: np.ndarray) -> np.ndarray:
+        return np.interp(t, [0.0, 2.0, 4.0, 6.0, 10.0], [0.0, 2.0, -1.0, 3.0, 0.0])
+
+    with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(corners))])) as results:
+        run = results.scenes["paper/fig11"].methods[PRINTED]
+        assert measure(run, of("swing_ratio")) == pytest.approx(4.0 / 2.0)
+        assert measure(run, of("swing_ratio", coordinate=1)) is None  # at rest: no swing
+        assert measure(run, of("growth", coordinate=1)) is None
+
+
+def test_extremes_are_read_off_the_refined_output(tmp_path: Path) -> None:
+    # A spike between two samples (0.02 s apart) that only the finer points see.
+    def spike(t: np.ndarray) -> np.ndarray:
+        return np.exp(-(((t - 5.01) / 0.002) ** 2))
+
+    made = Made(FIG11, PRINTED, rotor(spike), refined=True)
+    plain = Made(FIG11, TAYLOR, rotor(spike))
+    with open_results(store(tmp_path / "r.h5", [made, plain])) as results:
+        runs = results.scenes["paper/fig11"].methods
+        assert measure(runs[TAYLOR], of("max")) < 1e-6
+        assert measure(runs[PRINTED], of("max")) > 0.1
+
+
+@pytest.mark.parametrize(("value", "reproduced"), [(2.73146, True), (2.73154, True), (2.73144, False), (2.7316, False)])
+def test_numbers_compare_at_the_printed_digits(value: float, reproduced: bool) -> None:
+    assert rounds_to(value, 2.7315, 4) is reproduced
+
+
+def test_a_number_that_the_printed_model_gives_and_the_right_one_does_not(tmp_path: Path) -> None:
+    runs = [
+        Made(FIG11, PRINTED, rotor(lambda t: 2.73148 * np.sin(np.pi * t / 10.0))),
+        Made(FIG11, REFERENCE, rotor(lambda t: 0.367 * t)),
+    ]
+    with open_results(store(tmp_path / "r.h5", runs)) as results:
+        found = claims(results.scenes, [number("max", 2.7315)])
+    assert [(one.printed.holds, one.right.holds) for one in found] == [(True, False)]
+    assert found[0].right.value == pytest.approx(3.67)
+
+
+def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
+    run = Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t, lambda t: -0.2 * t))
+    less = Condition(of("range"), "<", than=of("range", 1))
+    opposite = Condition(of("net_change"), "opposite", than=of("net_change", 1))
+    undefined = Condition(of("growth", 2), ">", bound=0.0)
+    with open_results(store(tmp_path / "r.h5", [run])) as results:
+        found = claims(
+            results.scenes,
+            [
+                claim(less),
+                claim(replace(less, relation=">")),
+                claim(opposite),
+                claim(undefined),
+                claim(less, undefined),
+            ],
+        )
+    assert [one.printed.holds for one in found] == [True, False, True, False, False]
+    assert all(one.right.holds is None for one in found)
+
+
+def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
+    holds = Condition(of("range"), ">", bound=0.5)
+    fails = Condition(of("range"), "<", bound=0.5)
+    elsewhere = Condition(of("range", scene="paper/fig12"), ">", bound=0.5)
+    with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t))])) as results:
+        assert claims(results.scenes, [claim(elsewhere), claim(holds, elsewhere)]) == []
+        # One that fails decides, whatever the others would say.
+        assert [one.printed.holds for one in claims(results.scenes, [claim(fails, elsewhere)])] == [False]
+
+
+def test_a_run_that_ended_early_is_named(tmp_path: Path) -> None:
+    made = Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t), until=0.5, attributes={"status": "solver_failed"})
+    with open_results(store(tmp_path / "r.h5", [made])) as results:
+        found = claims(results.scenes, [claim(Condition(of("range"), ">", bound=0.1))])
+    assert found[0].printed.broke_off == ("paper/fig11",)
+
+
+def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path: Path) -> None:
+    right = [Made(FIG11, name, rotor(np.zeros_like)) for name in ("exudyn_tree/rk67", TAYLOR, REFERENCE, PRINTED)]
+    with open_results(store(tmp_path / "a.h5", right)) as results:
+        assert methods.right_run(results.scenes["paper/fig11"]).method == REFERENCE
+        assert list(methods.in_order(results.scenes["paper/fig11"]))[:2] == [PRINTED, REFERENCE]
+    with open_results(store(tmp_path / "b.h5", right[:2])) as results:
+        assert methods.right_run(results.scenes["paper/fig11"]).method == TAYLOR
+        assert methods.printed_run(results.scenes["paper/fig11"]) is None
+
+
+def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
+    fig12 = paper("fig12", samples=501)
+    still = rotor(np.zeros_like)
+    off = rotor(lambda t: np.full_like(t, 1e-9))
+    runs = [
+        *(Made(scene, REFERENCE, still) for scene in (FIG11, fig12)),
+        Made(FIG11, PRINTED, still, gain=3e5),
+        Made(fig12, PRINTED, still, gain=9e9, until=0.5, attributes={"status": "solver_failed"}),
+        Made(FIG11, TAYLOR, off),
+        Made(fig12, TAYLOR, rotor(lambda t: np.full_like(t, 1.0)), attributes={"status": "inaccurate"}),
+    ]
+    with open_results(store(tmp_path / "r.h5", runs)) as results:
+        facts = finding(results.scenes, [])
+    assert facts.energy is not None
+    assert (facts.energy.made.count, facts.energy.made.of) == (2, 2)
+    # The run that broke off made more, but what a runaway reaches is no measure.
+    assert facts.energy.gain == pytest.approx(3e5)
+    assert facts.energy.scene == "paper/fig11"
+    assert facts.energy.broke_off == ("paper/fig12",)
+    (agreement,) = facts.agreement
+    assert agreement.angle_error == pytest.approx(1e-9)
+    assert (agreement.runs.count, agreement.runs.of) == (1, 2)
+    assert facts.numbers is None
+
+
+def test_every_published_test_is_one_that_can_be_carried_out() -> None:
+    items = published()
+    asked = [item.of for item in items if item.of] + [
+        side for item in items for test in item.tests for side in (test.of, test.than) if side
+    ]
+    assert {one.statistic for one in asked} <= set(STATISTICS)
+    assert {one.quantity for one in asked} <= {"angle", "rate"}
+    assert {test.relation for item in items for test in item.tests} <= {"<", ">", "opposite"}
+    assert sum(item.is_number for item in items) == 4  # 2.7315, 0.5127, 0.5273, 0.0458
+    assert [one.id for one in errata()] == ["E1", "E2", "E3"]
+
+
+def test_escape_rate_of_a_pendulum_upside_down(tmp_path: Path) -> None:
+    sprung = replace(FIG11, name="sprung", text=FIG11.text + "\n[bearing]\nstiffness = 5.0\n")
+    still = rotor(np.zeros_like)
+    runs = [Made(FIG11, TAYLOR, still), Made(sprung, TAYLOR, still)]
+    with open_results(store(tmp_path / "r.h5", runs)) as results:
+        rate = escape_rate(results.scenes["paper/fig11"])
+        assert rate == pytest.approx(math.sqrt(9.8 / math.hypot(0.08, 0.03)))
+        assert escape_rate(results.scenes["sprung"]) is None
+
+
+def test_errata_are_read_in_order_and_effects_by_name(tmp_path: Path) -> None:
+    checks = [
+        {"equation": "(8)", "entry": "row 2 column 4", "printed": "c c3", "right": "0", "difference": 1.0,
+         "agrees": False, "explained_by": "E1"},
+        {"equation": "(9)", "entry": "row 1 column 1", "printed": "x", "right": "x", "difference": 0.0,
+         "agrees": True, "explained_by": ""},
+    ]  # fmt: skip
+    write_errata(tmp_path / "e.h5", checks, "f")
+    with open_results(tmp_path / "e.h5") as results:
+        assert [(one.equation, one.agrees, one.explained_by) for one in entries(results)] == [
+            ("(8)", False, "E1"),
+            ("(9)", True, ""),
+        ]
+    runs = [Made(FIG11, REFERENCE, rotor(np.zeros_like)), Made(FIG11, "printed_e2/ode45", rotor(lambda t: 0.01 * t))]
+    with open_results(store(tmp_path / "r.h5", runs)) as results:
+        assert entries(results) == []
+        found = effects(results.scenes["paper/fig11"])
+    assert list(found) == ["E2"]
+    assert found["E2"].angle_whole == pytest.approx(0.1)
+
+
+def test_scenes_come_in_natural_order() -> None:
+    names = ["paper/fig15-100kNm", "paper/fig15-1kNm", "paper/fig06-tenth", "paper/fig15-10kNm", "paper/fig06"]
+    assert natural(names) == [names[4], names[2], names[1], names[3], names[0]]

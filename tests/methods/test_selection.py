@@ -1,0 +1,100 @@
+"""The rule that takes a method where none is named: what it takes, what it refuses, and why in one line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from support.references import reference, scene
+from support.scenes import PAPER, paper
+
+from rotor_mbs.cli import main
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.catalogue import DEFAULT_METHODS, find_method
+from rotor_mbs.methods.selection import choose, singular_reason
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import is_held, judge
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_scenes_of_the_paper_keep_the_default_set(name: str) -> None:
+    methods = choose(paper(name), DEFAULT_METHODS).methods
+    assert methods[0] == "lagrange/taylor"  # not the printed model, which comes first in the paper's comparison
+    assert set(methods) == set(DEFAULT_METHODS)
+
+
+@pytest.mark.parametrize("name", ["bearing-1e8", "bearing-1e12", "slow-rotor", "one-blade-stiff"])
+def test_fast_swings_get_methods_that_choose_their_step(name: str) -> None:
+    choice = choose(scene(f"stiff/{name}"), DEFAULT_METHODS)
+    assert choice.methods[0] == "lagrange/taylor"
+    assert not {"exudyn_tree/rk44", "exudyn_tree/rk67"} & set(choice.methods)
+    assert "\n" not in choice.reason
+
+
+@pytest.mark.parametrize("name", ["bearing-1e8-damping-100", "bearing-1e12-damping-100", "shaft-damping"])
+def test_overdamped_scenes_get_what_holds_there(name: str) -> None:
+    """By itself: no fixed step of Exudyn's stays within its bound on all of them."""
+    choice = choose(scene(f"stiff/{name}"), DEFAULT_METHODS)
+    assert choice.methods == ("lagrange/taylor", "lagrange/radau")
+    assert "implicit" in choice.reason
+
+
+# No method at all: rates that overflow when squared, and 7.9e6 s of simulated time within the suite's time limit.
+_NOTHING_HOLDS = ("extreme/rate-1e200", "extreme/pendulum-million")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [found.name for found in find_scenes(["stiff", "extreme"])])
+def test_what_the_rule_takes_holds(name: str) -> None:
+    """Every method that claims to be right, at its default settings, against the frozen reference."""
+    chosen = scene(name)
+    if singular_reason(chosen) or name in _NOTHING_HOLDS:
+        pytest.skip("refused, or beyond every method")
+    stored = None if name == "extreme/hour-chaos" else reference(name)  # an hour of chaos: by its energy
+    for method in choose(chosen, DEFAULT_METHODS).methods:
+        if is_held(method):
+            found = solve(method, find_method(method), chosen, {}, time_limit_s=120.0)
+            verdict = judge(chosen, found, stored)
+            assert verdict.status == "ok", f"{method}: {verdict.message}"
+
+
+@pytest.mark.parametrize("name", ["singular-start", "singular-one-blade"])
+def test_what_has_no_motion_is_refused(name: str) -> None:
+    with pytest.raises(MethodRefusal, match="singular") as caught:
+        choose(scene(f"extreme/{name}"), DEFAULT_METHODS)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "able",
+    [
+        replace(scene("extreme/singular-one-blade"), hub_inertia=1e-6),
+        replace(scene("extreme/singular-one-blade"), bearing_stiffness=(1e6,)),
+        paper("fig03"),
+    ],
+    ids=["with a hub", "held by a spring", "pitch exactly zero"],
+)
+def test_one_blade_is_taken_where_it_does_not_end(able: Scene) -> None:
+    assert choose(able, DEFAULT_METHODS).methods
+
+
+def test_a_run_says_what_it_took_and_a_refusal_ends_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "extreme/singular-one-blade", "-o", str(tmp_path / "r.h5")]) == 2
+    told = capsys.readouterr().err.strip()
+    assert told.startswith("extreme/singular-one-blade: refused: ")
+    assert "\n" not in told
+    assert not (tmp_path / "r.h5").exists()
+
+
+def test_a_run_names_every_method_it_took_first_the_one_it_stands_by(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene_file = tmp_path / "own.toml"
+    scene_file.write_text(paper("fig03").text.replace("duration = 10.0", "duration = 0.1"))
+    assert main(["run", str(scene_file), "-o", str(tmp_path / "r.h5"), "-j", "1"]) == 0
+    told = capsys.readouterr().err.splitlines()[0]
+    assert told.startswith("own: neither stiff, singular nor long: ")
+    assert told.index("lagrange/") < told.index("exudyn_tree/") < told.index("exudyn_chain/")

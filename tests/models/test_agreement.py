@@ -1,0 +1,119 @@
+"""The cross-check itself: independent models against the quad reference, on every scene of the paper."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import references
+from support.scenes import PAPER, paper
+
+from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples, running_growth
+from rotor_mbs.solution.record import Solution, Trajectory
+
+BEST = ("lagrange/taylor", "exudyn_tree/rk67")
+BOUND = {"lagrange/taylor": 1e-10, "exudyn_tree/rk67": 1e-9}  # rad, up to the horizon, on every scene
+CHAIN = "exudyn_chain/generalized_alpha"
+
+
+def reference(name: str) -> Trajectory:
+    return references.reference(f"paper/{name}")
+
+
+@functools.cache
+def run(scene: Scene, method: str) -> Solution:
+    if method == "lagrange/taylor":
+        pytest.importorskip("heyoka")
+    return solve(method, find_method(method), scene, {})
+
+
+def cut(name: str, growth: float) -> tuple[Scene, Trajectory]:
+    """The scene, and its reference, as far as an error has grown less than `growth`-fold."""
+    whole, scene = reference(name), paper(name)
+    rows = max(int((running_growth(whole) < growth).sum()), 2)
+    parts = {part: getattr(whole, part)[:rows] for part in ("time", "angles", "rates", "tip", "growth")}
+    return replace(scene, duration=float(whole.time[rows - 1]), samples=rows), Trajectory(**parts)
+
+
+@pytest.mark.parametrize("method", BEST)
+@pytest.mark.parametrize("name", PAPER)
+def test_up_to_the_horizon(name: str, method: str) -> None:
+    found = run(paper(name), method)
+    error = angle_error(found.trajectory, reference(name))
+    assert len(error) == paper(name).samples
+    assert error[: horizon_samples(reference(name))].max() <= BOUND[method]
+
+
+@pytest.mark.parametrize("method", BEST)
+def test_the_whole_of_fig08(method: str) -> None:
+    """Smooth as long as two blades stay at exactly zero pitch: nothing grows but round-off itself."""
+    assert angle_error(run(paper("fig08"), method).trajectory, reference("fig08")).max() <= 1e-12
+
+
+@pytest.mark.parametrize("method", BEST)
+@pytest.mark.parametrize("name", PAPER)
+def test_energy_less_work_is_kept(name: str, method: str) -> None:
+    """Of the energy scale; 5e-14 is the worst that was seen, the rest is for another machine's rounding."""
+    scene = paper(name)
+    assert compare(scene, run(scene, method).trajectory, None)["energy_drift_max"] <= 1e-12
+
+
+def test_the_chain_on_fig08_up_to_its_horizon() -> None:
+    scene, exact = cut("fig08", 1e5)
+    assert angle_error(run(scene, CHAIN).trajectory, exact).max() <= 1e-6
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in ("fig03", "fig11") else pytest.param(name, marks=pytest.mark.slow) for name in PAPER]
+)
+def test_the_chain_while_the_growth_is_below_1000(name: str) -> None:
+    scene, exact = cut(name, 1e3)
+    assert angle_error(run(scene, CHAIN).trajectory, exact).max() <= 1e-3
+
+
+@pytest.mark.parametrize("name", ["fig03", "fig05", "fig06", "fig08", "fig15-100kNm"])
+@pytest.mark.parametrize("method", BEST)
+def test_blades_that_start_at_zero_pitch_stay_there(name: str, method: str) -> None:
+    """An invariant set, unstable: one rounding error off it would be 1e30 away by the end."""
+    scene = paper(name)
+    zero = [i for i, angle in enumerate(scene.initial_angles) if i and angle == 0.0]
+    assert not run(scene, method).trajectory.angles[:, zero].any()
+    metrics = judge(scene, run(scene, method), reference(name)).metrics
+    assert metrics["zero_pitch_max"] == 0.0
+    assert "zero_pitch_left_s" not in metrics
+
+
+def test_a_run_that_leaves_zero_pitch_is_told_with_its_rate() -> None:
+    """Blade 2 of fig05, pushed by 1e-12 rad: below the shaft it is an inverted pendulum of rate √(g/c · sin φ)."""
+    pytest.importorskip("heyoka")
+    scene = paper("fig05")
+    pushed = replace(scene, initial_angles=(*scene.initial_angles[:2], 0.0, 1e-12))
+    metrics = judge(scene, run(pushed, "lagrange/taylor"), reference("fig05")).metrics
+    azimuth = scene.initial_angles[0] + scene.phases[2]
+    rate = np.sqrt(scene.gravity / scene.blades[0].centre_of_mass[0] * -np.sin(azimuth))
+    assert metrics["zero_pitch_growth_per_s"] == pytest.approx(rate, rel=0.02)  # cosh, not exp, in the first samples
+    assert metrics["zero_pitch_left_s"] == pytest.approx(np.arccosh(1e-9 / 1e-12) / rate, abs=0.02)  # two samples
+
+
+@pytest.mark.parametrize("name", ["fig03", "fig04b", "fig05", "fig06", "fig15-100kNm"])
+def test_the_chain_extrapolated_to_step_zero_follows_the_exact_solution(name: str) -> None:
+    """Second order: 3e-8 rad at its default step. Two steps and Richardson's (4 a - b) / 3 leave the model, no scheme.
+
+    The Newton tolerance is tightened, since the default one's remainder, 1e-10 rad, is no power of the step.
+    """
+    scene = paper(name, outputs=("angles", "rates"))
+    newton = {"newton_relative_tolerance": 1e-12, "newton_absolute_tolerance": 1e-13}
+    coarse, fine = (
+        solve(CHAIN, find_method(CHAIN), scene, {"step": step, **newton}).trajectory for step in (1e-3, 5e-4)
+    )
+    exact = exact_rotor_angle(scene, fine.time)
+    assert exact is not None
+    assert np.abs((4 * fine.angles[:, 0] - coarse.angles[:, 0]) / 3 - exact[1]).max() <= 1e-10
+    assert not fine.angles[:, 1:].any()

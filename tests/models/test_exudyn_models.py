@@ -1,0 +1,214 @@
+"""Both Exudyn models against the closed form, their order, their symmetries, and what they say of themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from support.exudyn_runs import CHAIN, EXPLICIT, TREE, energy_error, run
+from support.rotors import (
+    FIG08,
+    FIG11,
+    MIXED,
+    PAPER,
+    SLIM,
+    STOUT,
+    D,
+    blade_points,
+    closed_form,
+    energies,
+    make_scene,
+)
+from support.scenes import paper
+
+from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.methods.base import solve
+from rotor_mbs.models.exudyn.methods import METHODS
+
+SHORT = replace(FIG11, duration=1.0, samples=101)
+HEIGHT = 3 * 15000 * 9.8 * D  # J, the energy scale of the paper's rotor
+
+
+@pytest.fixture(scope="module")
+def short_motion():
+    return closed_form(SHORT)
+
+
+@pytest.fixture(scope="module")
+def mixed_motion():
+    return closed_form(MIXED)
+
+
+def angle_error(trajectory, motion):
+    n = trajectory.angles.shape[1]
+    return np.abs(trajectory.angles - motion[: len(trajectory.time), :n]).max()
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_unlike_blades_hub_springs_dampers_and_torque_follow_the_closed_form(name, mixed_motion) -> None:
+    got = run(name, MIXED)
+    # tolerances of dopri5 1e-11 a step; order 2 at rates of a few rad/s and steps of 2.5e-4 to 5e-4 s
+    bound = 1e-9 if name in EXPLICIT else 1e-4
+    assert angle_error(got, mixed_motion) < bound
+    assert np.abs(got.rates - mixed_motion[:, 4:]).max() < 50 * bound  # pitch frequencies up to 11/s, torque jumps
+    kinetic, potential = energies(MIXED, mixed_motion)
+    assert np.abs(got.kinetic_energy - kinetic).max() < 100 * bound * kinetic.max()
+    assert np.abs(got.potential_energy - potential).max() < 100 * bound * np.abs(potential).max()
+    for i, blade in enumerate(MIXED.blades):
+        reach = np.linalg.norm(blade.tip)
+        assert np.abs(got.tip[:, i] - blade_points(MIXED, mixed_motion, i, blade.tip)).max() < 3 * bound * reach
+    assert energy_error(got) < 100 * bound * kinetic.max()
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 7])
+@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+def test_any_number_of_blades(name, count) -> None:
+    scene = make_scene(
+        [0.4, *np.linspace(-0.5, 0.6, count)],
+        [0.3, *np.linspace(0.2, -0.4, count)],
+        tuple((STOUT, SLIM)[i % 2] for i in range(count)),
+        duration=0.5,
+        samples=51,
+        hub_inertia=20.0,
+    )
+    assert angle_error(run(name, scene), closed_form(scene)) < (1e-11 if name in TREE else 1e-5)
+
+
+def test_a_blade_without_pitch_inertia_beside_others_is_carried_by_the_hub() -> None:
+    pole = replace(PAPER, centre_of_mass=(0.0, 0.0, D))
+    angles, rates = [0.5, 0.2, 0.3, -0.4], [0.1, 0.0, 0.0, 0.1]
+    scene = make_scene(angles, rates, (pole, PAPER, PAPER), duration=0.5, samples=51)
+    tree, chain = run("exudyn_tree/rk67", scene), run("exudyn_chain/generalized_alpha", scene)
+    assert energy_error(tree) < 1e-12 * HEIGHT
+    # a little pitch inertia instead: the rotor's 1e7 kg m² grow by half of it, the rest moves alike
+    eps = 1.0
+    almost = replace(pole, inertia=(0.5 * eps, 0.5 * eps, eps, 0.0, 0.0, 0.0))
+    other = closed_form(make_scene(angles, rates, (almost, PAPER, PAPER), duration=0.5, samples=51))
+    others = [0, 2, 3]
+    assert np.abs(tree.angles[:, others] - other[:, others]).max() < 1e-6
+    assert np.abs(chain.angles - tree.angles).max() < 1e-3
+    assert np.abs(chain.tip - tree.tip).max() < 1e-3 * 33.38
+
+
+@pytest.mark.parametrize(
+    ("name", "order", "steps"),
+    [
+        ("exudyn_tree/rk44", 4, [1e-2, 5e-3, 2.5e-3, 1.25e-3]),
+        ("exudyn_tree/rk67", 6, [1e-2, 5e-3, 2.5e-3]),
+        ("exudyn_tree/generalized_alpha", 2, [2e-3, 1e-3, 5e-4, 2.5e-4]),
+        ("exudyn_chain/generalized_alpha", 2, [1e-3, 5e-4, 2.5e-4]),
+        ("exudyn_chain/newmark_index2", 2, [1e-3, 5e-4, 2.5e-4]),
+    ],
+)
+def test_order_of_convergence(name, order, steps, short_motion) -> None:
+    errors = [angle_error(run(name, SHORT, step=step), short_motion) for step in steps]
+    # all above round-off (1e-13); Butcher's sixth order comes with a shrinking seventh-order part
+    slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert slope == pytest.approx(order, abs=0.2 if order != 6 else 0.5)
+
+
+def test_order_of_dopri5_in_its_tolerance(short_motion) -> None:
+    tolerances = [1e-7, 1e-8, 1e-9, 1e-10]
+    errors = [angle_error(run("exudyn_tree/dopri5", SHORT, absolute_tolerance=t), short_motion) for t in tolerances]
+    # error per step kept at the tolerance: the global error falls as its power 4/5 to 1
+    assert 0.7 < np.polyfit(np.log(tolerances), np.log(errors), 1)[0] < 1.1
+    assert errors[-1] < 1e-8
+
+
+def test_chaotic_scene_to_the_accuracy_of_each_model() -> None:
+    scene = replace(FIG11, duration=2.5, samples=251)  # errors have grown a thousandfold by then
+    motion = closed_form(scene)
+    # DOP853 at 1e-13, grown by 1e3, is the limit for the tree; order 2 gives the chain 1e-7 of it
+    assert angle_error(run("exudyn_tree/rk67", scene), motion) < 2e-10
+    assert angle_error(run("exudyn_chain/generalized_alpha", scene), motion) < 1e-3
+
+
+def test_chain_keeps_near_the_invariant_set_of_zero_pitch() -> None:
+    scene = replace(FIG08, duration=1.2, samples=121)
+    motion = closed_form(scene)
+    assert angle_error(run("exudyn_chain/generalized_alpha", scene), motion) < 1e-6
+    tree = run("exudyn_tree/rk67", scene)
+    assert angle_error(tree, motion) < 1e-12
+    assert not tree.angles[:, 2:].any()
+
+
+def test_tree_keeps_its_energy_over_a_chaotic_run() -> None:
+    got = run("exudyn_tree/rk67", FIG11)
+    # sixth order at 0.67 ms leaves 1e-14 of the energy scale
+    assert energy_error(got) < 1e-12 * HEIGHT
+
+
+def test_a_hub_without_inertia_costs_the_chain_no_accuracy(short_motion) -> None:
+    # were it regularised by an inertia, its error would not fall with the step
+    coarse, fine = (run("exudyn_chain/generalized_alpha", SHORT, step=step) for step in (2e-4, 1e-4))
+    extrapolated = (4 * fine.angles - coarse.angles) / 3
+    assert np.abs(extrapolated - short_motion[:, :4]).max() < 2e-7
+
+
+@pytest.mark.parametrize("name", CHAIN)
+def test_joints_hold(name) -> None:
+    got = run(name, SHORT)
+    # index 3 holds positions to Newton's tolerance; index 2 holds velocities, positions drift with the step squared
+    assert got.constraint_error.max() < (1e-7 if name.endswith("alpha") else 1e-4)
+    assert got.constraint_error.max() > 0.0
+    assert run("exudyn_tree/rk67", SHORT).constraint_error is None
+
+
+@pytest.mark.parametrize("name", CHAIN)
+def test_rotation_vector_nodes_move_the_same(name) -> None:
+    got = run(name, SHORT, node="rotation_vector")
+    assert angle_error(got, run("exudyn_tree/rk67", SHORT).angles) < 1e-3
+
+
+@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+def test_turning_the_rotor_by_a_third_and_renaming_blades_changes_nothing(name) -> None:
+    scene = make_scene([0.2, 0.3, -0.6, 0.9], [0.5, 0.1, 0.2, -0.3], (STOUT, SLIM, PAPER), duration=0.3, samples=31)
+    turned = replace(
+        scene,
+        blades=(SLIM, PAPER, STOUT),
+        initial_angles=(0.2 + 2 * pi / 3, -0.6, 0.9, 0.3),
+        initial_rates=(0.5, 0.2, -0.3, 0.1),
+    )
+    one, other = run(name, scene), run(name, turned)
+    back = other.angles[:, [0, 3, 1, 2]] - [2 * pi / 3, 0, 0, 0]
+    # round-off for the tree, Newton's tolerance for the chain
+    assert np.abs(one.angles - back).max() < (1e-12 if name in TREE else 1e-6)
+
+
+def test_dopri5_treats_both_signs_alike() -> None:
+    # mirrored in the plane of rotation: pitch angles change sign, nothing else does
+    scene = make_scene([0.3, 0.5, 0.9], [0.2, 1.0, 0.4], duration=1.0)
+    mirrored = replace(scene, initial_angles=(0.3, -0.5, -0.9), initial_rates=(0.2, -1.0, -0.4))
+    method = METHODS["exudyn_tree/dopri5"]
+    one, other = (solve("dopri5", method, each, {}) for each in (scene, mirrored))
+    assert one.integration.steps == other.integration.steps
+    assert np.array_equal(one.trajectory.angles * [1, -1, -1], other.trajectory.angles)
+    # the engine's relative tolerance does not: the reason why the default is 0
+    one, other = (solve("dopri5", method, each, {"relative_tolerance": 1e-9}) for each in (scene, mirrored))
+    assert one.integration.steps != other.integration.steps
+
+
+@pytest.mark.parametrize("step", [1e-2, 5e-3])
+def test_long_runs_lose_no_sample(step) -> None:
+    """Thousands of sample intervals: the engine adds them up, and rounding must not make a row come a step too late.
+
+    The sixth-order error of some 50,000 equal steps adds up to less than 1e-6 rad on a pendulum.
+    """
+    scene = paper("fig03", duration=800.0, samples=8001, outputs=("angles", "rates"))
+    found = run("exudyn_tree/rk67", scene, step=step)
+    assert len(found.time) == scene.samples
+    _, exact = exact_rotor_angle(scene, found.time)
+    assert np.abs(found.angles[:, 0] - exact).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_repeats_are_bit_identical(name) -> None:
+    scene = replace(MIXED, duration=0.2, samples=21, rotor_torque=((0.0, 0.0), (0.0737, 500.0), (0.1, 100.0)))
+    solver = METHODS[name].build(scene, METHODS[name].DEFAULTS)
+    first_word, first = solver.integrate(), solver.observe()
+    second_word, second = solver.integrate(), solver.observe()
+    assert first_word == second_word
+    for field in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
+        assert np.array_equal(getattr(first, field), getattr(second, field)), field

@@ -1,0 +1,280 @@
+"""What is built and what is not, how failures are told, and what each part needs to be imported."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
+
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.methods.base import solve
+from rotor_mbs.models.exudyn import energy, geometry, observe, timetable
+from rotor_mbs.models.exudyn.methods import METHODS
+
+KINDS = ("node", "object", "marker", "load", "sensor")
+POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
+BARE = replace(FIG08, gravity=0.0, outputs=("angles", "rates"))
+SCENES = {
+    "bare": BARE,
+    "gravity": replace(BARE, gravity=9.8),
+    "tip": replace(BARE, outputs=("angles", "rates", "tip")),
+    "energy": replace(BARE, outputs=("angles", "rates", "energy")),
+    "torque": replace(BARE, rotor_torque=((0.0, 5.0),)),
+    "torque over time": replace(BARE, rotor_torque=((0.0, 5.0), (1.0, 7.0))),
+    "springs": replace(BARE, bearing_stiffness=(1.0, 0.0, 2.0)),
+    "dampers": replace(BARE, bearing_damping=(0.0, 1.0, 0.0), shaft_damping=1.0),
+    "hub": replace(BARE, hub_inertia=3.0),
+    "fixed pitch": make_scene([0.1, 0.2], [0.0, 0.0], (POLE,)),
+    "all": MIXED,
+}
+TREE, CHAIN = "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"
+
+
+def listed(name, scene):
+    kinds = [item.kind for item in METHODS[name].items(scene)]
+    return {kind: kinds.count(kind) for kind in KINDS}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("name", [TREE, CHAIN])
+def test_the_list_is_what_the_engine_holds(name, scene) -> None:
+    solver = METHODS[name].build(SCENES[scene], METHODS[name].DEFAULTS)
+    assert solver.system.counts() == listed(name, SCENES[scene])
+
+
+def extra(name, scene):
+    bare, more = listed(name, BARE), listed(name, SCENES[scene])
+    return {kind: more[kind] - bare[kind] for kind in KINDS if more[kind] != bare[kind]}
+
+
+@pytest.mark.parametrize(
+    ("scene", "tree", "chain"),
+    [
+        ("gravity", {}, {"marker": 3, "load": 3}),  # one for each blade; the tree has it in its one object
+        ("tip", {"sensor": 3}, {"sensor": 3}),
+        ("energy", {"sensor": 6}, {"sensor": 3}),  # position and velocity; the chain reads positions anyhow
+        ("torque", {"marker": 1, "load": 1}, {"load": 1}),
+        ("torque over time", {"marker": 1, "load": 1}, {"load": 1}),
+        ("springs", {}, {"node": 2, "object": 2}),  # a spring and its turn counter where there is stiffness
+        ("dampers", {}, {"object": 2}),
+        ("hub", {}, {}),
+    ],
+)
+def test_a_scene_builds_what_it_needs_and_no_more(scene, tree, chain) -> None:
+    assert extra(TREE, scene) == tree
+    assert extra(CHAIN, scene) == chain
+
+
+@pytest.mark.parametrize(
+    ("scene", "absent"),
+    [
+        ("bare", ["gravity", "jointPControlVector", "jointDControlVector"]),
+        ("springs", ["gravity", "jointDControlVector"]),
+        ("dampers", ["gravity", "jointPControlVector"]),
+    ],
+)
+def test_the_tree_is_told_nothing_that_is_not_there(scene, absent) -> None:
+    from rotor_mbs.models.exudyn import tree
+
+    chosen = SCENES[scene]
+    told = next(p for p in tree.parts(chosen, timetable.RotorTorque(chosen)) if p.type == "ObjectKinematicTree")
+    assert not set(absent) & set(told.parameters)
+
+
+def test_a_pitch_without_inertia_is_left_out() -> None:
+    assert listed(TREE, SCENES["fixed pitch"])["node"] == 1
+    assert "1 coordinates" in METHODS[TREE].items(SCENES["fixed pitch"])[0].detail
+    chain = METHODS[CHAIN].items(SCENES["fixed pitch"])
+    assert [item.name for item in chain if "Joint" in item.detail] == ["shaft bearing"]
+    assert [item.name for item in chain if item.kind == "node"] == ["hub"]
+
+
+def test_outputs_not_asked_for_are_not_there() -> None:
+    for name in (TREE, CHAIN):
+        got = solve(name, METHODS[name], replace(BARE, duration=0.1, samples=11), {}).trajectory
+        assert got.tip is None
+        assert got.work is None
+        assert got.kinetic_energy is None
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "said"),
+    [
+        (TREE, {"step": -1.0}, "step"),
+        (TREE, {"step": float("nan")}, "step"),
+        (TREE, {"step": True}, "step"),
+        (TREE, {"step": 1e-12}, "steps"),
+        (TREE, {"stride": 1.0}, "allowed: step"),
+        (CHAIN, {"node": "tait_bryan"}, "euler_parameters, rotation_vector"),
+        (CHAIN, {"spectral_radius": 1.5}, "0 to 1"),
+    ],
+)
+def test_a_wrong_setting_is_told_with_what_is_allowed(name, settings, said) -> None:
+    with pytest.raises(InputError, match=said):
+        METHODS[name].build(FIG08, {**METHODS[name].DEFAULTS, **settings})
+
+
+def test_samples_the_engine_cannot_tell_apart_are_refused() -> None:
+    with pytest.raises(MethodRefusal, match="1e-08 s apart"):
+        METHODS[TREE].build(replace(FIG08, duration=1e-9), {})
+
+
+# One blade runs into θ = π/2, where nothing holds the rotor: the rates go to infinity at about 0.06 s.
+SINGULAR = make_scene([0.3, 1.2], [0.5, 3.0], duration=1.0)
+
+
+def test_success_with_a_state_that_is_not_finite_is_cut_and_not_hidden() -> None:
+    run = solve("rk44", METHODS["exudyn_tree/rk44"], SINGULAR, {})
+    assert run.integration.success  # the engine's word
+    assert 0 < len(run.trajectory.time) < SINGULAR.samples
+    assert np.isfinite(run.trajectory.angles).all()
+    assert np.isfinite(run.trajectory.kinetic_energy).all()
+
+
+@pytest.mark.parametrize("name", ["exudyn_tree/dopri5", *(n for n in METHODS if "chain" in n)])
+def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None:
+    start = time.perf_counter()
+    run = solve(name, METHODS[name], SINGULAR, {})
+    assert time.perf_counter() - start < 5.0
+    assert not run.integration.success
+    assert run.integration.message
+    assert "\n" not in run.integration.message
+    assert 0.0 < run.integration.time_reached < 0.1
+    assert 1 < len(run.trajectory.time) < 11
+    said = capfd.readouterr()
+    assert said.out == said.err == ""
+
+
+def test_a_failed_solve_leaves_the_next_alone() -> None:
+    good = replace(FIG11, duration=0.1, samples=11)
+    before = solve(CHAIN, METHODS[CHAIN], good, {}).trajectory
+    assert not solve(CHAIN, METHODS[CHAIN], SINGULAR, {}).integration.success
+    assert np.array_equal(solve(CHAIN, METHODS[CHAIN], good, {}).trajectory.angles, before.angles)
+
+
+def test_samples_stand_exactly_at_their_times() -> None:
+    scene = replace(FIG11, duration=7.3, samples=334)
+    solver = METHODS[TREE].build(scene, METHODS[TREE].DEFAULTS)
+    solver.integrate()
+    # index times step, not a sum of 12000 steps, which would be off by 1e-12 s
+    assert np.abs(solver.system.rows("angles")[:, 0] - np.linspace(0.0, 7.3, 334)).max() < 1e-14
+
+
+def test_counts_of_steps_and_evaluations() -> None:
+    scene = replace(FIG11, duration=0.1, samples=11)
+    rk44 = solve("", METHODS["exudyn_tree/rk44"], scene, {"step": 3e-3}).integration
+    assert (rk44.steps, rk44.rhs_evaluations) == (40, 160)  # four steps of at most 3 ms in each 10 ms
+    alpha = solve("", METHODS[CHAIN], scene, {"step": 1e-3}).integration
+    assert alpha.steps == 100
+    assert alpha.rhs_evaluations >= 200
+    dopri5 = solve("", METHODS["exudyn_tree/dopri5"], scene, {}).integration
+    assert dopri5.rhs_evaluations % 7 == 0
+    assert dopri5.rhs_evaluations >= 7 * dopri5.steps
+
+
+def test_ctrl_c_inside_a_solve_is_an_interrupt() -> None:
+    scene = replace(FIG11, duration=2.0, samples=201)
+    with pytest.raises(KeyboardInterrupt), subprocess.Popen(["sh", "-c", f"sleep 0.5; kill -INT {os.getpid()}"]):
+        solve(CHAIN, METHODS[CHAIN], scene, {"step": 1e-4})
+
+
+def python(program: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_the_tree_runs_without_scipy_heyoka_h5py_and_the_other_models() -> None:
+    program = """
+import sys
+for name in ("scipy", "heyoka", "h5py", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"):
+    sys.modules[name] = None
+from rotor_mbs.methods.base import solve
+from rotor_mbs.models.exudyn.methods import METHODS
+from rotor_mbs.scenario.scene import Blade, Scene
+blade = Blade(1.0, (0.1, 0.0, 1.0), (0.0,) * 6, (0.1, 0.0, 2.0))
+scene = Scene("s", "s", (), 9.8, 0.1, 11, ("angles", "rates", "tip", "energy"), (blade,), 1.0, (0.1, 0.2), (0.0, 0.0))
+run = solve("t", METHODS["exudyn_tree/rk67"], scene, {})
+assert run.integration.success and len(run.trajectory.time) == 11
+"""
+    done = python(program)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+
+
+def test_listing_needs_no_engine() -> None:
+    program = """
+import sys
+sys.modules["exudyn"] = None
+from rotor_mbs.models.exudyn.methods import METHODS
+from rotor_mbs.scenario.scene import Blade, Scene
+blade = Blade(1.0, (0.1, 0.0, 1.0), (0.0,) * 6, (0.1, 0.0, 2.0))
+scene = Scene("s", "s", (), 9.8, 0.1, 11, ("angles", "rates"), (blade,), 1.0, (0.1, 0.2), (0.0, 0.0))
+assert all(method.items(scene) for method in METHODS.values())
+"""
+    done = python(program)
+    assert done.returncode == 0, done.stderr
+
+
+def test_unwrapping_follows_rates_over_turns_between_rows() -> None:
+    t = np.linspace(0.0, 1.0, 101)
+    angle, rate = 70.0 + 900.0 * t + 50.0 * np.sin(9 * t), 900.0 + 450.0 * np.cos(9 * t)
+    wrapped = np.angle(np.exp(1j * angle))
+    # predicted to h³/12 times the third derivative, 3e-3 rad, against the half turn that would mislead it
+    assert np.abs(observe.unwrap(t, wrapped, rate, 70.0) - angle).max() < 1e-11
+
+
+def test_cumulative_integral_is_exact_for_quintics_on_uneven_rows() -> None:
+    t = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 40))
+    got = energy.cumulative_integral(t, 6 * t**5 - 2 * t)
+    assert np.allclose(got, t**6 - t**2 - (t[0] ** 6 - t[0] ** 2), rtol=1e-11)
+
+
+@pytest.mark.parametrize("rows", [2, 3, 5])
+def test_cumulative_integral_of_few_rows(rows) -> None:
+    t = np.linspace(0.0, 1.0, rows)
+    assert energy.cumulative_integral(t, 2 * t)[-1] == pytest.approx(1.0, abs=1e-14)
+
+
+def test_mountings_balance_exactly() -> None:
+    for count in (2, 3, 4, 6):
+        assert not sum(geometry.mounting(i, count)[0, 0] for i in range(count))
+    for count in range(1, 13):
+        for i in range(count):
+            c, s = np.cos(2 * pi * i / count), np.sin(2 * pi * i / count)
+            assert np.abs(geometry.mounting(i, count) - geometry.rotation_y(c, s)).max() < 5e-16
+
+
+def test_quaternion_and_rotation_vector_are_those_of_the_rotation() -> None:
+    for psi, theta in ((0.3, -1.2), (4.0, 2.5), (-7.0, 9.0), (0.0, 0.0)):
+        R = geometry.rotation_y(np.cos(psi), np.sin(psi)) @ geometry.rotation_z(theta)
+        p = geometry.quaternion(psi, theta)
+        w, v = p[0], p[1:]
+        cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+        assert np.abs(np.eye(3) + 2 * w * cross + 2 * cross @ cross - R).max() < 1e-15
+        axis = geometry.rotation_vector(p)
+        angle = np.linalg.norm(axis)
+        assert angle <= pi + 1e-15
+        assert 1 + 2 * np.cos(angle) == pytest.approx(np.trace(R), abs=1e-14)
+        assert np.abs(R @ axis - axis).max() < 1e-14
+
+
+def test_legs_meet_samples_and_kinks() -> None:
+    scene = replace(BARE, duration=1.0, samples=11, rotor_torque=((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0)))
+    pieces = timetable.torque_pieces(scene)
+    assert [(p.start, p.torque_start) for p in pieces] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
+    assert pieces[1].torque_end == pytest.approx(2.0)
+    parts = timetable.legs(scene, pieces, every_sample=False)
+    ends = [leg.end for leg in parts]
+    assert np.allclose(ends, [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])
+    assert [leg.intervals for leg in parts] == [3, 1, 1, 1, 3, 2]
+    assert len(timetable.legs(scene, pieces, every_sample=True)) == 11
+    assert timetable.steps_and_rows(0.01, 0.01 / 15, False) == (15, 1)
+    steps, rows = timetable.steps_and_rows(0.01, 1e-4 / 1.37, True)
+    assert steps % rows == 0
+    assert 137 <= steps <= 145

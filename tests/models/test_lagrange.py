@@ -1,0 +1,271 @@
+"""The closed form against a derivation by machine, exact solutions, conserved quantities and its own precision."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+from support.scenes import ARM, GRAVITY, MASS, OFFSET, general, paper
+
+from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import energy_error, energy_scale
+from rotor_mbs.solution.record import Trajectory
+
+heyoka = pytest.importorskip("heyoka")
+
+METHODS = ("lagrange/taylor", "lagrange/dop853")
+TWO = {"initial_angles": (0.1, 0.3, -0.2), "initial_rates": (0.2, 0.1, 0.4)}
+
+
+@functools.cache
+def run(scene: Scene, method: str = "lagrange/taylor", **settings: float) -> Trajectory:
+    result = solve(method, find_method(method), scene, settings)
+    assert result.integration.success, result.integration.message
+    assert len(result.trajectory.time) == scene.samples
+    return result.trajectory
+
+
+def machine_derivation(scene: Scene):
+    """Accelerations by heyoka.lagrangian from T - V of bodies: com velocities by differentiation, no hub inertias."""
+    count = 1 + len(scene.blades)
+    q = heyoka.make_vars(*[f"q{i}" for i in range(count)])
+    w = heyoka.make_vars(*[f"w{i}" for i in range(count)])
+    kinetic = 0.5 * scene.hub_inertia * w[0] ** 2.0
+    potential = heyoka.expression(0.0)
+    for i, (blade, phase) in enumerate(zip(scene.blades, scene.phases, strict=True)):
+        phi, theta = q[0] + phase, q[1 + i]
+        x, y, z = blade.centre_of_mass
+        across = x * heyoka.cos(theta) - y * heyoka.sin(theta)
+        place = [
+            heyoka.cos(phi) * across + heyoka.sin(phi) * z,
+            x * heyoka.sin(theta) + y * heyoka.cos(theta),
+            heyoka.cos(phi) * z - heyoka.sin(phi) * across,
+        ]
+        velocity = [heyoka.diff(p, q[0]) * w[0] + heyoka.diff(p, q[1 + i]) * w[1 + i] for p in place]
+        spin = [w[0] * heyoka.sin(theta), w[0] * heyoka.cos(theta), w[1 + i]]
+        xx, yy, zz, xy, xz, yz = blade.inertia
+        tensor = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        kinetic += 0.5 * blade.mass * sum(v * v for v in velocity)
+        kinetic += 0.5 * sum(tensor[a][b] * spin[a] * spin[b] for a in range(3) for b in range(3))
+        potential += blade.mass * scene.gravity * place[2]
+        if scene.bearing_stiffness:
+            potential += 0.5 * scene.bearing_stiffness[i] * theta**2.0
+    lost = heyoka.expression(0.5 * scene.shaft_damping) * w[0] ** 2.0
+    for damping, rate in zip(scene.bearing_damping, w[1:], strict=False):
+        lost += 0.5 * damping * rate**2.0
+    equations = heyoka.lagrangian(kinetic - potential, list(q), list(w), D=lost)
+    return heyoka.cfunc([right for _, right in equations[count:]], vars=[*q, *w])
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        paper("fig11"),
+        paper("fig03"),
+        general(),
+        general(shaft_damping=900.0, bearing_damping=(40.0, 0.0, 70.0)),
+        general(gravity=0.0, hub_inertia=0.0),
+        general(blades=general().blades[:2], bearing_stiffness=(0.0, 9e3), **TWO),
+    ],
+    ids=["paper", "one blade", "general", "damped", "free", "two blades"],
+)
+def test_equals_lagranges_equations_derived_by_machine(scene: Scene) -> None:
+    """Same accelerations at random states.
+
+    Bound: round-off of O(100) operations on terms as large as g and Ω² over the pitch arm, which cancel, divided by
+    the share of the rotor's inertia that the Schur complement leaves (the conditioning of the solve).
+    """
+    derived, form = machine_derivation(scene), rotor_form(scene)
+    count = 1 + len(scene.blades)
+    cancelling = 20.0 / min(math.hypot(*blade.centre_of_mass[:2]) for blade in scene.blades)
+    random = np.random.default_rng(7)
+    for _ in range(50):
+        q, w = random.uniform(-4, 4, count), random.uniform(-3, 3, count)
+        found = np.array(closed_form.accelerations(list(q), list(w), form, 0.0, math.sin, math.cos))
+        share = closed_form.schur_complement(list(q), form, math.sin, math.cos) / sum(
+            b.mass * float(np.dot(b.centre_of_mass, b.centre_of_mass)) for b in scene.blades
+        )
+        right = derived(np.concatenate([q, w]))
+        assert np.abs(found - right).max() <= 1e-13 / share * (np.abs(right).max() + cancelling)
+
+
+def pendulum(time: np.ndarray, length: float, start: float) -> np.ndarray:
+    """Angle from straight up of a pendulum let go at rest: q'' = (g / length) sin q (elliptic functions)."""
+    modulus = math.sin((math.pi - start) / 2) ** 2
+    sn, *_ = ellipj(ellipk(modulus) - math.sqrt(GRAVITY / length) * time, modulus)
+    return math.pi - 2 * np.arcsin(math.sqrt(modulus) * sn)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("name", "offset"), [("fig03", OFFSET), ("fig04b", 0.0)])
+def test_one_blade_is_the_pendulum(method: str, name: str, offset: float) -> None:
+    """At zero pitch the mass point lies in the plane of rotation, turned from the blade's axis by atan(c / d)."""
+    scene = paper(name)
+    found = run(scene, method)
+    lead = math.atan2(offset, ARM)
+    exact = pendulum(found.time, math.hypot(offset, ARM), scene.initial_angles[0] + lead) - lead
+    assert np.abs(found.angles[:, 0] - exact).max() <= 1e-10  # the issue's bound for every right model
+    assert not found.angles[:, 1].any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_three_blades_at_zero_pitch(method: str) -> None:
+    """Rest stays rest, a turning rotor turns uniformly, a constant torque gives a parabola; no blade pitches."""
+    rest, turning, driven = (run(paper(name), method) for name in ("fig05", "fig06", "fig15-100kNm"))
+    assert np.abs(rest.angles[:, 0] - math.pi / 6).max() <= 1e-10
+    assert np.abs(turning.angles[:, 0] - (math.pi / 6 + math.pi / 10 * turning.time)).max() <= 1e-10
+    inertia = 3 * MASS * (OFFSET**2 + ARM**2)
+    assert np.abs(driven.angles[:, 0] - 1e5 * driven.time**2 / (2 * inertia)).max() <= 1e-10
+    for found in (rest, turning, driven):
+        assert not found.angles[:, 1:].any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", ["fig09", "fig11", "fig14c"])
+def test_energy_is_kept(method: str, name: str) -> None:
+    scene = paper(name)
+    found = run(scene, method)
+    error = energy_error(found)
+    assert error is not None
+    assert np.abs(error).max() <= 1e-9 * energy_scale(scene, found)
+
+
+def test_energy_balance_with_torque_springs_and_dampers() -> None:
+    table = ((0.5, 0.0), (1.0, 4e4), (2.0, 4e4), (2.0, -1e4), (3.5, 2e4))
+    scene = general(rotor_torque=table, shaft_damping=800.0, bearing_damping=(50.0, 20.0, 90.0))
+    for method in METHODS:
+        found = run(scene, method)
+        error = energy_error(found)
+        assert error is not None
+        assert np.abs(error).max() <= 1e-11 * energy_scale(scene, found)  # DOP853 at 3e-14 a step, a hundred steps
+    assert np.abs(run(scene).angles - run(scene, "lagrange/dop853").angles).max() <= 1e-9
+
+
+def test_angular_momentum_about_the_shaft_is_kept_without_gravity() -> None:
+    """∂T/∂Ω is an integral when nothing depends on q2: evaluated from T alone, quadratic in the rates."""
+    scene = paper("fig11", gravity=0.0, initial_rates=(0.5, 0.3, -0.2, 0.4))
+    found, form = run(scene), rotor_form(scene)
+
+    def momentum(row: int) -> float:
+        angles, rates = list(found.angles[row]), list(found.rates[row])
+        more, less = [rates[0] + 1, *rates[1:]], [rates[0] - 1, *rates[1:]]
+        kinetic = [closed_form.energies(angles, r, form, math.sin, math.cos)[0] for r in (more, less)]
+        return (kinetic[0] - kinetic[1]) / 2
+
+    values = [momentum(row) for row in range(0, scene.samples, 50)]
+    assert np.ptp(values) <= 1e-12 * abs(values[0])
+
+
+def test_torque_table_integrates_exactly() -> None:
+    """Zero pitch, no gravity: I q̈ = τ(t), linear up to 2 s, then a jump: a cubic, then a parabola on top."""
+    scene = paper("fig05", gravity=0.0, duration=4.0, samples=401, rotor_torque=((0.0, 0.0), (2.0, 8e4), (2.0, 1e4)))
+    inertia = 3 * MASS * (OFFSET**2 + ARM**2)
+    for method in METHODS:
+        t = run(scene, method).time
+        late = np.maximum(t - 2.0, 0.0)
+        rising = np.minimum(t, 2.0)
+        spin, angle = 4e4 * rising**2 / 2, 4e4 * rising**3 / 6
+        exact = math.pi / 6 + (angle + (spin[-1] * late + 1e4 * late**2 / 2)) / inertia
+        assert np.abs(run(scene, method).angles[:, 0] - exact).max() <= 1e-13
+
+
+def test_shaft_damping_decays_exponentially() -> None:
+    scene = paper("fig06", gravity=0.0, shaft_damping=5e6)
+    rate = 5e6 / (3 * MASS * (OFFSET**2 + ARM**2))
+    for method in METHODS:
+        found = run(scene, method)
+        assert np.abs(found.rates[:, 0] - math.pi / 10 * np.exp(-rate * found.time)).max() <= 1e-13
+
+
+def test_time_runs_back() -> None:
+    """Forward, rates reversed, forward again: back at the start, to what round-off grows to."""
+    scene = paper("fig09", duration=2.0, samples=3)
+    there = run(scene)
+    back = run(replace(scene, initial_angles=tuple(there.angles[-1]), initial_rates=tuple(-there.rates[-1])))
+    assert np.abs(back.angles[-1] - scene.initial_angles).max() <= 1e-12
+
+
+def test_blades_may_change_places() -> None:
+    """Turning the rotor by a third and handing every pitch on to the next blade is the same machine."""
+    scene = paper("fig11")
+    q, *pitches = scene.initial_angles
+    turned = replace(scene, initial_angles=(q - 2 * math.pi / 3, pitches[2], pitches[0], pitches[1]))
+    one, other = run(scene), run(turned)
+    until = 600  # 6 s, where an error has grown 1e5-fold: 1e-16 of 2π/3 may have become 1e-10
+    assert np.abs(one.angles[:until, 1:] - other.angles[:until][:, [2, 3, 1]]).max() <= 1e-10
+
+
+def test_error_growth_is_that_of_neighbouring_runs() -> None:
+    """The largest singular value bounds what any perturbation does, and some direction comes near it."""
+    scene = paper("fig11", duration=3.0, samples=31)
+    growth = run(scene, "reference").growth
+    assert growth is not None
+    base = run(scene)
+    largest = np.zeros(31)
+    for i in range(4):
+        angles, rates = list(scene.initial_angles), list(scene.initial_rates)
+        angles[i] += 1e-7
+        rates[i] += 1e-7
+        for near in (replace(scene, initial_angles=tuple(angles)), replace(scene, initial_rates=tuple(rates))):
+            other = run(near)
+            state = np.hstack([other.angles - base.angles, other.rates - base.rates])
+            largest = np.maximum(largest, np.linalg.norm(state, axis=1) / 1e-7)
+    assert (largest <= growth * 1.001).all()
+    assert (growth <= largest * math.sqrt(8) * 1.001).all()  # eight columns: at most √8 of the largest
+
+
+def test_the_stand_in_reference_says_what_it_is_worth() -> None:
+    from rotor_mbs.models.lagrange.fallback_reference import StandInReference
+
+    scene = paper("fig11", duration=7.0, samples=701)
+    stand_in = StandInReference(scene)
+    stand_in.integrate()
+    found, true = stand_in.observe(), run(scene, "reference")
+    assert found.uncertainty is not None
+    assert found.growth is not None
+    assert true.growth is not None
+    error = np.abs(found.angles - true.angles).max(axis=1)
+    assert error.max() <= 10 * found.uncertainty.max()
+    first = [int(np.argmax(np.maximum.accumulate(g) >= 1e5)) for g in (found.growth, true.growth)]
+    assert abs(first[0] - first[1]) <= 2  # the same horizon to two samples
+
+
+def test_radau_converges() -> None:
+    """fig08, with ever tighter tolerances, towards Taylor's."""
+    scene = paper("fig08", duration=2.0, samples=201)
+    exact = run(scene).angles
+    errors = [
+        np.abs(run(scene, "lagrange/radau", relative_tolerance=tol, absolute_tolerance=tol * 1e-3).angles - exact).max()
+        for tol in (1e-4, 1e-6, 1e-8)
+    ]
+    assert errors[0] > 10 * errors[1] > 100 * errors[2]
+    assert errors[2] <= 1e-7
+
+
+def test_ode45_on_the_right_equations_converges_in_its_tolerance() -> None:
+    """MATLAB's step control with the right closed form: a thousandth of the tolerance, a hundredth of the error."""
+    scene = paper("fig12", duration=2.0, samples=201)
+    exact = run(scene).angles
+    loose, tight = (
+        np.abs(run(scene, "lagrange/ode45", relative_tolerance=tol, absolute_tolerance=tol / 1e3).angles - exact).max()
+        for tol in (1e-6, 1e-9)
+    )
+    assert tight <= loose / 100
+    assert tight <= 1e-5
+
+
+@pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/ode45", "lagrange/dop853", "lagrange/radau"])
+def test_rates_whose_squares_overflow_end_in_words_and_not_in_warnings(method: str) -> None:
+    """Warnings are errors here: a run that cannot be followed says so in its result, not on the terminal."""
+    scene = find_scenes(["extreme/rate-1e200"])[0]
+    assert judge(scene, solve(method, find_method(method), scene, {}, time_limit_s=5.0), None).status != "ok"

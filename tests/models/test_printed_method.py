@@ -1,0 +1,289 @@
+"""printed/ode45 and its single-erratum variants: the published digits, exact solutions, energy, refusals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.base import solve
+from rotor_mbs.models.ode45 import ode45
+from rotor_mbs.models.printed.derivation import DerivedRotor
+from rotor_mbs.models.printed.matrices import Errata
+from rotor_mbs.models.printed.method import METHODS, right_hand_side
+from rotor_mbs.scenario.scene import Blade, Scene
+
+PI = math.pi
+C = math.hypot(0.08, 0.03)
+M, D = 15000.0, 15.42  # Table 1
+WEIGHT = M * 9.8 * D  # J, the scale of a blade's energy
+TIGHT = {"relative_tolerance": 1e-12, "absolute_tolerance": 1e-14}
+
+
+def scene(angles, rates, duration=10.0, c=C, gravity=9.8, torque=(), outputs=("angles", "rates", "tip", "energy")):
+    blade = Blade(M, (c, 0.0, D), (0.0,) * 6, (c, 0.0, 33.38))
+    return Scene(
+        name="test",
+        title="",
+        figures=(),
+        gravity=gravity,
+        duration=duration,
+        samples=101,
+        outputs=outputs,
+        blades=(blade,) * (len(angles) - 1),
+        hub_inertia=0.0,
+        initial_angles=tuple(float(angle) for angle in angles),
+        initial_rates=tuple(float(rate) for rate in rates),
+        rotor_torque=torque,
+    )
+
+
+REST = (0.0, 0.0, 0.0, 0.0)
+FIG03 = scene((11 * PI / 12, 0), (0, 0))
+FIG04B = scene((11 * PI / 12, 0), (0, 0), c=0.0)
+FIG05 = scene((PI / 6, 0, 0, 0), REST, duration=10.83)
+FIG08 = scene((0, PI / 4, 0, 0), REST)
+FIG11 = scene((PI / 6, PI / 4, PI / 6, PI / 2), (PI / 10, 0, 0, 0))
+
+
+def run(given, method="printed/ode45", **settings):
+    return solve(method, METHODS[method], given, settings)
+
+
+def rotor(result):
+    """Angle and rate of the rotor at ode45's own output points, from which a figure's extremes are read."""
+    refined = result.trajectory.refined
+    return refined.angles[:, 0], refined.rates[:, 0]
+
+
+def drift(trajectory):
+    """Largest change of energy less work, in units of a blade's weight times its arm."""
+    energy = trajectory.kinetic_energy + trajectory.potential_energy - trajectory.work
+    return np.abs(energy - energy[0]).max() / WEIGHT
+
+
+# The published digits.
+
+
+def test_figure_11_crest():
+    result = run(FIG11)
+    assert result.integration.success
+    angle, _ = rotor(result)
+    assert round(angle.max(), 4) == 2.7315
+    assert result.trajectory.refined.time[angle.argmax()] == pytest.approx(7.26, abs=0.01)
+
+
+def test_figure_5_numbers():
+    angle, rate = rotor(run(FIG05))
+    assert round(angle.min(), 4) == 0.5127
+    assert round(angle.max(), 4) == 0.5273
+    assert round(np.abs(rate).max(), 4) == 0.0458
+
+
+def test_figure_8_rotor_stays_below_half_a_radian():
+    # 0.4176: another program of the same equations and step control. Starts changed by 1e-15 rad give 0.415 to 0.423
+    # over 8 s; over 10 s chaos leaves no digit of it.
+    angle, _ = rotor(run(replace(FIG08, duration=8.0)))
+    assert np.abs(angle).max() == pytest.approx(0.4176, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("changed", "settings"),
+    [
+        pytest.param(replace(FIG11, gravity=9.81), {}, id="g = 9.81"),
+        pytest.param(FIG11, {"relative_tolerance": 1e-7}, id="RelTol = 1e-7"),
+        pytest.param(
+            scene(FIG11.initial_angles, FIG11.initial_rates, c=0.0854), {}, marks=pytest.mark.slow, id="c = 0.0854"
+        ),  # comes close to the singularity: tens of thousands of steps
+    ],
+)
+def test_figure_11_crest_is_lost_by_any_other_reading(changed, settings):
+    # Crests of 2.64, 3.07 and more were found for these; chaos leaves no second digit of them to rounding.
+    angle, _ = rotor(run(changed, **settings))
+    assert abs(angle.max() - 2.7315) > 0.05
+
+
+def test_figure_11_with_the_third_erratum_mended_passes_4_rad():
+    mended = DerivedRotor(M, C, D, 9.8, FIG11.phases, Errata(e3=False))
+    f = right_hand_side(FIG11, lambda torque, y: mended.accelerations(torque, y[:4], y[4:]), moving=4)
+    result = ode45(f, 10.0, [*FIG11.initial_angles, *FIG11.initial_rates], 1e-6, 1e-9)
+    assert result.refined()[1][:, 0].max() > 4.0
+
+
+def test_figure_11_converged_is_another_crest():
+    # The published digits hold integration error: the same equations solved closely have their crest at 2.7462.
+    angle, _ = rotor(run(FIG11, relative_tolerance=1e-11, absolute_tolerance=1e-13))
+    assert angle.max() == pytest.approx(2.7462, abs=1e-3)
+
+
+# Exact solutions.
+
+
+def pendulum(start, length, time):
+    """Angle from the lower rest of a pendulum let go at `start`: sin(φ/2) = k sn(K - ω t), k = sin(start/2)."""
+    k = math.sin(start / 2.0)
+    sn = ellipj(ellipk(k**2) - math.sqrt(9.8 / length) * time, k**2)[0]
+    return 2.0 * np.arcsin(k * sn)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_figure_4b_is_a_pendulum(method):
+    # Without c every erratum is without effect. q2 = π hangs down.
+    result = run(FIG04B, method, **TIGHT)
+    exact = PI + pendulum(11 * PI / 12 - PI, D, result.trajectory.time)
+    # Tolerance 1e-12 a step, some 1e3 steps.
+    np.testing.assert_allclose(result.trajectory.angles[:, 0], exact, atol=1e-9)
+    assert np.all(result.trajectory.angles[:, 1] == 0.0)
+
+
+@pytest.mark.parametrize("method", ["printed_e2/ode45", "printed_e3/ode45"])
+def test_figure_3_without_e1_is_a_pendulum_that_does_not_pitch(method):
+    # At zero pitch and pitch rate E2, E3 have no effect: the arm is (c² + d²)/d, and the rest leans by atan(c/d).
+    result = run(FIG03, method, **TIGHT)
+    lean = math.atan2(C, D)
+    arm = (C**2 + D**2) / math.hypot(C, D)
+    exact = PI - lean + pendulum(11 * PI / 12 - (PI - lean), arm, result.trajectory.time)
+    np.testing.assert_allclose(result.trajectory.angles[:, 0], exact, atol=1e-9)
+    assert np.all(result.trajectory.angles[:, 1] == 0.0)
+
+
+def test_figure_3_as_printed_makes_the_blade_pitch():
+    assert np.abs(run(FIG03).trajectory.angles[:, 1]).max() > 0.5
+
+
+@pytest.mark.parametrize("c", [0.0, C])
+def test_constant_torque_turns_a_balanced_rotor(c):
+    # τ t² / (2·3·m·(c² + d²)); the pitches stay at zero with E1 out (they have no inertia at c = 0).
+    given = scene(REST, REST, c=c, torque=((0.0, 1000.0),))
+    result = run(given, "printed_e3/ode45", **TIGHT).trajectory
+    exact = 1000.0 * result.time**2 / (6.0 * M * (c**2 + D**2))
+    np.testing.assert_allclose(result.angles[:, 0], exact, atol=1e-9)
+    np.testing.assert_allclose(result.work, 1000.0 * exact, atol=1e-6)
+
+
+# Energy: the physical one of the motion.
+
+
+def test_right_equations_keep_energy_and_printed_ones_make_it():
+    # Energy drifts by the tolerance a step at most; 2e3 steps, most of them at far less.
+    closely = {"relative_tolerance": 1e-9, "absolute_tolerance": 1e-11}
+    assert drift(run(FIG11, "printed_e3/ode45", **closely).trajectory) < 1e-8
+    for method, gain in {"printed/ode45": 0.1, "printed_e1/ode45": 1e-4, "printed_e2/ode45": 0.1}.items():
+        assert drift(run(FIG11, method).trajectory) > gain
+
+
+def test_work_of_a_torque_that_ramps_and_jumps():
+    table = ((1.0, 0.0), (2.0, 4e5), (3.0, 4e5), (3.0, -3e5), (4.5, 1e5))
+    given = replace(FIG11, duration=5.0, rotor_torque=table)
+    # Steps cross the kinks of the table with their error held to the tolerance, 1e-9; the work adds nothing to it.
+    closely = {"relative_tolerance": 1e-9, "absolute_tolerance": 1e-11}
+    trajectory = run(given, "printed_e3/ode45", **closely).trajectory
+    assert drift(trajectory) < 1e-7
+    assert np.abs(trajectory.work).max() > 0.01 * WEIGHT
+
+
+def test_work_of_a_known_motion():
+    # A rotor alone of inertia J under τ = a t: q̇2 = a t²/(2 J), and the work a² t⁴/(8 J).
+    a, inertia = 5e4, 3.0 * M * D**2
+    given = scene(REST, REST, c=0.0, torque=((0.0, 0.0), (10.0, 10.0 * a)))
+    trajectory = run(given, **TIGHT).trajectory
+    np.testing.assert_allclose(trajectory.work, a**2 * trajectory.time**4 / (8.0 * inertia), rtol=1e-9, atol=1e-6)
+
+
+# What is handed over.
+
+
+def test_samples_and_outputs():
+    trajectory = run(FIG11).trajectory
+    assert np.array_equal(trajectory.time, np.linspace(0.0, 10.0, 101))
+    assert trajectory.angles.shape == trajectory.rates.shape == (101, 4)
+    assert trajectory.tip.shape == (101, 3, 3)
+    assert np.array_equal(trajectory.angles[0], FIG11.initial_angles)
+    bare = run(replace(FIG11, outputs=("angles", "rates"))).trajectory
+    assert (bare.tip, bare.kinetic_energy, bare.potential_energy, bare.work) == (None, None, None, None)
+
+
+def test_tip_is_the_blade_turned_about_its_axis_and_the_shaft():
+    trajectory = run(FIG11).trajectory
+    for row in (0, 37, 100):
+        for blade, phase in enumerate(FIG11.phases):
+            pitch, turn = trajectory.angles[row, 1 + blade], trajectory.angles[row, 0] + phase
+            x, y = C * math.cos(pitch), C * math.sin(pitch)  # about z, by the pitch
+            expected = (
+                x * math.cos(turn) + 33.38 * math.sin(turn),  # about y, by the shaft
+                y,
+                -x * math.sin(turn) + 33.38 * math.cos(turn),
+            )
+            np.testing.assert_allclose(trajectory.tip[row, blade], expected, atol=1e-12)
+
+
+def test_a_singularity_ends_the_run_with_what_was_reached():
+    # One blade as printed pitches to a right angle, where the mass matrix is singular.
+    result = run(replace(FIG03, duration=20.0))
+    assert not result.integration.success
+    assert "Failure at t=" in result.integration.message
+    assert 11.0 < result.integration.time_reached < 14.0
+    assert result.trajectory.time[-1] <= result.integration.time_reached
+    assert abs(result.trajectory.refined.angles[-1, 1]) == pytest.approx(PI / 2, abs=1e-3)
+    for part in (result.trajectory.angles, result.trajectory.rates, result.trajectory.tip):
+        assert np.all(np.isfinite(part))
+        assert len(part) == len(result.trajectory.time)
+
+
+def test_integrating_twice_gives_the_same():
+    solver = METHODS["printed/ode45"].build(FIG05, METHODS["printed/ode45"].DEFAULTS)
+    first, second = solver.integrate(), solver.integrate()
+    assert first == second
+
+
+def test_items_are_what_the_scene_needs():
+    method = METHODS["printed/ode45"]
+
+    def names(given):
+        return {item.name for item in method.items(given)}
+
+    assert names(FIG11) >= {"rotor", "pitch 1", "pitch 2", "pitch 3", "gravity", "tip"}
+    assert "rotor torque" not in names(FIG11)
+    assert names(replace(FIG11, rotor_torque=((0.0, 1e3),))) - names(FIG11) == {"rotor torque"}
+    assert names(FIG11) - names(replace(FIG11, gravity=0.0)) == {"gravity"}
+    assert names(FIG11) - names(replace(FIG11, outputs=("angles", "rates"))) == {"tip", "energy"}
+    assert names(FIG03) - names(FIG04B) == {"pitch 1"}
+
+
+BLADE = FIG11.blades[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "word"),
+    [
+        (scene(REST[:3], REST[:3]), "1 or 3 blades"),
+        (replace(FIG11, blades=(BLADE, BLADE, replace(BLADE, mass=1.0))), "alike"),
+        (replace(FIG11, blades=(replace(BLADE, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),) * 3), "point-mass"),
+        (replace(FIG11, blades=(replace(BLADE, centre_of_mass=(C, 0.1, D)),) * 3), "y = 0"),
+        (replace(FIG11, hub_inertia=1.0), "hub inertia"),
+        (replace(FIG11, bearing_stiffness=(0.0, 1.0, 0.0)), "bearing"),
+        (replace(FIG11, bearing_damping=(0.0, 1.0, 0.0)), "bearing"),
+        (replace(FIG11, shaft_damping=1.0), "shaft damping"),
+    ],
+)
+def test_refusals_are_one_sentence(given, word):
+    with pytest.raises(MethodRefusal, match=word) as refusal:
+        run(given)
+    assert "\n" not in str(refusal.value)
+    assert str(refusal.value).startswith("printed/ode45")
+
+
+@pytest.mark.parametrize("value", [0.0, -1e-6, math.nan, math.inf])
+def test_tolerances_must_be_positive(value):
+    with pytest.raises(MethodRefusal, match="relative_tolerance"):
+        run(FIG11, relative_tolerance=value)
+
+
+def test_single_errata_take_any_number_of_blades():
+    # Two blades let go level: balanced, but for rounding at rest.
+    result = run(scene((PI / 2, 0, 0), (0, 0, 0), duration=1.0), "printed_e1/ode45")
+    assert result.integration.success

@@ -1,0 +1,245 @@
+"""The fast path: runs side by side in SIMD lanes are the runs one by one, each with its own end and its own word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.scenes import general, paper
+
+from rotor_mbs.methods.base import solve
+from rotor_mbs.models.lagrange import taylor
+from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.variants import Variants
+from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_errors
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.record import Solution
+from rotor_mbs.store.sweep_layout import SWEEP_STATUSES, row_type
+from rotor_mbs.studies.sweep_work import Chunk, perform, rows_of
+
+pytest.importorskip("heyoka")
+LANES = lanes()
+_EPS = float(np.finfo(float).eps)
+_NAMES = ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work")
+
+
+def _perturbed(scene: Scene, count: int) -> list[Scene]:
+    rng = np.random.default_rng(5)
+    starts = np.array(scene.initial_angles) + 1e-3 * rng.standard_normal((count, len(scene.initial_angles)))
+    return [replace(scene, initial_angles=tuple(start)) for start in starts.tolist()]
+
+
+def _machines(count: int) -> list[Scene]:
+    """Different machines: masses, stiffness and torque vary, so that no two share a parameter."""
+    base = general(duration=2.0, samples=41)
+    return [
+        replace(
+            base,
+            blades=tuple(replace(blade, mass=blade.mass + 7.0 * i) for blade in base.blades),
+            bearing_stiffness=(2e4 + i, 1.5e4, 3e4 - i),
+            rotor_torque=((0.0, 100.0 + i),),
+        )
+        for i in range(count)
+    ]
+
+
+def _tips(count: int) -> list[Scene]:
+    """Tips that differ by blade and by run, one of them on the pitch axis."""
+    base = general(duration=2.0, samples=41)
+    return [
+        replace(
+            base, blades=tuple(replace(blade, tip=(0.1 * i * k, 0.0, 11.0 + i)) for k, blade in enumerate(base.blades))
+        )
+        for i in range(count)
+    ]
+
+
+def _many_blades(blades: int, count: int) -> list[Scene]:
+    """More than code is unrolled for."""
+    base = general(duration=2.0, samples=41)
+    angles, rates = 0.1 * np.arange(blades + 1), 0.2 * np.arange(blades + 1)
+    return [
+        replace(
+            base,
+            blades=tuple(replace(base.blades[k % 3], mass=900.0 + 10.0 * k) for k in range(blades)),
+            initial_angles=tuple((angles + 0.01 * i).tolist()),
+            initial_rates=tuple(rates.tolist()),
+            bearing_stiffness=(2e4,) * blades,
+            bearing_damping=(),
+        )
+        for i in range(count)
+    ]
+
+
+@pytest.mark.parametrize(
+    "scenes",
+    [
+        _perturbed(paper("fig11", duration=2.0, samples=41), LANES + 3),
+        _perturbed(paper("fig04b", samples=41), 3),  # a pitch that is held
+        _machines(3),
+        [replace(scene, bearing_damping=(10.0, 20.0, 30.0), shaft_damping=5.0) for scene in _machines(2)],
+        [replace(scene, rotor_torque=((0.0, 0.0), (1.0, 50.0))) for scene in _machines(2)],
+        _tips(LANES + 1),
+        _many_blades(6, 2),
+        [replace(scene, gravity=0.0, bearing_stiffness=()) for scene in _machines(2)],
+    ],
+    ids=["starts", "held pitch", "machines", "dampers", "torque over time", "tips", "six blades", "free"],
+)
+def test_runs_side_by_side_are_the_runs_one_by_one(scenes: list[Scene]) -> None:
+    block = solve_many(scenes, _EPS)
+    for i, scene in enumerate(scenes):
+        single = solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+        assert block.words[i].success
+        assert block.words[i].steps == pytest.approx(single.integration.steps, abs=2)
+        for name in _NAMES:
+            expected, found = getattr(single.trajectory, name), getattr(block, name)[i]
+            # Round-off of other instructions, which two seconds of fig11 carry on a thousandfold; rates by the
+            # energy's scale are larger still.
+            scale = max(1.0, float(np.abs(expected).max()))
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10 * scale, err_msg=name)
+
+
+def test_a_run_does_not_depend_on_its_neighbours() -> None:
+    scenes = _perturbed(paper("fig11", samples=41), 2 * LANES + 1)
+    block = solve_many(scenes, _EPS)
+    for i in (0, LANES - 1, LANES + 2, 2 * LANES):
+        alone = solve_many([scenes[i]], _EPS)
+        for name in _NAMES:
+            np.testing.assert_array_equal(getattr(alone, name)[0], getattr(block, name)[i], err_msg=name)
+        assert alone.words[0].steps == block.words[i].steps
+
+
+@pytest.mark.parametrize("outputs", [("angles",), ("angles", "tip"), ("angles", "energy")])
+def test_what_is_not_asked_for_is_not_made(outputs: tuple[str, ...]) -> None:
+    scenes = [replace(scene, outputs=outputs) for scene in _perturbed(paper("fig11", duration=1.0, samples=11), 2)]
+    block = solve_many(scenes, _EPS)
+    assert (block.tip is not None) == ("tip" in outputs)
+    assert (block.kinetic_energy is not None) == ("energy" in outputs)
+    assert all(word.success for word in block.words)
+
+
+def test_many_samples_are_evaluated_in_pieces() -> None:
+    scene = paper("fig11", duration=1.0, samples=2501)
+    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+    assert block.tip is not None
+    np.testing.assert_allclose(block.tip[0], single.trajectory.tip, rtol=0.0, atol=1e-10)
+
+
+# Of one scene file each: what it changes in fig11's or fig03's, the varied keys, and a row of values for each run.
+_STARTS = [[1.0 + 0.1 * i] for i in range(2 * LANES + 1)]
+_TO_SINGULARITY = [[0.5 * i] for i in range(2 * LANES + 1)]
+_CHUNKED = {
+    "starts": ({}, ["initial.angles[1]"], _STARTS),
+    "at rest": ({"gravity": 0.0, "rates": [0, 0, 0, 0]}, ["initial.angles[1]"], _STARTS),
+    "some break off": ({"blades": 1, "angles": [1.0, 1.2], "rates": [0, 0]}, ["initial.rates[1]"], _TO_SINGULARITY),
+    "some break off, no gravity": (
+        {"blades": 1, "angles": [1.0, 1.2], "rates": [0, 0], "gravity": 0.0},
+        ["initial.rates[1]"],
+        _TO_SINGULARITY,
+    ),
+    "a rotor turned by 2e14": ({}, ["initial.angles[0]"], [[0.1], [0.2], [2e14], [0.3], [0.4]]),
+    "tips and masses": ({}, ["blade.tip[0]", "blade.mass"], [[0.1 * i, 1e4 + i] for i in range(LANES + 2)]),
+}
+
+
+@pytest.mark.parametrize(("changes", "keys", "values"), _CHUNKED.values(), ids=list(_CHUNKED))
+def test_any_chunks_give_the_same_bytes(changes: dict[str, object], keys: list[str], values: list[list[float]]) -> None:
+    blade = {"mass": 15000.0, "centre_of_mass": [0.085, 0.0, 15.42], "tip": [0.085, 0.0, 33.38]}
+    tables = {
+        "title": "t",
+        "blades": changes.get("blades", 3),
+        "gravity": changes.get("gravity", 9.8),
+        "duration": 2.0,
+        "samples": 62,
+        "outputs": ["angles", "rates", "tip", "energy"],
+        "blade": blade,
+        "initial": {
+            "angles": changes.get("angles", [0.5, 0.8, 0.5, 1.6]),
+            "rates": changes.get("rates", [0.3, 0, 0, 0]),
+        },
+    }
+    variants = Variants("t", tables, keys)
+    row = row_type(variants.scene(values[0]), ("angles", "rates", "tip", "energy"), "float64")
+    whole = Chunk(variants, "lagrange/taylor", {}, row, 0, np.array(values), 60.0)
+    expected = rows_of(whole)
+    for size in (1, LANES - 1, LANES):
+        for start in range(0, len(values), size):
+            part = rows_of(whole.part(start, min(start + size, len(values))))
+            for name, found in part.items():
+                assert found.tobytes() == expected[name][start : start + size].tobytes(), (name, start, size)
+
+
+def test_a_run_that_fails_at_once_has_its_start() -> None:
+    scene = replace(
+        paper("fig03", duration=1.0, samples=11), initial_angles=(1.0, -np.pi / 2), initial_rates=(0.0, 3.0)
+    )
+    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+    assert block.samples == [1] == [len(single.trajectory.time)]
+    np.testing.assert_array_equal(block.angles[0, 0], scene.initial_angles)
+
+
+def _towards_the_singularity(count: int) -> list[Scene]:
+    """One point-mass blade on a massless hub: there is no motion past ±π/2 of pitch; at rest it stays away."""
+    base = paper("fig03", duration=3.0, samples=301)
+    still = replace(base, initial_angles=(1.0, 0.3))
+    return [still, *[replace(base, initial_angles=(1.0, 1.2), initial_rates=(0.0, 1.0 + i)) for i in range(count)]]
+
+
+@pytest.mark.parametrize("gravity", [9.8, 0.0])
+def test_a_run_that_breaks_off_ends_alone(gravity: float) -> None:
+    scenes = [replace(scene, gravity=gravity) for scene in _towards_the_singularity(2)]
+    block = solve_many(scenes, _EPS)
+    assert [word.success for word in block.words] == [True, False, False]
+    assert block.samples[0] == 301
+    for i in (1, 2):
+        n = block.samples[i]
+        assert 1 < n < 301
+        assert np.isfinite(block.angles[i, :n]).all()
+        for name in _NAMES:
+            assert np.isnan(getattr(block, name)[i, n:]).all(), name
+        assert block.words[i].time_reached == pytest.approx(3.0 * (n - 1) / 300)
+        single = solve("lagrange/taylor", taylor, scenes[i], {"tolerance": _EPS}).trajectory
+        assert abs(len(single.time) - n) <= 1
+
+
+def test_every_row_has_the_status_that_the_run_alone_would_have() -> None:
+    scenes = _towards_the_singularity(3)
+    block = solve_many(scenes, _EPS)
+    assert block.kinetic_energy is not None
+    assert block.potential_energy is not None
+    assert block.work is not None
+    errors = energy_errors(block.kinetic_energy, block.potential_energy, block.work)
+    drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
+    well = clearly_ok(scenes, "lagrange/taylor", block.words, block.samples, drifts)
+    for i, scene in enumerate(scenes):
+        run = Solution("lagrange/taylor", block.trajectory(i), block.words[i], {}, 0.0, [0.0], 0.0)
+        verdict = judge(scene, run, None)
+        assert well[i] == (verdict.status == "ok")
+        assert drifts[i] == pytest.approx(verdict.metrics["energy_drift_max"], rel=1e-12)
+
+
+def test_a_loose_tolerance_is_found_out_run_by_run() -> None:
+    """Teeth: at 1e-6 the energy is not kept to 1e-11, and the rows say so."""
+    scene = paper("fig11", duration=2.0, samples=41)
+    tables = {
+        "title": "t",
+        "blades": 3,
+        "gravity": 9.8,
+        "duration": 2.0,
+        "samples": 41,
+        "outputs": ["angles", "energy"],
+        "blade": {"mass": 15000.0, "centre_of_mass": list(scene.blades[0].centre_of_mass)},
+        "initial": {"angles": list(scene.initial_angles), "rates": list(scene.initial_rates)},
+    }
+    variants = Variants("t", tables, ("initial.angles[0]",))
+    row = row_type(variants.scene([0.0]), ("angles",), "float32")
+    values = np.linspace(0.1, 0.5, 3)[:, None]
+    statuses = {}
+    for tolerance in (1e-6, 1e-15):
+        rows = perform(Chunk(variants, "lagrange/taylor", {"tolerance": tolerance}, row, 5, values, 60.0))
+        statuses[tolerance] = [SWEEP_STATUSES[code] for code in rows["status"]]
+        assert rows["angles"].dtype == np.float32
+        assert (rows["steps"] > 10).all()
+    assert statuses == {1e-6: ["inaccurate"] * 3, 1e-15: ["ok"] * 3}

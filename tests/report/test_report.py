@@ -1,0 +1,396 @@
+"""The report from made files: what is drawn, what is left out, what is escaped, where it is written."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import METHOD_NAMES
+from rotor_mbs.methods.ladders import ladders
+from rotor_mbs.report import figures, numbers, svg
+from rotor_mbs.report.build import write_report
+from rotor_mbs.report.canvas import panels, svg_text
+from rotor_mbs.report.files import page_names
+from rotor_mbs.report.names import COLOURS, GREY, LOOKS, Look
+from rotor_mbs.report.parts import run_sample
+
+FIG11 = paper("fig11", samples=301)
+PLAIN = replace(FIG11, outputs=("angles",))
+PRINTED, REFERENCE, TAYLOR, TREE = "printed/ode45", "reference", "lagrange/taylor", "exudyn_tree/rk67"
+SWING = rotor(lambda t: 0.5 + 0.2 * np.sin(t), lambda t: 0.1 * t, np.cos, np.sin)
+LOOK = Look("#0072b2", "-", "o")
+TIME = np.linspace(0.0, 10.0, 1001)
+
+
+class Page(HTMLParser):
+    """Tags in order, section ids and text of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+        self.sections: list[str] = []
+        self.words = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(name, value or "") for name, value in attrs]
+        if tag == "section":
+            self.sections.append(dict(attrs)["id"] or "")
+
+    def handle_data(self, data: str) -> None:
+        if self.tags[-1:] != ["style"]:
+            self.words += data.replace(numbers.SPACE, " ")
+
+
+def page(folder: Path, name: str = "paper-fig11.html") -> Page:
+    return Page((folder / name).read_text(encoding="utf-8"))
+
+
+def full_set() -> list[Made]:
+    return [
+        Made(FIG11, REFERENCE, SWING),
+        Made(FIG11, PRINTED, rotor(lambda t: 2.7315 * np.sin(0.3 * t), lambda t: -30.0 * t), gain=1e6, refined=True),
+        Made(FIG11, TAYLOR, lambda t: SWING(t) + 1e-12 * t[:, None]),
+        Made(FIG11, TREE, lambda t: SWING(t) + 1e-10 * t[:, None]),
+    ]
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    return write_report(store(folder / "r.h5", full_set()), folder / "out").parent
+
+
+# What is drawn
+
+
+def test_motion_draws_the_run_as_lines_and_the_others_as_marks_upon_them() -> None:
+    angles, rates = SWING(TIME[::4]), np.cos(SWING(TIME[::4]))
+    run = figures.Motion(TIME[::4], angles, rates)
+    picture = figures.motion(run, [(run, LOOK)], horizon=6.0)
+    above, below = picture.axes
+    for axes, values in ((above, angles), (below, rates)):
+        lines = axes.get_lines()
+        for column in range(4):
+            np.testing.assert_array_equal(lines[column].get_xydata(), np.column_stack([TIME[::4], values[:, column]]))
+            marks = lines[4 + column].get_xydata()
+            assert 20 < len(marks) < 40
+            np.testing.assert_allclose(np.interp(marks[:, 0], TIME[::4], values[:, column]), marks[:, 1])
+        assert lines[-1].get_xdata() == [6.0, 6.0]
+    assert "rad/s" in below.get_ylabel()
+
+
+def test_only_what_is_there_is_drawn() -> None:
+    assert len(figures.motion(figures.Motion(TIME, SWING(TIME), None)).axes) == 1
+    # Nothing leaves the plane of rotation: no panel that shows how far.
+    tip = np.stack([np.cos(TIME), 0.0 * TIME, np.sin(TIME)], axis=1)[:, None, :]
+    assert len(figures.paths(TIME, tip).axes) == 1
+
+
+def test_thinning_loses_no_peak() -> None:
+    values = np.sin(np.arange(100_000.0))
+    values[54_321], values[77_777] = 9.0, -8.0
+    time, thin = figures.thin(np.arange(100_000.0), values)
+    assert len(time) <= 1001
+    assert (thin.max(), thin.min()) == (9.0, -8.0)
+    assert time[thin.argmax()] == 54_321.0
+    assert (np.diff(time) > 0).all()
+
+
+def test_differences_are_drawn_at_their_largest_and_zero_is_a_gap() -> None:
+    error = np.where(TIME < 5.0, 0.0, 1e-9 * TIME)
+    error[700] = 1e-3
+    picture = figures.difference([figures.Series(TIME, error, LOOK)], None, None, None)
+    drawn = picture.axes[0].get_lines()[0].get_xydata()
+    assert picture.axes[0].get_yscale() == "log"
+    assert np.nanmax(drawn[:, 1]) == 1e-3
+    assert np.isnan(drawn[drawn[:, 0] < 4.9, 1]).all()
+
+
+def test_a_runaway_does_not_flatten_the_rest() -> None:
+    rates = np.sin(TIME)[:, None].copy()
+    rates[-20:] = 1e6
+    picture = figures.motion(figures.Motion(TIME, None, rates))
+    assert figures.is_cut(rates)
+    assert picture.axes[0].get_ylim()[1] < 5.0
+
+
+def test_rounding_is_not_blown_up_into_a_motion() -> None:
+    rates = 1e-13 * np.sin(TIME)[:, None]
+    low, high = figures.motion(figures.Motion(TIME, rates, None)).axes[0].get_ylim()
+    assert high - low > 0.1
+
+
+def test_paths_have_equal_scales() -> None:
+    tip = np.stack([30.0 * np.cos(TIME), 0.05 * np.sin(9.0 * TIME), 30.0 * np.sin(TIME)], axis=1)[:, None, :]
+    space, strip = figures.paths(TIME, tip).axes
+    spans = [np.ptp(limits) for limits in (space.get_xlim(), space.get_ylim(), space.get_zlim())]
+    box = space._box_aspect  # the drawn lengths of the axes
+    np.testing.assert_allclose(np.array(spans) / box, spans[0] / box[0])
+    np.testing.assert_allclose(strip.get_lines()[0].get_ydata().max(), 50.0, rtol=1e-3)  # mm
+
+
+def test_svg_is_made_small_without_moving_a_point_or_touching_a_label() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot([0.0, 0.5, 1.0, 1.0, 2.0], [0.1234567, 0.5, 0.25, 0.75, 0.123])
+    picture.axes[0].set_yticks([0.125, 0.625])
+    plain = svg_text(picture.figure)
+    small = svg.embedded(plain, "n", "title <b>", "described & so")
+    assert len(small) < 0.7 * len(plain)
+    assert ">0.125<" in small
+    assert ">0.625<" in small
+    assert "title &lt;b&gt;" in small
+    assert "described &amp; so" in small
+    curve = max(re.findall(r' d="(M[^"]*)"', small), key=len)
+    wanted = max(re.findall(r' d="(M[^"]*)"', plain), key=len)
+    numbers_wanted = np.array(re.findall(r"-?[\d.]+", wanted), float).reshape(-1, 2)
+    start, steps = re.match(r"M(\S+?)[ ]?(-?[\d.]+)l(.*)", curve), re.findall(r"-?\d*\.?\d+", curve.split("l")[1])
+    assert start is not None
+    places = np.cumsum([[float(start[1]), float(start[2])], *np.array(steps, float).reshape(-1, 2)], axis=0)
+    np.testing.assert_allclose(places, numbers_wanted, atol=0.051)  # a tenth of a unit, rounded once
+
+
+# What a page has
+
+
+def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> None:
+    found = page(report)
+    assert found.sections == ["said", "paths", "motion", "difference", "energy", "metrics", "file"]
+    headings = [tag for tag in found.tags if re.fullmatch(r"h\d", tag)]
+    assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
+    assert found.tags.count("figcaption") == found.tags.count("figure") == 3 + 1 + 3 + 2
+    images = [value for name, value in found.attributes if name == "role" and value == "img"]
+    assert len(images) == found.tags.count("figure") + found.tags.count("canvas")
+
+
+def test_the_index_tells_the_finding(report: Path) -> None:
+    found = page(report, "index.html")
+    assert "1 of 1 published number is reproduced to every printed digit" in found.words
+    # The fixture's scene: 9.8 m/s² and 10 s, as the paper's own.
+    assert "as they are printed: that of Fig. 11 with g = 9.8 m/s² and 10 s. The right model" in found.words
+    assert (
+        "more than a thousandth of the energy scale in 1 of 1 scene, among the runs that reach the end up to 1.00 MJ"
+        in found.words
+    )
+    assert "1.0×10⁻¹¹ rad (closed form, Taylor)" in found.words  # 1e-12 per second over 10 s
+    assert "1.0×10⁻⁹ rad (Exudyn tree, RK67)" in found.words
+    assert ("href", "paper-fig11.html") in found.attributes
+    errata = page(report, "errata.html").words
+    assert "E1" in errata
+    assert "the first and second derivatives of its transformation (3) by the angles" in errata
+
+
+FIG05 = paper("fig05", samples=301)
+# Two of Fig. 5's three numbers, 0.5127 and 0.5273 rad; so slow that the third, 0.0458 rad/s, does not come out.
+FIG05_ANGLES = rotor(lambda t: 0.52 + 0.0073 * np.sin(2.0 * t))
+
+
+@pytest.mark.parametrize(
+    ("language", "condition", "note"),
+    [
+        (
+            "en",
+            "the 2 of Fig. 5, grown rounding error, for a length of the run and an order of adding",
+            "chosen to match",
+        ),
+        ("es", "los 2 de la Fig. 5, error de redondeo crecido, con una duración de la corrida", "para que coincidan"),
+    ],
+)
+def test_numbers_that_were_matched_are_told_as_such_wherever_they_stand(
+    tmp_path: Path, language: str, condition: str, note: str
+) -> None:
+    runs = [Made(FIG05, PRINTED, FIG05_ANGLES, refined=True), Made(FIG05, REFERENCE, rotor(lambda t: 0.52 + 0.0 * t))]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out", language=language).parent
+    assert condition in page(folder, "index.html").words
+    for name, times in (("index.html", 2 + 1), ("paper-fig05.html", 2), ("figures.html", 1)):
+        assert page(folder, name).words.count(note) >= times, name
+
+
+def test_energy_of_runs_that_broke_off_is_not_the_largest_of_the_finding(tmp_path: Path) -> None:
+    broken = {"status": "solver_failed", "message": "gave up"}
+    away = replace(FIG11, name="paper/fig12")
+    runs = [
+        Made(FIG11, PRINTED, SWING, gain=1e6),
+        Made(away, PRINTED, SWING, gain=1e12, until=0.5, attributes=broken),
+    ]
+    found = page(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent, "index.html")
+    assert "in 2 of 2 scenes, among the runs that reach the end up to 1.00 MJ, and in 1 it runs away" in found.words
+    assert "497 GJ" in found.words  # in the table: 149/300 of 1e12 J
+
+
+def test_ok_is_said_of_methods_that_are_held_to_something_alone(report: Path) -> None:
+    text = (report / "paper-fig11.html").read_text(encoding="utf-8")
+    metrics = text[text.index('<section id="metrics">') :]
+    rows = dict(re.findall(r'<tr><th scope="row">([^<]*)</th><td>(.*?)</td>', metrics))
+    assert rows["as printed, ode45"] == "runs to the end"
+    assert rows["closed form, Taylor"] == '<span class="good">ok</span>'
+    assert "says nothing of whether it is right" in metrics
+
+
+def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None:
+    assert set(LOOKS) == {"reference", *METHOD_NAMES, *(ladder.curve for ladder in ladders())}
+    assert len(set(LOOKS.values())) == len(LOOKS)
+    for one, other in combinations(METHOD_NAMES, 2):  # without variants: told apart by more than a colour
+        differing = sum(a != b for a, b in zip(LOOKS[one], LOOKS[other], strict=True))
+        assert differing >= 2, (one, other)
+    for look in LOOKS.values():
+        assert run_sample("", look).mark  # the legend can draw it
+        assert look.colour in (*COLOURS, GREY)
+
+
+def test_no_caption_repeats_its_heading(report: Path) -> None:
+    for path in report.glob("*.html"):
+        for section in re.findall(r"<section.*?</section>", path.read_text(encoding="utf-8"), re.S):
+            headings = set(re.findall(r"<h2>(.*?)</h2>", section))
+            assert not headings & set(re.findall(r"<caption><span>(.*?)</span>", section)), path.name
+
+
+def test_one_scene_and_one_method_make_a_report_without_empty_sections(tmp_path: Path) -> None:
+    scene = replace(PLAIN, name="mine", title="Mine", figures=(), text="")
+    folder = write_report(store(tmp_path / "r.h5", [Made(scene, TAYLOR, SWING)]), tmp_path / "out").parent
+    assert sorted(path.name for path in folder.iterdir()) == ["index.html", "mine.html"]
+    found = page(folder, "mine.html")
+    assert found.sections == ["motion", "metrics"]
+    index = page(folder, "index.html")
+    assert index.sections == ["scenes", "machine"]
+    assert "paper" not in index.words.lower()
+
+
+def test_a_failed_run_shows_its_reason_and_its_partial_data(tmp_path: Path) -> None:
+    failed = {"status": "solver_failed", "message": "the step became <too> small"}
+    runs = [
+        Made(FIG11, REFERENCE, SWING),
+        Made(FIG11, PRINTED, SWING, until=0.4, attributes=failed),
+        Made(FIG11, TREE, SWING, until=0.0, attributes={"status": "timed_out", "message": "60 s"}),
+    ]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
+    found = page(folder)
+    assert "as printed, ode45: solver failed. the step became <too> small (samples up to 3.967 s)" in found.words
+    assert "Exudyn tree, RK67: timed out. 60 s" in found.words
+    assert {"motion", "difference", "energy", "paths"} <= set(found.sections)
+
+
+# Safety
+
+
+def test_texts_from_the_file_are_escaped(tmp_path: Path) -> None:
+    evil = "<script>alert(1)</script>"
+    scene = replace(FIG11, name="a b/<i>", title=evil, text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
+    failed = {"status": evil, "message": evil}
+    folder = write_report(
+        store(tmp_path / "r.h5", [Made(scene, f"{evil[:8]}>/x", SWING, attributes=failed)]), tmp_path / "o"
+    )
+    for path in folder.parent.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert "<script" not in text
+        assert "<i>" not in text
+        assert "&lt;script&gt;" in text
+
+
+def test_pages_need_nothing_from_outside(report: Path) -> None:
+    for path in report.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert "http://" not in text
+        assert "https://" not in text
+        assert "@import" not in text
+        assert not re.search(r"url\((?!#)", text)
+        found = Page(text)
+        assert not {"link", "img", "iframe", "object"} & set(found.tags)
+        assert "src" not in dict(found.attributes)
+        assert "default-src 'none'" in text
+        links = [value for name, value in found.attributes if name in ("href", "src")]
+        targets = {value.split("#")[0] for value in links} - {""}
+        assert all((report / target).is_file() for target in targets)
+        ids = [value for name, value in found.attributes if name == "id"]
+        assert {value[1:] for value in links if value.startswith("#")} <= set(ids)
+
+
+def test_file_names_stay_in_the_folder_and_differ() -> None:
+    names = page_names(["paper/fig05", "/etc/passwd", "index", "A", "a", "ü/ß", "x" * 300])
+    assert names["paper/fig05"] == "paper-fig05.html"
+    assert all(re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*\.html", name) for name in names.values())
+    assert len({name.lower() for name in names.values()} | {"index.html", "errata.html"}) == len(names) + 2
+    for bad in ("../x", "a/../b", "..", "a\\..\\b"):
+        with pytest.raises(StoreError, match="file name"):
+            page_names([bad])
+
+
+def test_own_old_pages_go_and_foreign_files_stay(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    write_report(store(tmp_path / "a.h5", [Made(PLAIN, TAYLOR, SWING)]), out)
+    (out / "notes.html").write_text("mine")
+    (out / "data.csv").write_text("1")
+    write_report(store(tmp_path / "b.h5", [Made(replace(PLAIN, name="other"), TAYLOR, SWING)]), out)
+    assert sorted(path.name for path in out.iterdir()) == ["data.csv", "index.html", "notes.html", "other.html"]
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    path = store(tmp_path / "r.h5", [Made(PLAIN, TAYLOR, SWING)])
+    with pytest.raises(StoreError, match=r"r\.h5.*cannot be written") as caught:
+        write_report(path, path)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(StoreError, match="no such file"):
+        write_report(tmp_path / "none.h5", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_same_file_gives_the_same_bytes_in_any_number_of_processes(tmp_path: Path) -> None:
+    runs = [Made(replace(PLAIN, name=name), TAYLOR, SWING) for name in ("one", "two")]
+    path = store(tmp_path / "r.h5", runs)
+    write_report(path, tmp_path / "a", jobs=1)
+    write_report(path, tmp_path / "b", jobs=2)
+    names = sorted(one.name for one in (tmp_path / "a").iterdir())
+    assert names == ["index.html", "one.html", "two.html"]
+    for name in names:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_the_report_is_built_without_any_engine(tmp_path: Path) -> None:
+    path = store(tmp_path / "r.h5", [Made(PLAIN, REFERENCE, SWING), Made(PLAIN, PRINTED, SWING)])
+    code = (
+        "import sys\n"
+        "for name in ('exudyn', 'heyoka', 'scipy'): sys.modules[name] = None\n"
+        "from rotor_mbs.cli import main\n"
+        "status = main(['report', sys.argv[1], '-o', sys.argv[2]])\n"
+        "assert not any(name.startswith('rotor_mbs.models.') for name in sys.modules), 'a model was loaded'\n"
+        "sys.exit(status)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code, str(path), str(tmp_path / "out")], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == str(tmp_path / "out" / "index.html")
+    assert (tmp_path / "out" / "paper-fig11.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("shown", "wanted"),
+    [
+        (numbers.number(1.2345e-10), "1.2×10⁻¹⁰"),
+        (numbers.number(0.9999), "1.0"),
+        (numbers.number(-12.34, 3), "−12.3"),
+        (numbers.number(0.0), "0"),
+        (numbers.number(float("nan")), "not finite"),
+        (numbers.number(None), "–"),
+        (numbers.fixed(-0.00001, 4), "0.0000"),
+        (numbers.prefixed(1.1234e6, "J"), "1.12 MJ"),
+        (numbers.prefixed(999.9, "J"), "1.00 kJ"),
+        (numbers.prefixed(150.0, "J", 2), "150 J"),
+        (numbers.prefixed(3e-12, "J"), "3.0×10⁻¹² J"),
+    ],
+)
+def test_numbers_read_well(shown: str, wanted: str) -> None:
+    assert shown.replace(numbers.SPACE, " ") == wanted

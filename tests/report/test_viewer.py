@@ -1,0 +1,123 @@
+"""The viewer's data: what a browser reads is what was stored, small, and harmless."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+from rotor_mbs.report.build import write_report
+from rotor_mbs.report.viewer import FRAMES, magnification, packed, script_json, viewer
+from rotor_mbs.store.read import open_results
+
+TEMPLATES = Path(write_report.__code__.co_filename).parent / "templates"
+FIG11 = paper("fig11", samples=301)
+TURNING = rotor(lambda t: 40.0 * t, lambda t: -7.0 * t + 1.0, np.cos, np.sin)
+TURN = 2.0 * np.pi
+
+
+def unpacked(text: str, coordinates: int) -> np.ndarray:  # type: ignore[type-arg]
+    """rad, (frames, coordinates), each within one turn: as templates/viewer.js reads it."""
+    return np.frombuffer(base64.b64decode(text), "<u2").reshape(-1, coordinates) * TURN / 65536
+
+
+def data_of(text: str) -> dict:  # type: ignore[type-arg]
+    found = re.search(r'<script type="application/json">(.*?)</script>', text, re.S)
+    assert found is not None
+    return json.loads(found[1])
+
+
+def test_angles_come_back_to_a_ten_thousandth_of_a_radian() -> None:
+    time = np.linspace(0.0, 10.0, 1001)
+    angles = np.stack([200.0 * time, -3.0 + np.sin(time)], axis=1)
+    found = unpacked(packed(time, angles, 10.0 / 360), 2)
+    assert len(found) == 361
+    at = np.arange(361) * 10.0 / 360
+    wanted = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
+    gap = (found - wanted + np.pi) % TURN - np.pi
+    assert np.abs(gap).max() <= 0.5 * TURN / 65536 * 1.001  # rounding to 16 bits
+
+
+def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
+    runs = [Made(FIG11, "reference", TURNING), Made(FIG11, "printed/ode45", TURNING, until=0.5)]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
+    text = (folder / "paper-fig11.html").read_text(encoding="utf-8")
+    data = data_of(text)
+    assert [one["name"] for one in data["models"]] == ["as printed, ode45", "reference, quad precision"]
+    frames = [len(unpacked(one["angles"], 4)) for one in data["models"]]
+    assert frames[1] == FRAMES
+    # The printed run stops at 149/300 of 10 s: its frames do, too.
+    assert (frames[0] - 1) * data["step"] == pytest.approx(10.0 * 149 / 300, abs=data["step"])
+    assert data["blades"][1]["tip"] == list(FIG11.blades[1].tip)
+    assert len(json.dumps(data)) < 15_000
+    own = [one for one in re.findall(r"<script>(.*?)</script>", text, re.S) if "viewer" in one]
+    assert len(own) == 1
+    assert len(own[0].encode()) < 40_000
+
+
+def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path) -> None:
+    broken = rotor(lambda t: np.where(t > 4.0, np.nan, t))
+    path = store(tmp_path / "r.h5", [Made(replace(FIG11, outputs=("angles",)), "lagrange/taylor", broken)])
+    with open_results(path) as opened:
+        scene = opened.scenes["paper/fig11"]
+        made = viewer(scene, dict(scene.runs), "")
+    assert made is not None
+    data = json.loads(str(made.data))
+    assert (FRAMES - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("offset", "factor"), [(0.11, 10), (0.5, 2), (2.0, 1), (0.0, None)])
+def test_an_offset_is_drawn_as_a_tenth_of_the_blade_and_never_smaller(offset: float, factor: int | None) -> None:
+    scene = replace(FIG11, blades=tuple(replace(blade, tip=(offset, 0.0, 11.0)) for blade in FIG11.blades))
+    assert magnification(scene) == factor
+
+
+@pytest.mark.parametrize(("offset", "shown"), [(0.1, True), (5.0, False)])
+def test_only_an_offset_that_is_too_small_to_be_seen_is_told_to_be(tmp_path: Path, offset: float, shown: bool) -> None:
+    assert FIG11.text.count("tip = ") == 1
+    text = re.sub(r"tip = .*", f"tip = [{offset}, 0, 11]", FIG11.text)
+    path = store(tmp_path / "r.h5", [Made(replace(FIG11, text=text), "reference", TURNING)])
+    page = write_report(path, tmp_path / "out").parent / "paper-fig11.html"
+    written = page.read_text(encoding="utf-8")
+    assert 'data-part="offset"' in written
+    assert ("so near the pitch axis that pitch could not be seen" in written) == shown
+
+
+def test_no_viewer_where_the_bodies_are_not_known(tmp_path: Path) -> None:
+    path = store(tmp_path / "r.h5", [Made(replace(FIG11, text="no scene"), "reference", TURNING)])
+    folder = write_report(path, tmp_path / "out").parent
+    text = (folder / "paper-fig11.html").read_text(encoding="utf-8")
+    assert 'class="viewer"' not in text
+    assert "<script" not in text
+    assert 'id="paths"' in text
+
+
+def test_data_cannot_end_the_script_element() -> None:
+    evil = "</script><script>alert(1)</script><!-- &amp;"
+    text = str(script_json({"name": evil}))
+    assert not set("<>&") & set(text)
+    assert json.loads(text) == {"name": evil}
+
+
+def test_a_hostile_method_and_title_stay_text(tmp_path: Path) -> None:
+    evil = "<script>alert(1)</script>"
+    scene = replace(FIG11, title=evil)
+    path = store(tmp_path / "r.h5", [Made(scene, "reference", TURNING), Made(scene, f"lagrange/{evil[:8]}", TURNING)])
+    folder = write_report(path, tmp_path / "out").parent
+    for page in folder.glob("*.html"):
+        assert "<script>alert" not in page.read_text(encoding="utf-8")
+
+
+def test_scripts_ask_for_nothing_from_outside_and_evaluate_no_text() -> None:
+    for path in TEMPLATES.glob("*.js"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"https?:|\bfetch\(|XMLHttpRequest|\beval\(|innerHTML|new Function|import\(", text), (
+            path.name
+        )

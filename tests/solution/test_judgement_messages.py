@@ -1,0 +1,55 @@
+"""What is told in words: where a run broke off and what its engine said of it, what the tree is listed as having."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.rotors import FIG08
+from support.scenes import paper
+
+from rotor_mbs.models.exudyn import tree
+from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.record import Integration, Solution, Trajectory
+
+AT_REST = paper("fig05", duration=1.0, samples=11)
+
+
+@pytest.mark.parametrize(
+    ("rows", "success", "said", "told"),
+    [
+        (5, True, "", ("at t = 0.4 s of 1 s", "the engine reported success")),
+        (5, False, "", ("at t = 0.4 s of 1 s", "no reason given")),
+        (5, False, "step too small", ("at t = 0.4 s of 1 s", "step too small")),
+        (0, False, "no start", ("at the start", "no start")),
+    ],
+)
+def test_a_run_that_broke_off_is_told_with_place_and_reason(
+    rows: int, success: bool, said: str, told: tuple[str, ...]
+) -> None:
+    time = np.linspace(0.0, 1.0, 11)[:rows]
+    angles = np.tile(AT_REST.initial_angles, (rows, 1))
+    trajectory = Trajectory(time, angles, np.zeros_like(angles))
+    run = Solution("lagrange/dop853", trajectory, Integration(success, said), {}, 0.0, [0.0], 0.0)
+    message = judge(AT_REST, run, None).message
+    assert all(words in message for words in told), message
+
+
+BARE = replace(FIG08, gravity=0.0)
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (BARE, "4 links"),
+        (FIG08, "4 links, gravity"),
+        (replace(BARE, bearing_stiffness=(1.0, 0.0, 0.0)), "4 links, bearing stiffness"),
+        (replace(BARE, shaft_damping=1.0), "4 links, damping"),
+    ],
+)
+def test_the_tree_is_listed_with_what_it_has(scene: Scene, words: str) -> None:
+    parts = tree.parts(scene, RotorTorque(scene))
+    assert next(part.detail for part in parts if part.type == "ObjectKinematicTree") == words

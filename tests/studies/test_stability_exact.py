@@ -1,0 +1,176 @@
+"""Stiff and extreme scenes against what is known of them exactly: quadrature, elliptic functions, symmetry, order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.quadrature import Passage
+from support.references import TAYLOR, reference, run, scene
+
+from rotor_mbs.analysis.step_limits import largest_stable_step
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import compare, horizon_samples
+from rotor_mbs.studies.conservation import ConservationTask, drift_record, perform_conservation
+from rotor_mbs.studies.step_limits import StepTask, perform_steps, step_for
+
+LIGHT = ("light-1e-2", "light-1e-4", "light-1e-6", "light-1e-8", "light-1e-4-hub", "light-1e-8-hub", "feather")
+
+
+@pytest.mark.parametrize("hub", ["1e3", "1e0", "1e-3", "1e-6"])
+def test_through_the_singular_pitch(hub: str) -> None:
+    """Time and rotor angle at every tenth pitch that the run passes, against 40-digit integrals over the pitch."""
+    one = scene(f"extreme/passage-{hub}")
+    found = run(one).trajectory
+    x, _, z = one.blades[0].centre_of_mass
+    exact = Passage(one.blades[0].mass, x, z, one.hub_inertia, one.initial_angles[1])
+    assert found.angles[0, 1] < np.pi / 2 < found.angles[-1, 1]
+    for k in range(10, len(found.time), 10):
+        time, rotor = exact.time_and_rotor(float(found.angles[k, 1]))
+        assert abs(float(time) - found.time[k]) * exact.pitch_rate(float(found.angles[k, 1])) <= 1e-9
+        spin = abs(found.rates[k, 0])
+        assert abs(float(rotor) - found.angles[k, 0]) <= 1e-9 + spin * 1e-9
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_light_blades_keep_to_the_quad_run(name: str) -> None:
+    exact = reference(f"extreme/{name}")
+    rows = horizon_samples(exact)
+    assert rows == len(exact.time)  # nothing grows: the whole run is held
+    error = np.abs(run(scene(f"extreme/{name}")).trajectory.angles - exact.angles).max()
+    assert error <= 1e-9
+
+
+@pytest.mark.parametrize("name", [s.name for s in find_scenes(["stiff"])])
+def test_every_stiff_scene_is_solved_to_1e_6(name: str) -> None:
+    exact = reference(name)
+    assert horizon_samples(exact) == len(exact.time)
+    verdict = judge(scene(name), run(scene(name)), exact)
+    assert verdict.status == "ok", verdict.message
+    assert verdict.metrics["angle_error_max"] <= 1e-9
+
+
+def test_an_hour_of_a_regular_motion() -> None:
+    """Errors of the start grow with the time and no faster, and the closed form is right to the end.
+
+    A rate off by δ turns the rotor by δ t: growth t / s. Pitch errors swing with at most the highest pitch frequency.
+    """
+    one = scene("extreme/hour-small")
+    exact = reference(one.name)
+    assert exact.growth is not None
+    x, _, _ = one.blades[0].centre_of_mass
+    fastest = np.sqrt((one.bearing_stiffness[0] / one.blades[0].mass + one.gravity * x) / x**2)
+    assert (exact.growth <= exact.time + 2.0 * fastest).all()
+    verdict = judge(one, run(one), exact)
+    assert verdict.status == "ok", verdict.message
+    assert verdict.metrics["angle_error_end"] <= 1e-11  # of a pitch of 8e-3 rad, after 5000 swings
+
+
+def test_springs_of_the_hour_hold_every_pitch() -> None:
+    """Stiffer than gravity's moment on the offset mass, wherever the rotor stands."""
+    one = scene("extreme/hour-small")
+    for blade, stiffness in zip(one.blades, one.bearing_stiffness, strict=True):
+        assert stiffness > 1.5 * blade.mass * one.gravity * np.hypot(*blade.centre_of_mass[:2])
+
+
+@pytest.mark.slow
+def test_the_tree_agrees_at_the_end_of_the_hour() -> None:
+    """720 000 steps of order 6 at ωh = 0.07: (ωh)^7/7! a step, a few 1e-12 of the pitch, adds up to 1e-8 at most."""
+    one = scene("extreme/hour-small")
+    exact = reference(one.name)
+    found = run(one, "exudyn_tree/rk67", step=5e-3).trajectory
+    assert np.abs(found.angles[-1] - exact.angles[-1]).max() <= 1e-8
+    assert np.abs(found.angles[-1] - run(one).trajectory.angles[-1]).max() <= 1e-8
+
+
+@pytest.mark.parametrize("method", ["lagrange/radau", "exudyn_chain/generalized_alpha"])
+def test_implicit_methods_take_an_overdamped_bearing(method: str) -> None:
+    name = "stiff/bearing-1e8-damping-100"
+    verdict = judge(scene(name), run(scene(name), method), reference(name))
+    assert verdict.status == "ok", verdict.message
+    assert verdict.metrics["angle_error_max"] <= 1e-6
+
+
+def test_the_theory_of_rk44() -> None:
+    """2.828 = 2√2 on the imaginary axis, 2.785 on the negative real one (Hairer & Wanner II, IV.2)."""
+    for mode, limit in ((1j, 2.0 * np.sqrt(2.0)), (-1.0, 2.7852935634)):
+        assert largest_stable_step("exudyn_tree/rk44", [mode], 1e6, 100.0) == pytest.approx(limit, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["stiff/bearing-1e8", "stiff/bearing-1e8-damping-100"])
+def test_rk44_grows_where_theory_says(name: str) -> None:
+    """Bisection on runs; a run has a whole number of steps between samples, about 180: half a percent and rounding."""
+    record = perform_steps(StepTask("limits", scene(name), "exudyn_tree/rk44", reference_folder() / "stiff.h5"))
+    facts = record.attributes
+    assert facts["largest_stable_step_s"] == pytest.approx(facts["theory_s"], rel=0.01)
+    scaled = facts["largest_stable_step_s"] * facts["fastest_mode_per_s"]
+    assert scaled == pytest.approx(2.785 if facts["mode_damping_ratio"] == 1.0 else 2.828, rel=0.015)
+
+
+def test_generalized_alpha_has_no_limit() -> None:
+    """ωh = 1000 on a linear swing: what it draws is wrong, but does not grow. (The chain's Newton fails.)"""
+    one = replace(scene("stiff/bearing-1e12"), duration=5.0, samples=51, outputs=("angles", "rates"))
+    found = run(one, "exudyn_tree/generalized_alpha", step=0.01).trajectory
+    assert len(found.time) == one.samples
+    assert np.abs(found.angles[:, 1:]).max() <= 2e-3
+
+
+def test_a_step_for_a_target_is_read_off_a_ladder() -> None:
+    """Order 4 to the digit: 1e-2 at 1, so 1e-6 at 0.1."""
+    steps = np.array([1.0, 0.25, 0.0625])
+    assert step_for(1e-6, steps, 1e-2 * steps**4) == pytest.approx(0.1)
+    assert step_for(1e-9, steps, 1e-2 * steps**4) is None
+
+
+def test_a_ladder_of_runs_that_fail_at_once_ends() -> None:
+    name = "extreme/light-1e-8"
+    record = perform_steps(
+        StepTask("steps", scene(name), "exudyn_chain/generalized_alpha", reference_folder() / "extreme.h5")
+    )
+    assert "ok" not in record.statuses
+    assert "step_for_target_s" not in record.attributes
+
+
+@pytest.mark.parametrize("method", [TAYLOR, "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+def test_symmetry_momentum_and_the_way_back(method: str) -> None:
+    """Bounds: ten times what round-off (the chain: its step, order 2) leaves on this regular motion."""
+    if method == TAYLOR:
+        pytest.importorskip("heyoka")
+    facts = perform_conservation(ConservationTask("symmetry", scene("extreme/zero-gravity"), method)).attributes
+    bound = {TAYLOR: 1e-13, "exudyn_tree/rk67": 1e-11, "exudyn_chain/generalized_alpha": 1e-6}[method]
+    assert set(facts) == {"mirror_error", "relabelling_error", "reversal_error", "angular_momentum_drift"}
+    assert all(value <= bound for value in facts.values()), facts
+
+
+def test_energy_drifts_like_a_random_walk() -> None:
+    pytest.importorskip("heyoka")
+    task = ConservationTask("drift", scene("extreme/zero-gravity"), TAYLOR)
+    record = drift_record("drift", task)
+    assert 0.3 <= record.attributes["exponent"] <= 0.6
+    assert record.attributes["largest"] <= 1e-13
+
+
+@pytest.mark.slow
+def test_a_million_periods_of_the_pendulum() -> None:
+    """Against sn of Jacobi; energy within a random walk of round-off, 2e-14·√steps at most, all along.
+
+    An energy off by δ shifts the period by about δ, and the angle by δ·2π·10⁶ at the end: with δ ≤ 1e-12, 6e-6 rad.
+    """
+    from scipy.special import ellipj, ellipk
+
+    one = scene("extreme/pendulum-million")
+    found = run(one)
+    drift = compare(one, found.trajectory, None)["energy_drift_max"]
+    assert found.integration.steps is not None
+    assert drift <= 2e-14 * np.sqrt(found.integration.steps)
+    x, _, z = one.blades[0].centre_of_mass
+    rate, tilt = np.sqrt(one.gravity / np.hypot(x, z)), np.arctan2(x, z)
+    k = np.sin(0.5 * (np.pi - tilt - one.initial_angles[0]))
+    sn, *_ = ellipj(ellipk(k * k) - rate * found.trajectory.time % (4.0 * ellipk(k * k)), k * k)
+    exact = np.pi - tilt - 2.0 * np.arcsin(k * sn)
+    assert one.duration * rate / (4.0 * ellipk(k * k)) >= 0.999e6
+    assert np.abs(found.trajectory.angles[:, 0] - exact).max() <= 1e-5
+    assert not found.trajectory.angles[:, 1].any()

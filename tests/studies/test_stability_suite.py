@@ -1,0 +1,154 @@
+"""The suite itself: a killed worker, a hung run, the map and its pages; scenes that say what they stress."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.checking import in_this_process
+
+from rotor_mbs.analysis.stability import OUTCOMES, advice, cells, in_words, reached_by, unreached
+from rotor_mbs.cli import main
+from rotor_mbs.execution.pool import Finished, run_tasks
+from rotor_mbs.report.stability_page import write_stability_report
+from rotor_mbs.report.stability_texts import NOT_COMPARED
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.store.stability import Record, read_records, write_records
+from rotor_mbs.studies import stability_records
+from rotor_mbs.studies.batch import Batch, execute
+from rotor_mbs.studies.stability_records import complete_records
+
+SCENES = ("stiff/bearing-1e8-damping-100", "extreme/light-1e-8", "extreme/rate-1e200")
+
+
+def test_there_are_enough_scenes_and_each_says_what_it_stresses() -> None:
+    found = find_scenes(["stiff", "extreme"])
+    assert len(found) >= 30
+    for scene in found:
+        assert scene.text.startswith("# Stresses: "), scene.name
+        assert "# Oracle: " in scene.text, scene.name
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("heyoka")
+    path = tmp_path_factory.mktemp("suite") / "stability.h5"
+    assert main(["stability", *SCENES, "-o", str(path), "--timeout", "3"]) == 0
+    return path
+
+
+@pytest.mark.slow
+def test_no_run_of_ours_claims_success(suite: Path) -> None:
+    found = cells(suite)
+    assert {cell.scene for cell in found} == set(SCENES)
+    ours = [cell for cell in found if cell.method.startswith("lagrange")]
+    assert not [cell for cell in ours if cell.false_success]
+    assert [cell for cell in found if cell.false_success]  # Exudyn's explicit methods on the overdamped bearing
+    assert not [cell for cell in found if cell.status == "ok" and cell.scene == "extreme/rate-1e200"]
+    # A fault of this package would be stored as a run that failed, with the exception's name before its text.
+    assert not [cell for cell in found if re.match(r"\w+Error: ", cell.message)]
+    assert not unreached(found)
+    assert reached_by(found, "extreme/light-1e-8") == "lagrange/taylor"
+
+
+@pytest.mark.slow
+def test_the_map_and_its_pages(suite: Path) -> None:
+    folder = suite.with_name("stability-report")
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    for cell in cells(suite):
+        symbol, words = OUTCOMES[cell.outcome]
+        assert words in page
+        assert symbol in page
+    for scene in SCENES:
+        own = (folder / (scene.replace("/", "-") + ".html")).read_text(encoding="utf-8")
+        assert "# Stresses" in own
+    for one in advice(cells(suite)):
+        assert one.method in in_words(one)
+
+
+def test_a_run_held_by_its_energy_alone_says_so(tmp_path: Path) -> None:
+    """A needle sampled at its two ends: the horizon is before the second, where doubles have lost the motion."""
+    pytest.importorskip("heyoka")
+    path = tmp_path / "needle.h5"
+    (one,) = find_scenes(["extreme/needle-fig05-1e-15"])
+    with in_this_process():
+        execute(Batch([replace(one, samples=2)], {one.name: ["lagrange/taylor"]}, path, 1, 60.0))
+    (cell,) = cells(path)
+    assert (cell.status, cell.outcome) == ("ok", "energy_alone")
+    assert cell.message == "held by its energy alone: the horizon is before the second sample"
+    assert cell.angle_error is None
+    assert not cell.reaches_target
+    assert reached_by([cell], one.name) is None
+    assert in_words(advice([cell])[0]).startswith("lagrange/taylor: holds on 1 of 1 (1 by its energy alone)")
+    page = write_stability_report(path, tmp_path / "report").read_text(encoding="utf-8")
+    assert cell.message in page
+    assert NOT_COMPARED in page
+    assert "closed form, Taylor: holds on 1 of 1 (1 by its energy alone); use for “on a needle”" in page
+    own = (tmp_path / "report" / "extreme-needle-fig05-1e-15.html").read_text(encoding="utf-8")
+    assert cell.message in own
+
+
+def test_records_come_back_as_they_were(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    record = Record("steps", "stiff/x/exudyn_tree/rk44", {"step_for_target_s": 0.25}, {"step": np.array([0.5, 0.25])})
+    write_records(path, [record])
+    write_records(path, read_records(path))
+    (back,) = read_records(path)
+    assert (back.kind, back.scene, back.method) == ("steps", "stiff/x", "exudyn_tree/rk44")
+    assert back.attributes["step_for_target_s"] == 0.25
+    assert {name: list(values) for name, values in back.arrays.items()} == {"step": [0.5, 0.25]}
+
+
+def test_an_interrupted_suite_goes_on_with_its_records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each record is stored when it is made; what is there is not made again, by whatever way it got there."""
+    path = tmp_path / "s.h5"
+    scenes, methods = find_scenes(["extreme/zero-gravity"]), ["lagrange/ode45", "exudyn_tree/rk67", "exudyn_tree/rk44"]
+    by_scene = {"extreme/zero-gravity": methods}
+    with in_this_process():
+        execute(Batch(scenes, by_scene, path, 1, 60.0))
+    made: list[str] = []
+    ends_after = 1
+
+    def one_by_one(work: Any, tasks: Any, *_: object) -> Iterator[Any]:
+        for task in tasks:
+            if len(made) == ends_after:
+                raise KeyboardInterrupt
+            yield Finished(task, work(task))
+            made.append(task.method)
+
+    monkeypatch.setattr(stability_records, "run_tasks", one_by_one)
+    with pytest.raises(KeyboardInterrupt):
+        complete_records(scenes, by_scene, [], path, 1)
+    assert read_records(path) == []
+    ends_after = 10
+    complete_records(scenes, by_scene, [], path, 1)
+    assert made == methods
+    assert [record.method for record in read_records(path)] == sorted(methods)
+    complete_records(scenes, by_scene, [], path, 1)
+    assert made == methods
+    assert [file.name for file in tmp_path.iterdir()] == ["s.h5"]
+
+
+def _work(task: int) -> int:
+    if task == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if task == 2:
+        time.sleep(60.0)
+    return task
+
+
+def test_a_killed_worker_and_a_hung_one_cost_their_own_run_alone() -> None:
+    start = time.monotonic()
+    ended = {finished.task: finished for finished in run_tasks(_work, [0, 1, 2, 3, 4], 2, 2.0)}
+    assert time.monotonic() - start < 30.0
+    assert {task for task, finished in ended.items() if finished.value == task} == {0, 3, 4}
+    assert ended[1].failure == "worker_died"
+    assert ended[2].failure == "timed_out"

@@ -1,0 +1,1 @@
+"""What tests share: scenes, stored results, runs, oracles. Holds no test."""

@@ -1,0 +1,155 @@
+"""For tests of `check`: results files made in this process, from true runs or from runs with a known fault."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+from rotor_mbs.analysis import kinematics
+from rotor_mbs.analysis.verdicts import Verdict
+from rotor_mbs.cli import check
+from rotor_mbs.execution.pool import Finished
+from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.models.exudyn import chain
+from rotor_mbs.scenario.bounds import Bounds, load_bounds
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.load import scene_hash
+from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.record import Solution
+from rotor_mbs.store.merge import merge
+from rotor_mbs.store.read import open_results
+from rotor_mbs.store.write import write_run
+from rotor_mbs.studies import batch
+from rotor_mbs.studies.batch import Batch, execute
+
+
+def _one_by_one(work: Callable[[Any], Any], tasks: Sequence[Any], _workers: int, _timeout_s: float) -> Iterator[Any]:
+    """In place of the pool: here, where a fault can be put in."""
+    for task in tasks:
+        yield Finished(task, work(task))
+
+
+@contextlib.contextmanager
+def in_this_process() -> Iterator[None]:
+    with (
+        mock.patch.object(batch, "run_tasks", _one_by_one),
+        mock.patch.object(check, "run_tasks", _one_by_one),
+    ):
+        yield
+
+
+def shipped(name: str) -> Scene:
+    return find_scenes([name])[0]
+
+
+def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], timeout_s: float = 60.0) -> Path:
+    """A batch as `run` makes it."""
+    found = find_scenes(scenes)
+    with in_this_process():
+        execute(Batch(found, {scene.name: methods for scene in found}, path, 1, timeout_s))
+    return path
+
+
+def add_run(path: Path, scene: Scene, run: Solution) -> None:
+    """A run into a file that has its scene's reference, judged as a batch judges it."""
+    from rotor_mbs.studies.work import reference_trajectory
+
+    with open_results(path) as results:
+        stored = results.scenes[scene.name].reference
+        assert stored is not None
+        verdict = judge(scene, run, reference_trajectory(scene, stored))
+    facts = {"status": verdict.status, "message": verdict.message, "false_success": verdict.false_success}
+    piece = path.with_name("piece.h5")
+    write_run(piece, scene, scene_hash(scene), run, {**facts, **verdict.metrics})
+    merge(path, [path, piece], {})
+    piece.unlink()
+
+
+def judged(path: Path, bounds: Bounds | None = None) -> list[Verdict]:
+    return check.judge_file(path, bounds or load_bounds())
+
+
+def failed(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    return [verdict for verdict in verdicts if not verdict.passed]
+
+
+# Known faults: what a method makes of a scene a little wrong, handed in as its answer to the right one.
+
+
+def _blades(scene: Scene, change: Callable[[Blade], Blade]) -> Scene:
+    return replace(scene, blades=tuple(change(blade) for blade in scene.blades))
+
+
+def with_wrong_offset(scene: Scene, share: float) -> Scene:
+    """c, the centre of mass's distance from the pitch axis, off by `share` of its size."""
+
+    def change(blade: Blade) -> Blade:
+        x, y, z = blade.centre_of_mass
+        return replace(blade, centre_of_mass=(x * (1.0 + share), y * (1.0 + share), z))
+
+    return _blades(scene, change)
+
+
+def with_wrong_tip(scene: Scene, share: float) -> Scene:
+    def change(blade: Blade) -> Blade:
+        x, y, z = blade.tip
+        return replace(blade, tip=(x * (1.0 + share), y * (1.0 + share), z * (1.0 + share)))
+
+    return _blades(scene, change)
+
+
+def with_wrong_mass(scene: Scene, share: float) -> Scene:
+    return _blades(scene, lambda blade: replace(blade, mass=blade.mass * (1.0 + share)))
+
+
+def with_wrong_start(scene: Scene, share: float) -> Scene:
+    return replace(scene, initial_angles=tuple(angle * (1.0 + share) for angle in scene.initial_angles))
+
+
+WRONG = {
+    "agreement": with_wrong_offset,
+    "energy": with_wrong_offset,
+    "exact": with_wrong_mass,
+    "energies": with_wrong_mass,
+    "tip": with_wrong_tip,
+    "start": with_wrong_start,
+}
+
+
+def faulty_run(check_name: str, scene: Scene, method: str, share: float) -> Solution:
+    """The run of a model that has the fault. For the energy balance: its energies do not have it."""
+    if check_name == "gap":
+        with _wrong_seat(share):
+            return solve(method, find_method(method), scene, {})
+    run = solve(method, find_method(method), WRONG[check_name](scene, share), {})
+    if check_name == "energy":
+        motion = run.trajectory
+        motion.kinetic_energy = kinematics.kinetic_energy(scene, motion.angles, motion.rates)
+        motion.potential_energy = kinematics.potential_energy(scene, motion.angles)
+    return run
+
+
+@contextlib.contextmanager
+def _wrong_seat(share: float) -> Iterator[None]:
+    """The blades' own markers at the bearings off by `share` of their distance from the centre of mass.
+
+    They are put there once the bodies' places are known: what is off is where the joint holds, not where the body is.
+    """
+    right = chain._on_body
+
+    def wrong(placed: chain.Placed, where: str, rotation: chain.Array) -> chain.Part:
+        part = right(placed, where, rotation)
+        if placed.name == "hub":
+            return part
+        frame = part.parameters["localHT"]
+        moved = replace(frame, position=frame.position * (1.0 + share))
+        return replace(part, parameters={**part.parameters, "localHT": moved})
+
+    with mock.patch.object(chain, "_on_body", wrong):
+        yield

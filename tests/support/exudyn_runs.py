@@ -1,0 +1,24 @@
+"""Runs of the Exudyn methods that must succeed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor_mbs.methods.base import solve
+from rotor_mbs.models.exudyn.methods import METHODS
+
+TREE = [name for name in METHODS if name.startswith("exudyn_tree")]
+CHAIN = [name for name in METHODS if name.startswith("exudyn_chain")]
+EXPLICIT = TREE[:3]
+
+
+def run(name, scene, **settings):
+    result = solve(name, METHODS[name], scene, settings)
+    assert result.integration.success, result.integration.message
+    assert len(result.trajectory.time) == scene.samples
+    return result.trajectory
+
+
+def energy_error(trajectory):
+    total = trajectory.kinetic_energy + trajectory.potential_energy - trajectory.work
+    return np.abs(total - total[0]).max()

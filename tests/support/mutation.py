@@ -1,0 +1,518 @@
+"""The mutation run: one change to the source at a time, and `check`'s own verdicts must notice.
+
+    python tests/mutation.py [GROUP...] [--every N] [--jobs N]
+
+Each mutant lives in a process of its own, forked from one that has the engines loaded: there the package is imported
+anew with one function's text changed, a small set of scenes is computed and judged as `check` does it, and the first
+verdict that fails is told. A mutant that raises, or does not end in time, would leave a run that failed: `check` fails
+for that, too. What no run that is judged here can show (a turn missed between rows, the place of a quadrature's window)
+is put to a unit test of its own; the answer then begins with "test:".
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import contextlib
+import copy
+import functools
+import importlib
+import importlib.machinery
+import importlib.util
+import io
+import json
+import os
+import re
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+_CPU_LIMIT_S, _RUN_LIMIT_S = 15, 5.0  # of a mutant, whatever else the machine does, and of each run in it
+# What is imported anew: what a mutant may be in, and what may have bound names of it.
+_ANEW = {"rules": ("rotor_mbs.solution", "rotor_mbs.analysis", "rotor_mbs.cli", "checking")}
+_ANEW_ELSE = ("rotor_mbs.models", "rotor_mbs.cli", "checking")
+
+
+@dataclass(frozen=True)
+class Target:
+    """Functions and constants of a module whose every term is perturbed; `share`: by how much a number is changed."""
+
+    group: str
+    module: str
+    names: tuple[str, ...]  # "*": all of them
+    share: float = 1e-6
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change: "line 12:30: s2 -> c2" of a module's function; `make` gives the module's text with it."""
+
+    group: str
+    module: str
+    scope: str
+    what: str
+    make: Callable[[], str]
+
+    @property
+    def name(self) -> str:
+        return f"{self.module}.{self.scope} {self.what}"
+
+
+_M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
+TARGETS = (
+    Target("lagrange", f"{_L}.closed_form", ("accelerations", "power", "energies", "_kinetic", "point_path")),
+    Target(
+        "lagrange",
+        f"{_L}.parameters",
+        ("rotor_form", "_inertia_about_hub", "_rotor_inertia", "_coefficients", "_cosine_of_turn"),
+    ),
+    Target("lagrange", f"{_L}.torque", ("stretches",)),
+    Target("lagrange", f"{_L}.samples", ("trajectory", "_constant_work")),
+    Target("printed", f"{_P}.literal", ("*",)),
+    Target("printed", f"{_P}.matrices", ("*",)),
+    Target("printed", f"{_P}.derivation", ("*",)),
+    Target("printed", f"{_P}.observables", ("tip_path", "kinetic_energy", "potential_energy", "_sines")),
+    Target(
+        "multibody",
+        f"{_M}.geometry",
+        (
+            "rotation_y",
+            "rotation_z",
+            "_turn",
+            "_cos_sin",
+            "blade_body",
+            "hub_body",
+            "_turned",
+            "fixed_blade_rotation",
+        ),
+    ),
+    # About the common centre of mass, which a change moves to second order alone.
+    Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
+    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_of_blade", "_rotor_torque", "_tip_sensor")),
+    Target("multibody", f"{_M}.energy", ("*",)),
+    Target("multibody", f"{_M}.timetable", ("at", "torque_at", "_slope", "torque_pieces", "legs")),
+    Target("multibody", f"{_M}.readings", ("_fields", "_add_energies")),
+    Target("chain", f"{_M}.geometry", ("quaternion", "quaternion_rate"), 1e-2),
+    Target(
+        "chain",
+        f"{_M}.chain",
+        (
+            "rotation",
+            "placed_bodies",
+            "_body",
+            "_gravity",
+            "_on_ground",
+            "_on_body",
+            "_pitch_spring",
+            "_rotor_torque",
+            "_tip_sensor",
+        ),
+        1e-2,
+    ),
+    Target("chain", f"{_M}.readings", ("_joint_motion", "_dot"), 1e-2),
+    Target("chain", f"{_M}.observe", ("unwrap",), 1e-2),
+    Target(
+        "rules",
+        "rotor_mbs.solution.judgement",
+        (
+            "allowed_of",
+            "is_held",
+            "judge",
+            "_is_close",
+            "_broken_off",
+            "_through_singularity",
+            "_inaccurate",
+            "energy_slack",
+            "energy_conditioning",
+            "_shares_at_quarter_turns",
+            "smallest_rotor_inertia_share",
+            "rotor_inertia_shares",
+            "_shaft_inertia_forms",
+            "_SINGULAR_SHARE",
+            "_ROUND_OFF",
+            "_RESEMBLES",
+            "_NO_INERTIA",
+        ),
+        0.5,
+    ),
+    Target(
+        "rules",
+        "rotor_mbs.solution.metrics",
+        (
+            "running_growth",
+            "horizon_samples",
+            "angle_error",
+            "energy_error",
+            "energy_scale",
+            "_against",
+            "_carried_error",
+            "HORIZON_GROWTH",
+        ),
+        0.5,
+    ),
+)
+
+
+# What sees the mutants of a module that no verdict can see.
+_PARTS = "models/test_exudyn_parts.py::test_"
+_TESTS = {
+    f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
+    f"{_M}.observe": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
+    f"{_M}.timetable": (f"{_PARTS}legs_meet_samples_and_kinks",),
+    f"{_M}.tree": ("solution/test_judgement_messages.py",),
+    "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py",),
+    f"{_M}.energy": (f"{_PARTS}cumulative_integral_is_exact_for_quintics_on_uneven_rows", "models/test_exudyn_work.py"),
+}
+
+
+# Making mutants
+
+
+def mutants(target: Target) -> list[Mutant]:
+    """In the order of the source."""
+    spec = importlib.util.find_spec(target.module)
+    assert spec is not None
+    assert spec.origin is not None
+    text = Path(spec.origin).read_text()
+    tree = ast.parse(text)
+    found = []
+    for name, scope in _scopes(tree):
+        if name in target.names or target.names == ("*",):
+            for number, (node, parents) in enumerate(_walk(scope)):
+                for what, change in _changes(node, parents, scope, target):
+                    where = f"line {getattr(node, 'lineno', 0)}:{getattr(node, 'col_offset', 0)}: {what}"
+                    source = functools.partial(_changed, tree, scope, number, change)
+                    found.append(Mutant(target.group, target.module, name, where, source))
+    return found
+
+
+Scope = ast.FunctionDef | ast.Assign
+
+
+def _scopes(tree: ast.Module) -> Iterator[tuple[str, Scope]]:
+    """Functions, methods and the module's constants."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            yield node.name, node
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            yield node.targets[0].id, node
+
+
+Change = Callable[[Any], Any]
+
+
+def _walk(scope: Scope) -> list[tuple[ast.AST, tuple[ast.AST, ...]]]:
+    """Every node of the body or value with its ancestors, the nearest last; neither annotations nor the docstring."""
+    found: list[tuple[ast.AST, tuple[ast.AST, ...]]] = []
+
+    def visit(node: ast.AST, parents: tuple[ast.AST, ...]) -> None:
+        found.append((node, parents))
+        for child in ast.iter_child_nodes(node):
+            visit(child, (*parents, node))
+
+    for node in scope.body if isinstance(scope, ast.FunctionDef) else [scope.value]:
+        if not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
+            visit(node, (scope,))
+    return found
+
+
+def _changed(tree: ast.Module, scope: Scope, number: int, change: Change) -> str:
+    """The module's text with one node of one function or constant replaced."""
+    own = copy.deepcopy(tree)
+    twin = next(node for _, node in _scopes(own) if node.lineno == scope.lineno)
+    node, parents = _walk(twin)[number]
+    new = change(node)
+    for name, value in ast.iter_fields(parents[-1]):
+        if value is node:
+            setattr(parents[-1], name, new)
+        elif isinstance(value, list) and any(item is node for item in value):
+            setattr(parents[-1], name, [new if item is node else item for item in value])
+    return ast.unparse(ast.fix_missing_locations(own))
+
+
+def _changes(node: ast.AST, parents: Sequence[ast.AST], scope: Scope, target: Target) -> Iterator[tuple[str, Change]]:
+    """What can be wrong at a node, each with a word for it."""
+    if any(isinstance(parent, (ast.Subscript, ast.JoinedStr, ast.Raise, ast.AnnAssign, ast.arguments)) and not
+           (isinstance(parent, ast.Subscript) and _inside(node, parent.value)) and not
+           (isinstance(parent, ast.AnnAssign) and parent.value is not None and _inside(node, parent.value))
+           for parent in parents):  # fmt: skip
+        return  # an index or a text is no term
+    text = ast.unparse(node) if isinstance(node, ast.expr) else ""
+    text = text if len(text) <= 60 else f"{text[:57]}..."
+    if isinstance(node, ast.BinOp):
+        yield from _arithmetic(node, parents, text, target.share)
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        yield f"sign of {text} lost", lambda n: n.operand
+    elif isinstance(node, ast.Call):
+        yield from _turned_function(node, text)
+    elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and isinstance(scope, ast.FunctionDef):
+        yield from _sine_for_cosine(node, scope, target)
+    elif isinstance(node, ast.AugAssign) and isinstance(node.op, (ast.Add, ast.Sub)):
+        yield f"sign of {ast.unparse(node)[:60]}", _flipped
+        yield f"without {ast.unparse(node)[:60]}", lambda _: ast.Pass()
+    elif isinstance(node, ast.Constant) and not isinstance(parents[-1], (ast.BinOp, ast.UnaryOp)):
+        yield from _constant(node, parents, target)
+    if target.group == "rules":
+        yield from _logic(node, text)
+
+
+def _inside(node: ast.AST, tree: ast.AST) -> bool:
+    return any(one is node for one in ast.walk(tree))
+
+
+def _arithmetic(node: ast.BinOp, parents: Sequence[ast.AST], text: str, share: float) -> Iterator[tuple[str, Change]]:
+    if any(isinstance(side, (ast.List, ast.ListComp, ast.Tuple, ast.JoinedStr)) for side in (node.left, node.right)):
+        return
+    if isinstance(node.op, (ast.Add, ast.Sub)):
+        sign = isinstance(node.op, ast.Sub)
+        yield f"sign in {text}", _flipped
+        yield f"right side of {text} lost", lambda n: n.left
+        if not (isinstance(node.left, ast.BinOp) and isinstance(node.left.op, (ast.Add, ast.Sub))):
+            yield f"left side of {text} lost", lambda n: ast.UnaryOp(ast.USub(), n.right) if sign else n.right
+        yield f"right side of {text} scaled", lambda n: _with(n, right=_scaled(n.right, share))
+    elif isinstance(node.op, (ast.Mult, ast.Div)):
+        within = parents[-1]
+        if not (isinstance(within, ast.BinOp) and isinstance(within.op, (ast.Mult, ast.Div, ast.Add, ast.Sub))):
+            yield f"{text} scaled", lambda n: _scaled(n, share)
+        if isinstance(node.op, ast.Div):
+            yield f"/ in {text} for *", lambda n: _with(n, op=ast.Mult())
+
+
+def _flipped(node: Any) -> Any:
+    return _with(node, op=ast.Add() if isinstance(node.op, ast.Sub) else ast.Sub())
+
+
+def _with(node: Any, **fields: Any) -> Any:
+    new = copy.copy(node)
+    for name, value in fields.items():
+        setattr(new, name, value)
+    return new
+
+
+def _scaled(node: ast.expr, share: float) -> ast.expr:
+    return ast.BinOp(node, ast.Mult(), ast.Constant(1.0 + share))
+
+
+_OTHER = {"sin": "cos", "cos": "sin"}
+
+
+def _turned_function(node: ast.Call, text: str) -> Iterator[tuple[str, Change]]:
+    function = node.func
+    if isinstance(function, ast.Name) and function.id in _OTHER:
+        other: ast.expr = ast.Name(_OTHER[function.id], ast.Load())
+    elif isinstance(function, ast.Attribute) and function.attr in _OTHER:
+        other = ast.Attribute(function.value, _OTHER[function.attr], ast.Load())
+    else:
+        return
+    yield f"{text}: sine and cosine", lambda n: _with(n, func=other)
+
+
+def _sine_for_cosine(node: ast.Name, function: ast.FunctionDef, target: Target) -> Iterator[tuple[str, Change]]:
+    """s2 for c2, where both are at hand; c is a length in the print."""
+    match = re.fullmatch(r"([sc])([2-5p]?|in_\w+|os_\w+)", node.id)
+    known = {arg.arg for arg in function.args.args} | {
+        name.id for name in ast.walk(function) if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)
+    }
+    if match is None or (target.group == "printed" and not match[2]):
+        return
+    other = {"s": "c", "c": "s"}[match[1]] + match[2].replace("in_", "#").replace("os_", "in_").replace("#", "os_")
+    if other in known:
+        yield f"{node.id} -> {other}", lambda _: ast.Name(other, ast.Load())
+
+
+def _constant(node: ast.Constant, parents: Sequence[ast.AST], target: Target) -> Iterator[tuple[str, Change]]:
+    value, within = node.value, parents[-1]
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return
+    is_number = isinstance(within, (ast.Tuple, ast.List, ast.Return, ast.Assign, ast.IfExp, ast.Dict))
+    if not is_number and not (target.group == "rules" and isinstance(within, ast.Compare)):
+        return
+    if isinstance(value, int) and target.group != "printed":
+        return
+    new = value * (1.0 + target.share) if value else 1e3 * target.share  # of units of order one
+    yield f"{value} -> {new!r}", lambda _: ast.Constant(new)
+
+
+_OPPOSITE = {ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+             ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}  # fmt: skip
+
+
+def _logic(node: ast.AST, text: str) -> Iterator[tuple[str, Change]]:
+    if isinstance(node, ast.Compare) and len(node.ops) == 1:
+        opposite = _OPPOSITE[type(node.ops[0])]
+        yield f"{text} turned round", lambda n: _with(n, ops=[opposite()])
+    elif isinstance(node, ast.BoolOp):
+        other = ast.Or() if isinstance(node.op, ast.And) else ast.And()
+        yield f"and, or in {text}", lambda n: _with(n, op=other)
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        yield f"{text} without not", lambda n: n.operand
+    elif isinstance(node, ast.Constant) and node.value in STATUS_WORDS:
+        other_word = "diverged" if node.value != "diverged" else "ok"
+        yield f"{node.value} -> {other_word}", lambda _: ast.Constant(other_word)
+    elif isinstance(node, (ast.If, ast.IfExp)):
+        condition = ast.unparse(node.test)[:60]
+        yield f"if {condition}: never", lambda n: _with(n, test=ast.Constant(False))
+        yield f"if {condition}: always", lambda n: _with(n, test=ast.Constant(True))
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("min", "max"):
+        other_name = "max" if node.func.id == "min" else "min"
+        yield f"{text}: min, max", lambda n: _with(n, func=ast.Name(other_name, ast.Load()))
+
+
+STATUS_WORDS = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out")
+
+
+# Judging mutants
+
+
+def _verdicts_of(group: str) -> Iterator[list[Any]]:
+    """What `check` says, the cheap parts first. Imported here: after the mutant's text was put in place."""
+    from rotor_mbs.cli import check
+    from rotor_mbs.scenario.bounds import load_bounds
+    from rotor_mbs.studies import check_runs
+
+    if group in ("lagrange", "printed", "rules"):
+        probe = next(probe for probe in check_runs.PROBES if probe.kind == ("rules" if group == "rules" else "printed"))
+        for one in check_runs.measurements(probe):
+            yield [check._verdict(one, load_bounds())]
+    batches = {
+        "lagrange": [(("check/held",), "lagrange/dop853"), (("check/general",), "lagrange/dop853")],
+        "printed": [(("check/point-masses", "paper/fig04b"), "printed/ode45"),
+                    (("paper/fig05", "paper/fig11"), "printed/ode45")],
+        "multibody": [(("check/held",), "exudyn_tree/rk67"), (("check/general",), "exudyn_tree/rk67"),
+                      (("check/held",), "exudyn_chain/generalized_alpha")],
+        "chain": [(("check/held",), "exudyn_chain/generalized_alpha"),
+                  (("check/general",), "exudyn_chain/generalized_alpha")],
+        "rules": [],
+    }  # fmt: skip
+    from support.checking import judged, results_file
+
+    for scenes, method in batches[group]:
+        with tempfile.TemporaryDirectory() as folder:
+            yield judged(results_file(Path(folder) / "mutant.h5", scenes, [method], _RUN_LIMIT_S))
+
+
+class _Changed(importlib.machinery.SourceFileLoader):
+    """Loads one module from a text in place of its file."""
+
+    def __init__(self, name: str, path: str, source: str) -> None:
+        super().__init__(name, path)
+        self._source = source
+
+    def get_code(self, fullname: str) -> Any:  # noqa: ARG002
+        return compile(self._source, self.path, "exec")
+
+
+class _Finder:
+    def __init__(self, mutant: Mutant) -> None:
+        self._mutant = mutant
+
+    def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> Any:
+        if name != self._mutant.module:
+            return None
+        place = str(ROOT / (name.replace(".", "/") + ".py"))
+        return importlib.util.spec_from_file_location(name, place, loader=_Changed(name, place, self._mutant.make()))
+
+
+def _forget(group: str) -> None:
+    for name in [name for name in sys.modules if name.startswith(_ANEW.get(group, _ANEW_ELSE))]:
+        del sys.modules[name]
+
+
+def _outcome(mutant: Mutant) -> str:
+    """Which verdict failed first, or which test; "" where none did."""
+    _forget(mutant.group)
+    sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
+    try:
+        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+            for verdicts in _verdicts_of(mutant.group):
+                for verdict in verdicts:
+                    if not verdict.passed:
+                        return f"{verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}"
+            return _test_that_fails(mutant.module)
+    except BaseException as exc:
+        return f"raised {type(exc).__name__}: {str(exc)[:60]}"
+
+
+def _test_that_fails(module: str) -> str:
+    for test in _TESTS.get(module, ()):
+        if pytest.main(["-q", "-p", "no:cacheprovider", str(ROOT / "tests" / test)]) == pytest.ExitCode.TESTS_FAILED:
+            return f"test: {test}"
+    return ""
+
+
+def _in_a_child(mutant: Mutant) -> tuple[int, int]:
+    """(process, pipe to read its answer from)."""
+    read, write = os.pipe()
+    process = os.fork()
+    if process:
+        os.close(write)
+        return process, read
+    resource.setrlimit(resource.RLIMIT_CPU, (_CPU_LIMIT_S, _CPU_LIMIT_S))
+    with os.fdopen(write, "w") as pipe:
+        pipe.write(_outcome(mutant) or "survived")
+    os._exit(0)
+
+
+def run(chosen: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
+    """Every mutant with the verdict that noticed it ("survived": none); as many at a time as there are jobs."""
+    waiting, going = list(chosen)[::-1], {}
+    while waiting or going:
+        while waiting and len(going) < jobs:
+            mutant = waiting.pop()
+            process, pipe = _in_a_child(mutant)
+            going[process] = mutant, pipe
+        process, _ = os.wait()
+        mutant, pipe = going.pop(process)
+        with os.fdopen(pipe) as answer:
+            yield mutant, answer.read() or "did not end, or took its process with it"
+
+
+def all_mutants(groups: Sequence[str] = (), every: int = 1) -> list[Mutant]:
+    found = [mutant for target in TARGETS if not groups or target.group in groups for mutant in mutants(target)]
+    return found[::every]
+
+
+def warm_up() -> None:
+    """Loads the engines, and proves that without a change every verdict passes."""
+    sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+    importlib.import_module("rotor_mbs.models.exudyn.adapter")
+    for name in ("scipy.integrate", "scipy.special", "h5py", "rotor_mbs.scenario.schema", "rotor_mbs.scenario.load"):
+        importlib.import_module(name)
+    for group in dict.fromkeys(target.group for target in TARGETS):
+        with contextlib.redirect_stderr(io.StringIO()):
+            failed = [v for verdicts in _verdicts_of(group) for v in verdicts if not v.passed]
+        if failed:
+            raise SystemExit(f"without a change, already: {failed[0]}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Mutants of the models and rules, and which verdict notices each.")
+    parser.add_argument("groups", nargs="*", metavar="GROUP", help="lagrange, printed, multibody, chain, rules")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th mutant alone")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="at a time (default: %(default)s)")
+    arguments = parser.parse_args()
+    warm_up()
+    start = time.monotonic()
+    rows = []
+    for mutant, noticed in run(all_mutants(arguments.groups, arguments.every), arguments.jobs):
+        rows.append({"mutant": mutant.name, "group": mutant.group, "noticed": noticed})
+        if noticed == "survived":
+            print(f"survived: {mutant.name}", file=sys.stderr, flush=True)
+    survived = sum(row["noticed"] == "survived" for row in rows)
+    tested = sum(row["noticed"].startswith("test:") for row in rows)
+    seconds = time.monotonic() - start
+    print(f"{len(rows)} mutants, {tested} seen by a test alone, {survived} survived; {seconds:.0f} s", file=sys.stderr)
+    json.dump(rows, sys.stdout, indent=1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,37 @@
+"""Shipped scenes, their frozen references, and runs of them; each read once."""
+
+from __future__ import annotations
+
+import functools
+
+import pytest
+
+from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Solution, Trajectory
+from rotor_mbs.store.read import open_results
+from rotor_mbs.studies.work import reference_trajectory
+
+TAYLOR = "lagrange/taylor"
+
+
+@functools.cache
+def scene(name: str) -> Scene:
+    return find_scenes([name])[0]
+
+
+@functools.cache
+def reference(name: str) -> Trajectory:
+    with open_results(reference_folder() / f"{name.split('/')[0]}.h5") as results:
+        stored = results.scenes[name].reference
+        assert stored is not None
+        return reference_trajectory(scene(name), stored)
+
+
+def run(one: Scene, method: str = TAYLOR, **settings: object) -> Solution:
+    if method == TAYLOR:
+        pytest.importorskip("heyoka")
+    return solve(method, find_method(method), one, settings)

@@ -1,0 +1,155 @@
+"""The closed form of the rotor, written here once more from its kinetic energy, as an oracle.
+
+T = J_hub q'²/2 + Σ ω·J ω/2 with ω = (q' sin θ, q' cos θ, θ') in the blade frame and J about the hub centre;
+V = Σ m g z + Σ k θ²/2. Shares nothing with the package but the scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from math import hypot, pi
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj
+
+from rotor_mbs.scenario.scene import Blade, Scene
+
+C, D = hypot(0.08, 0.03), 15.42
+PAPER = Blade(15000.0, (C, 0.0, D), (0.0,) * 6, (C, 0.0, 33.38))
+STOUT = Blade(100.0, (0.3, -0.2, 4.0), (30.0, 40.0, 25.0, 3.0, -4.0, 5.0), (0.3, 0.1, 8.0))
+SLIM = Blade(80.0, (-0.1, 0.25, 3.0), (20.0, 22.0, 9.0, -2.0, 1.0, 2.0), (0.3, 0.1, 6.0))
+AXIAL = Blade(50.0, (0.0, 0.0, 3.0), (12.0, 12.0, 7.0, 0.0, 0.0, 0.0), (0.2, 0.0, 6.0))
+ALL = ("angles", "rates", "tip", "energy")
+
+
+def make_scene(angles, rates, blades=None, gravity=9.8, duration=1.0, samples=101, outputs=ALL, **more) -> Scene:
+    """A scene with as many of the paper's blades as there are pitch angles, unless told otherwise."""
+    return Scene(
+        name="test",
+        title="test",
+        figures=(),
+        gravity=gravity,
+        duration=duration,
+        samples=samples,
+        outputs=outputs,
+        blades=blades or (PAPER,) * (len(angles) - 1),
+        hub_inertia=more.pop("hub_inertia", 0.0),
+        initial_angles=tuple(map(float, angles)),
+        initial_rates=tuple(map(float, rates)),
+        **more,
+    )
+
+
+FIG08 = make_scene([0, pi / 4, 0, 0], [0] * 4, duration=10.0, samples=1001)
+FIG11 = make_scene([pi / 6, pi / 4, pi / 6, pi / 2], [pi / 10, 0, 0, 0], duration=10.0, samples=1001)
+MIXED = make_scene(
+    [0.3, 0.4, -0.2, 1.0],
+    [1.0, 0.5, -0.3, 0.2],
+    (STOUT, SLIM, STOUT),
+    duration=1.6,
+    samples=161,
+    hub_inertia=500.0,
+    bearing_stiffness=(2000.0, 3000.0, 100.0),
+    bearing_damping=(5.0, 8.0, 1.0),
+    shaft_damping=200.0,
+    rotor_torque=((0.1234, 0.0), (0.777, 2000.0), (0.777, -1000.0), (1.5, -1000.0), (1.5, 500.0)),
+)
+
+
+def about_hub(blade: Blade):
+    """(3, 3) kg m² about the hub centre."""
+    xx, yy, zz, xy, xz, yz = blade.inertia
+    r = np.array(blade.centre_of_mass)
+    com = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return com + blade.mass * (r @ r * np.eye(3) - np.outer(r, r))
+
+
+def acceleration(scene: Scene, t: float, y):
+    """(2 (1 + blades),) time derivative of angles and rates."""
+    n = 1 + len(scene.blades)
+    q, theta, w, rate = y[0], y[1:n], y[n], y[n + 1 :]
+    M, f = np.zeros((n, n)), np.zeros(n)
+    M[0, 0] = scene.hub_inertia
+    f[0] = scene.torque_at(t) - scene.shaft_damping * w
+    for i, blade in enumerate(scene.blades, start=1):
+        J, (x, yy, z) = about_hub(blade), blade.centre_of_mass
+        s, c, v = np.sin(theta[i - 1]), np.cos(theta[i - 1]), rate[i - 1]
+        sp, cp = np.sin(q + scene.phases[i - 1]), np.cos(q + scene.phases[i - 1])
+        a, da = np.array([s, c, 0.0]), np.array([c, -s, 0.0])
+        M[0, 0] += a @ J @ a
+        M[0, i] = M[i, 0] = a @ J[2]
+        M[i, i] = J[2, 2]
+        weight = blade.mass * scene.gravity
+        f[0] += weight * (cp * (c * x - s * yy) + sp * z) - 2 * w * v * (da @ J @ a) - v * v * (da @ J[2])
+        f[i] = w * w * (da @ J @ a) - weight * sp * (s * x + c * yy)
+        f[i] -= scene.bearing_stiffness[i - 1] * theta[i - 1] if scene.bearing_stiffness else 0.0
+        f[i] -= scene.bearing_damping[i - 1] * v if scene.bearing_damping else 0.0
+    return np.concatenate([y[n:], np.linalg.solve(M, f)])
+
+
+def closed_form(scene: Scene, duration: float | None = None):
+    """(n, 2 (1 + blades)) angles and rates at the samples up to `duration`, torque jumps taken one by one."""
+    times = np.linspace(0.0, scene.duration, scene.samples)
+    end = duration or scene.duration
+    knots = sorted({0.0, end, *(t for t, _ in scene.rotor_torque if 0.0 < t < end)})
+    y = np.array(scene.initial_angles + scene.initial_rates)
+    rows = [y]
+    for start, stop in pairwise(knots):
+        held = _torque_until(scene, stop)
+        wanted = times[(times > start + 1e-12) & (times <= stop + 1e-12)].clip(max=stop)
+        last = wanted if len(wanted) and wanted[-1] == stop else np.append(wanted, stop)
+        run = solve_ivp(
+            lambda t, y, held=held: acceleration(held, t, y),
+            (start, stop),
+            y,
+            "DOP853",
+            last,
+            rtol=1e-13,
+            atol=1e-14,
+        )
+        rows += list(run.y.T[: len(wanted)])
+        y = run.y[:, -1]
+    return np.array(rows)
+
+
+def _torque_until(scene: Scene, stop: float) -> Scene:
+    """The scene with the torque's value before a jump at `stop` held there."""
+    rows = scene.rotor_torque
+    early = [row for row in rows if row[0] < stop] + [next((r for r in rows if r[0] == stop), None)]
+    return replace(scene, rotor_torque=tuple(r for r in early if r)) if any(r[0] == stop for r in rows) else scene
+
+
+def energies(scene: Scene, y):
+    """Kinetic and potential energy (n,) J of rows of angles and rates."""
+    n = 1 + len(scene.blades)
+    kinetic = 0.5 * scene.hub_inertia * y[:, n] ** 2
+    potential = np.zeros(len(y))
+    for i, blade in enumerate(scene.blades):
+        theta, w, v = y[:, 1 + i], y[:, n], y[:, n + 1 + i]
+        omega = np.stack([w * np.sin(theta), w * np.cos(theta), v], axis=1)
+        kinetic += 0.5 * np.einsum("ni,ij,nj->n", omega, about_hub(blade), omega)
+        potential += blade.mass * scene.gravity * (blade_points(scene, y, i, blade.centre_of_mass)[:, 2])
+        if scene.bearing_stiffness:
+            potential += 0.5 * scene.bearing_stiffness[i] * theta**2
+    return kinetic, potential
+
+
+def blade_points(scene: Scene, y, index: int, point):
+    """(n, 3) m: Ry(q + phase) Rz(θ) point."""
+    psi, theta = y[:, 0] + scene.phases[index], y[:, 1 + index]
+    x = np.cos(theta) * point[0] - np.sin(theta) * point[1]
+    across = np.sin(theta) * point[0] + np.cos(theta) * point[1]
+    z = np.full_like(x, point[2])
+    return np.stack([np.cos(psi) * x + np.sin(psi) * z, across, -np.sin(psi) * x + np.cos(psi) * z], axis=1)
+
+
+def pendulum(start: float, length: float, lean: float, gravity: float, t):
+    """Angle of a pendulum released from rest at `start` from the top, its mass `lean` ahead of the angle told.
+
+    φ = angle + lean - π swings as φ = 2 asin(k cd(t sqrt(g/l), k²)), k = sin(φ(0)/2).
+    """
+    k = np.sin(0.5 * (start + lean - pi))
+    _, cn, dn, _ = ellipj(t * np.sqrt(gravity / length), k * k)
+    return pi - lean + 2.0 * np.arcsin(k * cn / dn)

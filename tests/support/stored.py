@@ -1,0 +1,89 @@
+"""Results files made by hand: known curves in place of trajectories, stored as a batch stores them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.scenario.load import scene_hash
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import compare
+from rotor_mbs.solution.record import Integration, Refined, Solution, Trajectory
+from rotor_mbs.store.merge import merge
+from rotor_mbs.store.write import write_run
+
+Curve = Callable[[Any], Any]  # time (n,) to angles (n, coordinates)
+
+
+@dataclass
+class Made:
+    """A run to be stored: angles as a function of time; rates are its differences.
+
+    until      share of the scene's duration that the run reached
+    gain       J that the total energy rises by, evenly over the time
+    """
+
+    scene: Scene
+    method: str
+    angles: Curve
+    until: float = 1.0
+    gain: float = 0.0
+    refined: bool = False
+    attributes: dict[str, object] = field(default_factory=dict)
+
+    def run(self) -> Solution:
+        scene = self.scene
+        time = np.linspace(0.0, scene.duration, scene.samples)[: max(int(self.until * scene.samples), 0)]
+        trajectory = self._trajectory(time)
+        if self.refined:
+            fine = np.linspace(0.0, scene.duration, 4 * scene.samples)
+            trajectory.refined = Refined(fine, self._angles(fine), np.gradient(self._angles(fine), fine, axis=0))
+        if self.method == "reference":
+            trajectory.uncertainty = np.full(len(time), 1e-30)
+            trajectory.growth = np.ones(len(time))
+        return Solution(self.method, trajectory, Integration(True), {}, 0.01, [0.002], 0.001)
+
+    def _trajectory(self, time: Any) -> Trajectory:
+        angles = self._angles(time)
+        rates = np.gradient(angles, time, axis=0) if len(time) > 1 else np.zeros_like(angles)
+        trajectory = Trajectory(time, angles, rates)
+        if not len(time):
+            return trajectory
+        if self.scene.wants("tip"):
+            turned = angles[:, :1] + np.array(self.scene.phases)
+            trajectory.tip = 33.0 * np.stack([np.sin(turned), 1e-3 * np.sin(angles[:, 1:]), np.cos(turned)], axis=2)
+        if self.scene.wants("energy"):
+            trajectory.kinetic_energy = 1e6 + self.gain * time / self.scene.duration
+            trajectory.potential_energy = np.zeros(len(time))
+            trajectory.work = np.zeros(len(time))
+        return trajectory
+
+    def _angles(self, time: Any) -> Any:
+        return np.broadcast_to(self.angles(time), (len(time), 1 + len(self.scene.blades))).copy()
+
+
+def store(path: Path, runs: Sequence[Made]) -> Path:
+    """The runs in one file, each compared with its scene's reference where there is one."""
+    references = {made.scene.name: made.run().trajectory for made in runs if made.method == "reference"}
+    pieces = []
+    for number, made in enumerate(runs):
+        run = made.run()
+        metrics = compare(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
+        piece = path.with_name(f"{path.stem}-{number}.piece")
+        attributes = {"status": "ok", "message": "", **metrics, **made.attributes}
+        write_run(piece, made.scene, scene_hash(made.scene), run, attributes)
+        pieces.append(piece)
+    merge(path, pieces, {"rotor_mbs": "0", "numpy": "0"})
+    for piece in pieces:
+        piece.unlink()
+    return path
+
+
+def rotor(curve: Callable[[Any], Any], *pitches: Callable[[Any], Any]) -> Curve:
+    """Angles of the rotor and of as many pitches as are given; the rest are zero, for three blades."""
+    curves = [curve, *pitches] + [np.zeros_like] * (3 - len(pitches))
+    return lambda time: np.stack([one(time) for one in curves], axis=1)
