@@ -46,7 +46,7 @@ def test_a_model_runs_without_the_other_engines(
         pytest.importorskip("heyoka")
     others = [m for m in ("printed", "lagrange", "exudyn") if m != _package(method)]
     more = "\n".join(f"assert 'rotor_mbs.models.{other}' not in sys.modules" for other in others)
-    tests = str(request.path.parent)
+    tests = str(request.path.parents[1])
     done = python(PREAMBLE.format(blocked=blocked, tests=tests, method=method, more=more))
     assert done.returncode == 0, done.stderr
 

@@ -343,7 +343,7 @@ def test_a_second_sweep_is_refused_until_the_first_one_ends_however_it_ends(tmp_
 _INTERRUPTED = """
 import os, signal, sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = [sys.argv[1], sys.argv[3]]
 from test_sweep_store import _plan
 from rotor_mbs.store.sweep_file import SweepFile
 from rotor_mbs.store.sweep_memory import SparseFile
@@ -369,7 +369,7 @@ except KeyboardInterrupt:
 @pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
 def test_an_interrupt_waits_until_the_file_library_is_done(number: str) -> None:
     """Within what it calls back, it would leave the library broken, and the process would end in a crash."""
-    script = [sys.executable, "-c", _INTERRUPTED, str(Path(__file__).parent), number]
+    script = [sys.executable, "-c", _INTERRUPTED, str(Path(__file__).parent), number, str(Path(__file__).parents[1])]
     ended = subprocess.run(script, capture_output=True, text=True)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
 

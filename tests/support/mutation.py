@@ -1,6 +1,6 @@
 """The mutation run: one change to the source at a time, and `check`'s own verdicts must notice.
 
-    python tests/mutation.py [GROUP...] [--every N] [--jobs N]
+    python tests/support/mutation.py [GROUP...] [--every N] [--jobs N]
 
 Each mutant lives in a process of its own, forked from one that has the engines loaded: there the package is imported
 anew with one function's text changed, a small set of scenes is computed and judged as `check` does it, and the first
@@ -37,8 +37,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 _CPU_LIMIT_S, _RUN_LIMIT_S = 15, 5.0  # of a mutant, whatever else the machine does, and of each run in it
 # What is imported anew: what a mutant may be in, and what may have bound names of it.
-_ANEW = {"rules": ("rotor_mbs.solution", "rotor_mbs.analysis", "rotor_mbs.cli", "checking")}
-_ANEW_ELSE = ("rotor_mbs.models", "rotor_mbs.cli", "checking")
+_UPPER = ("rotor_mbs.studies", "rotor_mbs.cli", "support.checking")
+_ANEW = {"rules": ("rotor_mbs.solution", "rotor_mbs.analysis", *_UPPER)}
+_ANEW_ELSE = ("rotor_mbs.models", "rotor_mbs.methods", *_UPPER)
 
 
 @dataclass(frozen=True)
