@@ -71,7 +71,6 @@ def _add_runs(commands: _Commands) -> None:
     )
     reproduce.add_argument("-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help=_default("DIR"))
     _add_batch_options(reproduce)
-    _add_language(reproduce)
 
     run = _command(commands, "run", "a batch of scenes into one results file", "runs:run")
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
@@ -140,7 +139,6 @@ def _add_report(commands: _Commands) -> None:
     report = _command(commands, "report", "HTML pages from a results file", "reports:report")
     report.add_argument("file", type=Path, metavar="FILE", help="a results file")
     report.add_argument("-o", "--output", type=Path, default=Path("report"), metavar="DIR", help=_default("DIR"))
-    _add_language(report)
 
     figures = _command(
         commands, "figures", "the paper's figures as files for a manuscript, from a results file", "figures:figures"
@@ -149,7 +147,6 @@ def _add_report(commands: _Commands) -> None:
     figures.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
     figures.add_argument("--figure", action="append", metavar="N", help="this one alone; may be repeated")
     _add_results(figures)
-    _add_language(figures)
 
     animate = _command(commands, "animate", "a scene moving, from a results file", "animate:animate")
     animate.add_argument("scene", metavar="SCENE", help="its name in the results file")
@@ -173,10 +170,6 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=_default("FILE"),
     )
-
-
-def _add_language(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--lang", choices=("en", "es"), default="en", help="of the texts (default: %(default)s)")
 
 
 def _add_sweep(commands: _Commands) -> None:

@@ -9,7 +9,7 @@ from rotor_mbs.report.print_figures import write_figures
 
 def figures(arguments: argparse.Namespace) -> int:
     """A file for each figure into `arguments.output`."""
-    made = write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or (), arguments.lang)
+    made = write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ())
     for path in made:
         print(path)
     return 0

@@ -20,28 +20,28 @@ _STAMP = ".made-from"
 
 def report(arguments: argparse.Namespace) -> int:
     """Pages from `arguments.file` into `arguments.output`."""
-    print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1, language=arguments.lang))
+    print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
     if read_curves(arguments.file):
         print(write_bench_report(arguments.file, arguments.output / "bench"))
     return 0
 
 
-def render_if_changed(results: Path, output: Path, jobs: int, language: str = "en") -> Path:
+def render_if_changed(results: Path, output: Path, jobs: int) -> Path:
     """The index of the report on `results` in `output`; made anew unless the same data and code have made it before.
 
     Raises StoreError.
     """
-    made_from = _digest(results, language)
+    made_from = _digest(results)
     stamp = output / _STAMP
     if not (stamp.is_file() and stamp.read_text() == made_from and (output / INDEX).is_file()):
-        write_report(results, output, jobs, language)
+        write_report(results, output, jobs)
         replace_file(stamp, made_from.encode())
     return output / INDEX
 
 
-def _digest(results: Path, language: str) -> str:
+def _digest(results: Path) -> str:
     """Of all that a report depends on."""
-    digest = hashlib.sha256((language + fingerprint("report", "analysis", "store")).encode())
+    digest = hashlib.sha256(fingerprint("report", "analysis", "store").encode())
     for path in (results, *sorted(reference_folder().glob("*.toml"))):
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())

@@ -54,7 +54,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
     errata = _errata_unless_in(results)
     report = execute(Batch(scenes, methods, results, arguments.jobs, arguments.timeout, also=errata))
     status = _tell(report, results)
-    index = render_if_changed(results, arguments.output / "report", arguments.jobs, arguments.lang)
+    index = render_if_changed(results, arguments.output / "report", arguments.jobs)
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from rotor_mbs.analysis import errata as errata_analysis
@@ -16,11 +16,10 @@ from rotor_mbs.analysis import methods, published
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.analysis.order import natural
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report import claim_tables, metrics, paper_set
+from rotor_mbs.report import claim_tables, metrics, paper_set, texts
 from rotor_mbs.report.errata_page import errata_page
 from rotor_mbs.report.files import ERRATA, INDEX, WALK, page_names, write_pages
 from rotor_mbs.report.index_page import index_page
-from rotor_mbs.report.language import speaking, texts
 from rotor_mbs.report.pages import Entry, ScenePage, WalkPage, render
 from rotor_mbs.store.read import Results, StoredScene, open_results
 
@@ -56,30 +55,29 @@ class _Made:
     entries: dict[str, Entry]
 
 
-def write_report(results: Path, output: Path, jobs: int = 1, language: str = "en") -> Path:
+def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
     """Pages from the results file into the folder `output`, with `jobs` processes; returns the index.
 
     Raises StoreError where the file cannot be read, has no scene, or the folder cannot be written. Nothing is written
     before every page is made.
     """
-    with speaking(language):
-        with open_results(results) as opened:
-            tasks, files, pages = _prepared(opened)
-        made = _made(results, tasks, jobs, language)
-        if made.entries:
-            in_order = sorted(made.entries.values(), key=lambda entry: int(entry.number))
-            pages[WALK] = render("walk", WalkPage(in_order, has_errata=ERRATA in pages))
+    with open_results(results) as opened:
+        tasks, files, pages = _prepared(opened)
+    made = _made(results, tasks, jobs)
+    if made.entries:
+        in_order = sorted(made.entries.values(), key=lambda entry: int(entry.number))
+        pages[WALK] = render("walk", WalkPage(in_order, has_errata=ERRATA in pages))
     pages |= {files[scene]: text for scene, text in made.pages.items()}
     write_pages(output, pages)
     return output / INDEX
 
 
-def made_of(results: Path, tasks: Sequence[SceneTask | FigureTask], language: str) -> _Made:
+def made_of(results: Path, tasks: Sequence[SceneTask | FigureTask]) -> _Made:
     """HTML of each scene, entry of each figure. Raises StoreError."""
     from rotor_mbs.report import walk  # late: matplotlib, in the workers alone
 
     made = _Made({}, {})
-    with speaking(language), open_results(results) as opened:
+    with open_results(results) as opened:
         figures = {one.number: one for one in paper_set.available(opened.scenes)}
         for task in tasks:
             if isinstance(task, SceneTask):
@@ -99,7 +97,7 @@ def _prepared(opened: Results) -> tuple[list[SceneTask | FigureTask], dict[str, 
     said_of = claims(scenes)
     conditions = published.conditions() if said_of else {}
     entries = errata_analysis.entries(opened)
-    errata = _spoken_errata() if entries or _speaks_of_errata(scenes) else ()
+    errata = published.errata() if entries or _speaks_of_errata(scenes) else ()
     figures = paper_set.available(scenes)
     index = index_page(opened, scenes, files, said_of, conditions, errata, has_walk=bool(figures))
     pages = {INDEX: render("index", index)}
@@ -108,20 +106,6 @@ def _prepared(opened: Results) -> tuple[list[SceneTask | FigureTask], dict[str, 
     tasks: list[SceneTask | FigureTask] = list(_tasks(files, said_of, conditions, has_errata=bool(errata)))
     tasks += [FigureTask(one.number, tuple(said_of), files) for one in figures]
     return tasks, files, pages
-
-
-def _spoken_errata() -> tuple[published.Erratum, ...]:
-    """In the language of the report."""
-    return tuple(
-        replace(
-            one,
-            entry=texts.erratum(one.id, "entry", one.entry),
-            printed=texts.erratum(one.id, "printed", one.printed),
-            right=texts.erratum(one.id, "right", one.right),
-            reason=texts.erratum(one.id, "reason", one.reason),
-        )
-        for one in published.errata()
-    )
 
 
 def _speaks_of_errata(scenes: Mapping[str, StoredScene]) -> bool:
@@ -145,17 +129,17 @@ def _tasks(
         )
 
 
-def _made(results: Path, tasks: Sequence[SceneTask | FigureTask], jobs: int, language: str) -> _Made:
+def _made(results: Path, tasks: Sequence[SceneTask | FigureTask], jobs: int) -> _Made:
     """All tasks, in `jobs` processes (here where it is one)."""
     workers = min(jobs, len(tasks))
     if workers <= 1:
-        return made_of(results, tasks, language)
+        return made_of(results, tasks)
     # A few tasks a piece: opening the file costs as much as two pictures, waiting for the slowest piece more.
     pieces = [tasks[start :: _PIECES * workers] for start in range(_PIECES * workers)]
     made = _Made({}, {})
     # spawn: the parent may have threads of numerical libraries, which a fork would copy half-way.
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        for piece in pool.map(made_of, [results] * len(pieces), pieces, [language] * len(pieces)):
+        for piece in pool.map(made_of, [results] * len(pieces), pieces):
             made.pages.update(piece.pages)
             made.entries.update(piece.entries)
     return made
@@ -166,7 +150,7 @@ def _scene_page(scene: StoredScene, task: SceneTask) -> ScenePage:
 
     return ScenePage(
         name=scene.name,
-        title=texts.scene_title(scene.name, scene.title),
+        title=scene.title,
         figures=texts.figures(str(scene.attributes.get("figures", ""))),
         lead=lead(scene),
         failures=metrics.failures(scene),

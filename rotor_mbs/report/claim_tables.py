@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from rotor_mbs.analysis.claims import Claim, Outcome, Reading
-from rotor_mbs.report.language import texts
+from rotor_mbs.report import texts
 from rotor_mbs.report.numbers import fixed
 from rotor_mbs.report.parts import Cell, Table
 
@@ -30,12 +30,12 @@ def claim_table(claims: Iterable[Claim]) -> Table:
 def conditions_of(scene: str, conditions: Mapping[str, str]) -> list[str]:
     """What had to be found out for this scene alone."""
     key = scene.rpartition("/")[2]
-    return [texts.condition(key, conditions[key])] if key in conditions else []
+    return [conditions[key]] if key in conditions else []
 
 
 def general_conditions(conditions: Mapping[str, str]) -> list[str]:
     """What had to be found out for all."""
-    return [texts.condition(key, text) for key, text in conditions.items() if not key.startswith("fig")]
+    return [text for key, text in conditions.items() if not key.startswith("fig")]
 
 
 def _number_row(claim: Claim) -> list[Cell]:
@@ -65,7 +65,7 @@ def _claim_row(claim: Claim) -> list[Cell]:
     item = claim.published
     return [
         Cell(item.figure),
-        Cell(texts.statement(item.statement, item.quote), note=texts.statement_note(item.quote), language="es"),
+        Cell(item.statement, note=f"«{item.quote}»", language="es"),
         _claim_cell(claim.printed),
         _claim_cell(claim.right),
     ]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from rotor_mbs.analysis.errata import Effect, Entry, effects
 from rotor_mbs.analysis.methods import ALONE
 from rotor_mbs.analysis.published import Erratum
-from rotor_mbs.report.language import texts
+from rotor_mbs.report import texts
 from rotor_mbs.report.numbers import number, prefixed
 from rotor_mbs.report.pages import ErrataPage
 from rotor_mbs.report.parts import Cell, Section, Table, without_empty_columns
@@ -60,7 +60,7 @@ def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) 
         found = effects(scene)
         if found:
             cells = [cell for erratum in ALONE for cell in _effect_cells(found.get(erratum))]
-            rows.append([Cell(name, href=files[name], note=texts.scene_title(name, scene.title)), *cells])
+            rows.append([Cell(name, href=files[name], note=scene.title), *cells])
     table = Table(texts.EFFECTS, head, rows, numeric=range(1, len(head)))
     return without_empty_columns(table) if rows else table
 

@@ -8,8 +8,7 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import finding
-from rotor_mbs.report import claim_tables, metrics
-from rotor_mbs.report.language import texts
+from rotor_mbs.report import claim_tables, metrics, texts
 from rotor_mbs.report.names import name_of
 from rotor_mbs.report.numbers import number, prefixed, quantity
 from rotor_mbs.report.pages import IndexPage
@@ -73,7 +72,7 @@ def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> 
 def _scene_row(scene: StoredScene, file: str, right: Sequence[str]) -> list[Cell]:
     printed = scene.methods.get(methods.PRINTED)
     cells = [
-        Cell(scene.name, href=file, note=texts.scene_title(scene.name, scene.title)),
+        Cell(scene.name, href=file, note=scene.title),
         Cell(str(scene.attributes.get("figures", ""))),
         Cell(quantity(metrics.horizon(scene), "s", 3)),
         *_printed_cells(printed),

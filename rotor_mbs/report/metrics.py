@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.escape_rate import escape_rate
-from rotor_mbs.report.language import texts
+from rotor_mbs.report import texts
 from rotor_mbs.report.names import name_of
 from rotor_mbs.report.numbers import number, prefixed
 from rotor_mbs.report.parts import Cell, Table, without_empty_columns
@@ -98,7 +98,7 @@ def range_table(runs: Mapping[str, StoredRun]) -> Table:
         if "rates" in run:
             head.append(texts.LARGEST_RATE)
             columns.append([number(x, 3) for x in np.abs(run.array("rates")).max(axis=0)])
-    rows = [[Cell(texts.coordinate(label)), *(Cell(column[i]) for column in columns)] for i, label in enumerate(labels)]
+    rows = [[Cell(label), *(Cell(column[i]) for column in columns)] for i, label in enumerate(labels)]
     return Table(texts.EXTREMES_CAPTION, head, rows, numeric=range(1, len(head)))
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rotor_mbs.report.language import texts
-
 # Okabe & Ito's colours, told apart by the colour-blind; the yellow is left out, it does not show on white.
 COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 GREY = "#666666"
@@ -69,7 +67,7 @@ _UNKNOWN = Look(GREY, ":", "D")
 
 
 def name_of(method: str) -> str:
-    return texts.METHOD_NAMES.get(method, method)
+    return NAMES.get(method, method)
 
 
 def look_of(curve: str) -> Look:

@@ -13,9 +13,8 @@ import jinja2
 from markupsafe import Markup
 
 from rotor_mbs.analysis.published import Erratum
-from rotor_mbs.report import stability_texts
+from rotor_mbs.report import stability_texts, texts
 from rotor_mbs.report.files import GENERATOR
-from rotor_mbs.report.language import texts
 from rotor_mbs.report.parts import Picture, Sample, Section, Table
 
 _TEMPLATES = Path(__file__).resolve().parent / "templates"

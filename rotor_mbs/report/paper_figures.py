@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
-from rotor_mbs.report import canvas
+from rotor_mbs.report import canvas, texts
 from rotor_mbs.report.figures import set_range, thin
-from rotor_mbs.report.language import texts
 from rotor_mbs.report.names import COLOURS, GREY, coordinate_look
 from rotor_mbs.store.read import StoredRun, StoredScene
 

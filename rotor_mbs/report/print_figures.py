@@ -11,19 +11,18 @@ from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report import canvas
-from rotor_mbs.report.language import speaking
 from rotor_mbs.report.paper_figures import columns, draw_motion, draw_paths, draw_torques
 from rotor_mbs.report.paper_set import MOTION, TORQUES, PaperFigure, available
 from rotor_mbs.report.walk import legend
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
 
-def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str], language: str = "en") -> list[Path]:
+def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]) -> list[Path]:
     """`folder`/figNN.`kind` for each figure asked for, all that the file has where `numbers` is empty.
 
     Raises InputError for a figure that the file does not have, StoreError where file or folder is not as it should be.
     """
-    with speaking(language), open_results(results) as opened:
+    with open_results(results) as opened:
         have = {one.number: one for one in available(opened.scenes)}
         asked = list(dict.fromkeys(numbers)) or list(have)
         unknown = [number for number in asked if number not in have]

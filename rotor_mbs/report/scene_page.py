@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import canvas, claim_tables, figures, metrics, svg
-from rotor_mbs.report.language import texts
+from rotor_mbs.report import canvas, claim_tables, figures, metrics, svg, texts
 from rotor_mbs.report.names import GREY, Look, coordinate_look, look_of, name_of
 from rotor_mbs.report.parts import Picture, Sample, Section, line_sample, mark_sample, run_sample
 from rotor_mbs.report.viewer import viewer
@@ -102,7 +101,7 @@ def motion(drawn: Drawn) -> Section:
         marked |= {n: other for n, other in others.items() if "angles" in other or "rates" in other}
         pictures.append(_motion_picture(drawn, run, marked))
     labels = runs[0].labels
-    legend = [line_sample(texts.coordinate(label), *coordinate_look(i)) for i, label in enumerate(labels)]
+    legend = [line_sample(label, *coordinate_look(i)) for i, label in enumerate(labels)]
     legend += [mark_sample(name_of(name), look_of(name)) for name in marked]
     pictures += _rotor_picture(drawn)
     table = metrics.range_table({_heading(drawn, run): run for run in runs})
@@ -270,8 +269,9 @@ def paths(drawn: Drawn) -> Section:
         replace(line_sample(texts.SHAFT, GREY, "-"), width=4.0),
     ]
     table = metrics.path_table({_heading(drawn, run): run for run in runs})
-    name = texts.scene_title(drawn.scene.name, drawn.scene.title)
-    moving = viewer(drawn.scene, {name_of(run.method): run for run in drawn.sides}, texts.viewer_described(name))
+    moving = viewer(
+        drawn.scene, {name_of(run.method): run for run in drawn.sides}, texts.viewer_described(drawn.scene.title)
+    )
     heading = texts.PATHS if moving is None else texts.MOVING
     return Section("paths", heading, pictures, legend, [table], [texts.PATHS_NOTE], moving)
 

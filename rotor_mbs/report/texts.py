@@ -1,6 +1,6 @@
 """Every text of the report, in English: headings, captions, axis labels, sentences made from numbers.
 
-Knows numbers and names, not where they come from. Another language is another module with these names.
+Knows numbers and names, not where they come from.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING
 
 from rotor_mbs.analysis.methods import model_of
 from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally
-from rotor_mbs.report.names import NAMES, name_of
+from rotor_mbs.report.names import name_of
 from rotor_mbs.report.numbers import number, prefixed, quantity
 
 if TYPE_CHECKING:
     from rotor_mbs.report.walk_facts import Facts
 
-LANGUAGE = "en"
 REPORT = "Rotor report"
 TITLE = "A published rotor model against the right ones"
 TITLE_PLAIN = "Rotor scenes by independent models"
@@ -59,7 +58,6 @@ VIEWER_OFFSET = (
     "The tip and the centre of mass lie so near the pitch axis that pitch could not be seen: their distance from it, "
     "and with it the paths, are drawn larger by the factor stated (1 is true to scale)."
 )
-METHOD_NAMES = NAMES
 
 # The walk through the paper's figures
 WALK, FIGURES, FIGURE_TITLES = "The paper's figures, one by one", "Figures", {
@@ -190,34 +188,6 @@ OFF_PLANE = "off the plane"
 RANGE = "{} to {}"
 
 
-def scene_title(name: str, title: str) -> str:
-    """Of the scene `name`, whose file says `title`."""
-    del name
-    return title
-
-
-def condition(key: str, text: str) -> str:
-    """What had to be found out about `key`, as reference/published.toml says in `text`."""
-    del key
-    return text
-
-
-def erratum(id_of: str, field: str, text: str) -> str:
-    """A field of an erratum ("entry", "printed", "right", "reason"), as reference/errata.toml says in `text`."""
-    del id_of, field
-    return text
-
-
-def statement(text: str, quote: str) -> str:
-    """What a claim says, and the paper's own words for it."""
-    del quote
-    return text
-
-
-def statement_note(quote: str) -> str:
-    return f"«{quote}»"
-
-
 def angle_column(side: str) -> str:
     return f"{side}: angle (rad)"
 
@@ -228,11 +198,6 @@ def length_column(side: str) -> str:
 
 def viewer_described(title: str) -> str:
     return f"{title}: the blades and the paths of their tips, moving. The pictures below show the same at rest."
-
-
-def coordinate(label: str) -> str:
-    """A coordinate by its name in the file: rotor, pitch 1 ..."""
-    return label
 
 
 def more_readings(count: int, failed: bool) -> str:

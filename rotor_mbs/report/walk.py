@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from markupsafe import Markup
 
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import canvas, svg
-from rotor_mbs.report.language import texts
+from rotor_mbs.report import canvas, svg, texts
 from rotor_mbs.report.names import coordinate_look, name_of
 from rotor_mbs.report.numbers import fixed
 from rotor_mbs.report.pages import Entry, Row
@@ -51,7 +50,7 @@ def legend(figure: PaperFigure, stored: Mapping[str, StoredScene]) -> list[Sampl
     runs = next(iter(columns(next(iter(stored.values()))).values()), None)
     labels = runs.labels if runs is not None else []
     if figure.kind == MOTION:
-        return [line_sample(texts.coordinate(label), *coordinate_look(i)) for i, label in enumerate(labels)]
+        return [line_sample(label, *coordinate_look(i)) for i, label in enumerate(labels)]
     return [line_sample(f"{texts.BLADE} {i}".lower(), coordinate_look(i)[0], "-") for i in range(1, len(labels))]
 
 
