@@ -39,7 +39,7 @@ class _Work:
 def bench(arguments: argparse.Namespace) -> int:
     """Measures what is missing in `arguments.output`, then the pages beside it. 0 also where points failed: they are
     what is measured."""
-    from rotor_mbs.report.bench_build import write_bench_report
+    from rotor_mbs.report.pages.bench import write_bench_report
 
     if not arguments.scenes and not arguments.growth:
         raise InputError("bench: nothing to measure; allowed: SCENE..., or --growth")

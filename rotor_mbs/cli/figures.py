@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from rotor_mbs.report.print_figures import write_figures
+from rotor_mbs.report.manuscript import write_figures
 
 
 def figures(arguments: argparse.Namespace) -> int:

@@ -8,9 +8,9 @@ import os
 from pathlib import Path
 
 from rotor_mbs.execution.environment import fingerprint
-from rotor_mbs.report.bench_build import write_bench_report
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.files import INDEX
+from rotor_mbs.report.core.files import INDEX
+from rotor_mbs.report.pages.bench import write_bench_report
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.store.bench import read_curves
 from rotor_mbs.store.hdf5 import replace_file

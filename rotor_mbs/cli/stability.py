@@ -50,7 +50,7 @@ def _tell(found: Sequence[Cell]) -> None:
 
 
 def _report(output: Path, arguments: argparse.Namespace) -> Path:
-    from rotor_mbs.report.stability_page import write_stability_report
+    from rotor_mbs.report.pages.stability import write_stability_report
 
     folder = arguments.report or output.with_name(f"{output.stem}-report")
     return write_stability_report(output, folder)

@@ -8,7 +8,7 @@ from pathlib import Path
 from rotor_mbs.analysis.sweep_map import stability_map
 from rotor_mbs.analysis.sweep_spread import spread_of
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report.sweep_figures import map_figure, spread_figure
+from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.store.sweep_read import StoredSweep
 

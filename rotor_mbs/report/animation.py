@@ -17,10 +17,10 @@ from PIL import Image, ImageDraw, ImageFont
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.canvas import font_file
+from rotor_mbs.report.core.canvas import font_file
 from rotor_mbs.report.frames import Wires, wires
 from rotor_mbs.report.names import GREY, coordinate_look, name_of
-from rotor_mbs.report.viewer import magnification, scene_of
+from rotor_mbs.report.pages.viewer import magnification, scene_of
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
 Array = NDArray[Any]

@@ -16,11 +16,14 @@ from rotor_mbs.analysis import methods, published
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.analysis.order import natural
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report import claim_tables, metrics, paper_set, texts
-from rotor_mbs.report.errata_page import errata_page
-from rotor_mbs.report.files import ERRATA, INDEX, WALK, page_names, write_pages
-from rotor_mbs.report.index_page import index_page
-from rotor_mbs.report.pages import Entry, ScenePage, WalkPage, render
+from rotor_mbs.report import paper_figures_set as paper_set
+from rotor_mbs.report import texts
+from rotor_mbs.report.core.environment import Entry, ScenePage, WalkPage, render
+from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, write_pages
+from rotor_mbs.report.pages import claims as claim_tables
+from rotor_mbs.report.pages import scene_tables as metrics
+from rotor_mbs.report.pages.errata import errata_page
+from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.store.read import Results, StoredScene, open_results
 
 _PIECES = 2  # per worker
@@ -146,7 +149,7 @@ def _made(results: Path, tasks: Sequence[SceneTask | FigureTask], jobs: int) -> 
 
 
 def _scene_page(scene: StoredScene, task: SceneTask) -> ScenePage:
-    from rotor_mbs.report.scene_page import lead, sections, source_comment  # late: matplotlib, in the workers alone
+    from rotor_mbs.report.pages.scene import lead, sections, source_comment  # late: matplotlib, in the workers alone
 
     return ScenePage(
         name=scene.name,

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
-from rotor_mbs.report import canvas, texts
-from rotor_mbs.report.figures import set_range, thin
+from rotor_mbs.report import texts
+from rotor_mbs.report.core import canvas
 from rotor_mbs.report.names import COLOURS, GREY, coordinate_look
+from rotor_mbs.report.plots.time_histories import set_range, thin
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]

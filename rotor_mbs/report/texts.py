@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from rotor_mbs.analysis.methods import model_of
 from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally
+from rotor_mbs.report.core.numbers import number, prefixed, quantity
 from rotor_mbs.report.names import name_of
-from rotor_mbs.report.numbers import number, prefixed, quantity
 
 if TYPE_CHECKING:
-    from rotor_mbs.report.walk_facts import Facts
+    from rotor_mbs.report.pages.walk_facts import Facts
 
 REPORT = "Rotor report"
 TITLE = "A published rotor model against the right ones"

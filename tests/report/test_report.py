@@ -18,12 +18,13 @@ from support.stored import Made, rotor, store
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import METHOD_NAMES
 from rotor_mbs.methods.ladders import ladders
-from rotor_mbs.report import figures, numbers, svg
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.canvas import panels, svg_text
-from rotor_mbs.report.files import page_names
+from rotor_mbs.report.core import numbers, svg
+from rotor_mbs.report.core.canvas import panels, svg_text
+from rotor_mbs.report.core.elements import run_sample
+from rotor_mbs.report.core.files import page_names
 from rotor_mbs.report.names import COLOURS, GREY, LOOKS, Look
-from rotor_mbs.report.parts import run_sample
+from rotor_mbs.report.plots import time_histories as figures
 
 FIG11 = paper("fig11", samples=301)
 PLAIN = replace(FIG11, outputs=("angles",))

@@ -15,7 +15,7 @@ from rotor_mbs.analysis.sweep_map import StabilityMap, stability_map
 from rotor_mbs.analysis.sweep_spread import Spread, lyapunov_exponent, spread_of
 from rotor_mbs.cli.sweep_picture import draw
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.sweep_figures import map_figure, spread_figure
+from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.store.sweep_read import StoredSweep
 from rotor_mbs.store.sweep_store import SweepStore

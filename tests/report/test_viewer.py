@@ -14,7 +14,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.viewer import FRAMES, magnification, packed, script_json, viewer
+from rotor_mbs.report.pages.viewer import FRAMES, magnification, packed, script_json, viewer
 from rotor_mbs.store.read import open_results
 
 TEMPLATES = Path(write_report.__code__.co_filename).parent / "templates"

@@ -20,9 +20,9 @@ from rotor_mbs.analysis.work_precision import (
     succeeded,
     time_to_reach,
 )
-from rotor_mbs.report.bench_build import write_bench_report
-from rotor_mbs.report.bench_figures import diagram
-from rotor_mbs.report.bench_tables import (
+from rotor_mbs.report.names import LOOKS
+from rotor_mbs.report.pages.bench import write_bench_report
+from rotor_mbs.report.pages.bench_tables import (
     csv_text,
     failure_table,
     omissions,
@@ -31,7 +31,7 @@ from rotor_mbs.report.bench_tables import (
     reach_table,
     summary,
 )
-from rotor_mbs.report.names import LOOKS
+from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.store.bench import STATUSES, Curve, read_curves, write_curves
 from rotor_mbs.store.merge import merge
 

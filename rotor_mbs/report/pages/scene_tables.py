@@ -9,9 +9,9 @@ import numpy as np
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.escape_rate import escape_rate
 from rotor_mbs.report import texts
+from rotor_mbs.report.core.elements import Cell, Table, without_empty_columns
+from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.names import name_of
-from rotor_mbs.report.numbers import number, prefixed
-from rotor_mbs.report.parts import Cell, Table, without_empty_columns
 from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene

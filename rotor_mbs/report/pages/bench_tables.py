@@ -17,10 +17,10 @@ from rotor_mbs.analysis.work_precision import (
     reaches,
     succeeded,
 )
-from rotor_mbs.report import bench_texts as texts
 from rotor_mbs.report import texts as report_texts
-from rotor_mbs.report.numbers import NOTHING, number, prefixed
-from rotor_mbs.report.parts import Cell, Table
+from rotor_mbs.report.core.elements import Cell, Table
+from rotor_mbs.report.core.numbers import NOTHING, number, prefixed
+from rotor_mbs.report.pages import bench_texts as texts
 from rotor_mbs.store.bench import Curve
 
 _CSV_COLUMNS = (

@@ -10,11 +10,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.report import canvas, figures, svg
-from rotor_mbs.report import stability_texts as words
-from rotor_mbs.report.figures import Series
+from rotor_mbs.report.core import canvas, svg
+from rotor_mbs.report.core.elements import Picture, Section, run_sample
 from rotor_mbs.report.names import look_of, name_of
-from rotor_mbs.report.parts import Picture, Section, run_sample
+from rotor_mbs.report.pages import stability_texts as words
+from rotor_mbs.report.plots import time_histories as figures
+from rotor_mbs.report.plots.time_histories import Series
 from rotor_mbs.store.read import StoredRun, StoredScene
 from rotor_mbs.store.stability import Record
 

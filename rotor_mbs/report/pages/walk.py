@@ -10,14 +10,15 @@ from collections.abc import Mapping, Sequence
 from markupsafe import Markup
 
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import canvas, svg, texts
+from rotor_mbs.report import texts
+from rotor_mbs.report.core import canvas, svg
+from rotor_mbs.report.core.elements import Picture, Sample, line_sample
+from rotor_mbs.report.core.environment import Entry, Row
+from rotor_mbs.report.core.numbers import fixed
 from rotor_mbs.report.names import coordinate_look, name_of
-from rotor_mbs.report.numbers import fixed
-from rotor_mbs.report.pages import Entry, Row
+from rotor_mbs.report.pages.walk_facts import conditions, facts
 from rotor_mbs.report.paper_figures import columns, draw_motion, draw_paths, draw_torques, torque_look
-from rotor_mbs.report.paper_set import MOTION, PATHS, TORQUES, PaperFigure
-from rotor_mbs.report.parts import Picture, Sample, line_sample
-from rotor_mbs.report.walk_facts import conditions, facts
+from rotor_mbs.report.paper_figures_set import MOTION, PATHS, TORQUES, PaperFigure
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 

@@ -8,11 +8,13 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import finding
-from rotor_mbs.report import claim_tables, metrics, texts
+from rotor_mbs.report import texts
+from rotor_mbs.report.core.elements import Cell, Section, Table, without_empty_columns
+from rotor_mbs.report.core.environment import IndexPage
+from rotor_mbs.report.core.numbers import number, prefixed, quantity
 from rotor_mbs.report.names import name_of
-from rotor_mbs.report.numbers import number, prefixed, quantity
-from rotor_mbs.report.pages import IndexPage
-from rotor_mbs.report.parts import Cell, Section, Table, without_empty_columns
+from rotor_mbs.report.pages import claims as claim_tables
+from rotor_mbs.report.pages import scene_tables as metrics
 from rotor_mbs.store.read import Results, StoredRun, StoredScene
 
 # Of the file's attributes, those that say what made it.

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rotor_mbs.analysis.stability import OUTCOMES, Advice, Cell, advice, cells, in_words, is_number, reached_by
-from rotor_mbs.report import stability_texts as words
-from rotor_mbs.report.files import INDEX, page_names, write_pages
+from rotor_mbs.report.core.elements import Cell as Entry
+from rotor_mbs.report.core.elements import Section, Table
+from rotor_mbs.report.core.environment import render
+from rotor_mbs.report.core.files import INDEX, page_names, write_pages
 from rotor_mbs.report.names import name_of
-from rotor_mbs.report.pages import render
-from rotor_mbs.report.parts import Cell as Entry
-from rotor_mbs.report.parts import Section, Table
-from rotor_mbs.report.stability_scene import scene_page
+from rotor_mbs.report.pages import stability_texts as words
+from rotor_mbs.report.pages.stability_scene import scene_page
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.stability import Record, read_records
 

@@ -13,11 +13,12 @@ import jinja2
 from markupsafe import Markup
 
 from rotor_mbs.analysis.published import Erratum
-from rotor_mbs.report import stability_texts, texts
-from rotor_mbs.report.files import GENERATOR
-from rotor_mbs.report.parts import Picture, Sample, Section, Table
+from rotor_mbs.report import texts
+from rotor_mbs.report.core.elements import Picture, Sample, Section, Table
+from rotor_mbs.report.core.files import GENERATOR
+from rotor_mbs.report.pages import stability_texts
 
-_TEMPLATES = Path(__file__).resolve().parent / "templates"
+_TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,14 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import canvas, claim_tables, figures, metrics, svg, texts
+from rotor_mbs.report import texts
+from rotor_mbs.report.core import canvas, svg
+from rotor_mbs.report.core.elements import Picture, Sample, Section, line_sample, mark_sample, run_sample
 from rotor_mbs.report.names import GREY, Look, coordinate_look, look_of, name_of
-from rotor_mbs.report.parts import Picture, Sample, Section, line_sample, mark_sample, run_sample
-from rotor_mbs.report.viewer import viewer
+from rotor_mbs.report.pages import claims as claim_tables
+from rotor_mbs.report.pages import scene_tables as metrics
+from rotor_mbs.report.pages.viewer import viewer
+from rotor_mbs.report.plots import time_histories as figures
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 

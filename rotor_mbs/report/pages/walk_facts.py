@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.report import metrics, texts
+from rotor_mbs.report import texts
+from rotor_mbs.report.pages import scene_tables as metrics
+from rotor_mbs.report.pages.viewer import scene_of
 from rotor_mbs.report.paper_figures import columns
-from rotor_mbs.report.viewer import scene_of
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]

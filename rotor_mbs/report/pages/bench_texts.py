@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
+from rotor_mbs.report.core.numbers import number, power, prefixed, quantity
 from rotor_mbs.report.names import name_of
-from rotor_mbs.report.numbers import number, power, prefixed, quantity
 
 TITLE = "Error against run time"
 LEAD = (

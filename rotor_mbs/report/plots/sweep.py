@@ -6,7 +6,7 @@ import numpy as np
 
 from rotor_mbs.analysis.sweep_map import GROWN, StabilityMap
 from rotor_mbs.analysis.sweep_spread import Spread
-from rotor_mbs.report.canvas import colour_bar, log_axis, panels, svg_text
+from rotor_mbs.report.core.canvas import colour_bar, log_axis, panels, svg_text
 
 _INK, _ACCENT = "#0072b2", "#d55e00"  # Okabe-Ito blue and vermillion
 _MOST_GROWTH = 1e4  # beyond it the pitch has long gone round; the colours end there

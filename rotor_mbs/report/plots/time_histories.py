@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.report import canvas, texts
-from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report import texts
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.names import GREY, Look, coordinate_look
 
 Array = NDArray[Any]

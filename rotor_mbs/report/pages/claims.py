@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from rotor_mbs.analysis.claims import Claim, Outcome, Reading
 from rotor_mbs.report import texts
-from rotor_mbs.report.numbers import fixed
-from rotor_mbs.report.parts import Cell, Table
+from rotor_mbs.report.core.elements import Cell, Table
+from rotor_mbs.report.core.numbers import fixed
 
 
 def number_table(claims: Iterable[Claim]) -> Table:

@@ -8,9 +8,9 @@ from rotor_mbs.analysis.errata import Effect, Entry, effects
 from rotor_mbs.analysis.methods import ALONE
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.report import texts
-from rotor_mbs.report.numbers import number, prefixed
-from rotor_mbs.report.pages import ErrataPage
-from rotor_mbs.report.parts import Cell, Section, Table, without_empty_columns
+from rotor_mbs.report.core.elements import Cell, Section, Table, without_empty_columns
+from rotor_mbs.report.core.environment import ErrataPage
+from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.store.read import StoredScene
 
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.stability import OUTCOMES, Cell, reached_by
-from rotor_mbs.report import figures
-from rotor_mbs.report import stability_texts as words
+from rotor_mbs.report.core.elements import Cell as Entry
+from rotor_mbs.report.core.elements import Section, Table, line_sample
+from rotor_mbs.report.core.environment import ScenePage
 from rotor_mbs.report.names import coordinate_look, name_of
-from rotor_mbs.report.pages import ScenePage
-from rotor_mbs.report.parts import Cell as Entry
-from rotor_mbs.report.parts import Section, Table, line_sample
-from rotor_mbs.report.stability_errors import error_over_step, errors_over_time, picture
+from rotor_mbs.report.pages import stability_texts as words
+from rotor_mbs.report.pages.stability_errors import error_over_step, errors_over_time, picture
+from rotor_mbs.report.plots import time_histories as figures
 from rotor_mbs.store.read import StoredRun, StoredScene
 from rotor_mbs.store.stability import Record
 

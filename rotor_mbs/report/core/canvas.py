@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullLocator
 
-from rotor_mbs.report.numbers import power
+from rotor_mbs.report.core.numbers import power
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal

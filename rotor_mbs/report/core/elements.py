@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from markupsafe import Markup
 
 from rotor_mbs.report.names import GREY, Look
-from rotor_mbs.report.viewer import Viewer
+from rotor_mbs.report.pages.viewer import Viewer
 
 _DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
 _MARKS = {

@@ -11,15 +11,15 @@ from markupsafe import Markup
 from rotor_mbs.analysis.order import natural
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report import bench_tables as tables
-from rotor_mbs.report import bench_texts as texts
-from rotor_mbs.report.bench_figures import FRONT_COLOUR, diagram, has_visible_floor
-from rotor_mbs.report.canvas import Panels, svg_text
-from rotor_mbs.report.files import INDEX, page_names, write_pages
+from rotor_mbs.report.core.canvas import Panels, svg_text
+from rotor_mbs.report.core.elements import Picture, Sample, Section, mark_sample, run_sample
+from rotor_mbs.report.core.environment import render
+from rotor_mbs.report.core.files import INDEX, page_names, write_pages
+from rotor_mbs.report.core.svg import embedded
 from rotor_mbs.report.names import GREY, Look, look_of
-from rotor_mbs.report.pages import render
-from rotor_mbs.report.parts import Picture, Sample, Section, mark_sample, run_sample
-from rotor_mbs.report.svg import embedded
+from rotor_mbs.report.pages import bench_tables as tables
+from rotor_mbs.report.pages import bench_texts as texts
+from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_floor
 from rotor_mbs.store.bench import GROWTH, Curve, read_curves
 from rotor_mbs.store.read import open_results
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.analysis.work_precision import failed, pareto, points, succeeded
-from rotor_mbs.report import bench_texts as texts
-from rotor_mbs.report import canvas
-from rotor_mbs.report.canvas import Panels
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.core.numbers import power
 from rotor_mbs.report.names import GREY, Look, look_of
-from rotor_mbs.report.numbers import power
+from rotor_mbs.report.pages import bench_texts as texts
 from rotor_mbs.store.bench import Curve
 
 FRONT_COLOUR = "#c8c8c8"

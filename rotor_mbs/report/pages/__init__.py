@@ -1,0 +1,1 @@
+"""One module per page: stored data to the content of the page."""
