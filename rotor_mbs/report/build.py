@@ -16,8 +16,7 @@ from rotor_mbs.analysis import methods, published
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.analysis.order import natural
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report import paper_figures_set as paper_set
-from rotor_mbs.report import texts
+from rotor_mbs.report import paper_set, texts
 from rotor_mbs.report.core.environment import Entry, ScenePage, WalkPage, render
 from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, write_pages
 from rotor_mbs.report.pages import claims as claim_tables
@@ -77,7 +76,7 @@ def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
 
 def made_of(results: Path, tasks: Sequence[SceneTask | FigureTask]) -> _Made:
     """HTML of each scene, entry of each figure. Raises StoreError."""
-    from rotor_mbs.report import walk  # late: matplotlib, in the workers alone
+    from rotor_mbs.report.pages import walk  # late: matplotlib, in the workers alone
 
     made = _Made({}, {})
     with open_results(results) as opened:

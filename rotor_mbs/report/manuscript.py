@@ -13,7 +13,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.pages.walk import legend
 from rotor_mbs.report.paper_figures import columns, draw_motion, draw_paths, draw_torques
-from rotor_mbs.report.paper_figures_set import MOTION, TORQUES, PaperFigure, available
+from rotor_mbs.report.paper_set import MOTION, TORQUES, PaperFigure, available
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
 

@@ -15,7 +15,7 @@ from support.stored import Made, rotor, store
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.walk_facts import facts, in_pi
 from rotor_mbs.report.paper_figures import seen
-from rotor_mbs.report.paper_figures_set import FIGURES
+from rotor_mbs.report.paper_set import FIGURES
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results
 

@@ -18,7 +18,7 @@ from rotor_mbs.report.core.numbers import fixed
 from rotor_mbs.report.names import coordinate_look, name_of
 from rotor_mbs.report.pages.walk_facts import conditions, facts
 from rotor_mbs.report.paper_figures import columns, draw_motion, draw_paths, draw_torques, torque_look
-from rotor_mbs.report.paper_figures_set import MOTION, PATHS, TORQUES, PaperFigure
+from rotor_mbs.report.paper_set import MOTION, PATHS, TORQUES, PaperFigure
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 
