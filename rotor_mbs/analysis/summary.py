@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.order import natural
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.load import parse_scene
+from rotor_mbs.scenario.names import natural_order
 from rotor_mbs.store.read import StoredScene
 
 # Share of a scene's energy scale. ode45's own drift at the paper's tolerances is below a thousandth of that (seen on
@@ -130,7 +130,7 @@ def _gravity(stored: StoredScene) -> float | None:
 
 
 def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
-    runs = {name: run for name in natural(scenes) if (run := methods.printed_run(scenes[name])) is not None}
+    runs = {name: run for name in natural_order(scenes) if (run := methods.printed_run(scenes[name])) is not None}
     gains = {name: run.attributes["energy_gain_J"] for name, run in runs.items() if "energy_gain_J" in run.attributes}
     if not gains:
         return None

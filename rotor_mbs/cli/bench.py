@@ -16,8 +16,7 @@ from rotor_mbs.execution.environment import machine, versions
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.methods.ladders import Ladder, ladders
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.load import scene_hash
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.store.bench import read_curves, write_curves
 from rotor_mbs.store.merge import merge
 from rotor_mbs.studies.batch import Batch, execute

@@ -14,7 +14,6 @@ from pathlib import Path
 from rotor_mbs.analysis import errata as errata_analysis
 from rotor_mbs.analysis import methods, published
 from rotor_mbs.analysis.claims import Claim, claims
-from rotor_mbs.analysis.order import natural
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import paper_set, texts
 from rotor_mbs.report.core.environment import Entry, ScenePage, WalkPage, render
@@ -23,6 +22,7 @@ from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages import scene_tables as metrics
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
+from rotor_mbs.scenario.names import natural_order
 from rotor_mbs.store.read import Results, StoredScene, open_results
 
 _PIECES = 2  # per worker
@@ -92,7 +92,7 @@ def made_of(results: Path, tasks: Sequence[SceneTask | FigureTask]) -> _Made:
 
 def _prepared(opened: Results) -> tuple[list[SceneTask | FigureTask], dict[str, str], dict[str, str]]:
     """What is to be made for the scenes, their file names, and the pages that need the whole file."""
-    scenes = {name: opened.scenes[name] for name in natural(opened.scenes)}
+    scenes = {name: opened.scenes[name] for name in natural_order(opened.scenes)}
     if not scenes:
         raise StoreError(f"{opened.path}: no scene in it, nothing to report")
     files = page_names(scenes)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.load import load_scene
+from rotor_mbs.scenario.names import RESERVED_GROUPS, natural_key
 from rotor_mbs.scenario.reading import read_toml, shown_path
 from rotor_mbs.scenario.resources import scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.scene import Scene
@@ -17,7 +18,6 @@ from rotor_mbs.scenario.scene import Scene
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
 _NAME = re.compile(rf"{_PIECE}(?:/{_PIECE})*")
 _NAME_RULE = "of the characters A-Z a-z 0-9 . _ -, with no dot in front"
-_TAKEN = ("bench", "errata", "stability", "sweep")  # groups of results files that are no scenes
 
 
 class _File(NamedTuple):
@@ -64,12 +64,7 @@ def _shipped() -> dict[str, Path]:
     folder = scenarios_folder()
     paths = (path for path in folder.rglob("*.toml") if path.parent != sweeps_folder())
     names = ((path.relative_to(folder).with_suffix("").as_posix(), path) for path in paths)
-    return dict(sorted(names, key=lambda item: _natural(item[0])))
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    """Sorts 1kNm, 10kNm, 50kNm, 100kNm as they are meant."""
-    return [(int(piece), "") if piece.isdigit() else (-1, piece) for piece in re.split(r"([0-9]+)", name)]
+    return dict(sorted(names, key=lambda item: natural_key(item[0])))
 
 
 def _title(path: Path) -> str:
@@ -111,7 +106,7 @@ def _why_unknown(argument: str, is_there: bool, shipped: Iterable[str]) -> str:
 
 def _files_in(folder: Path) -> list[_File]:
     try:
-        paths = sorted(folder.glob("*.toml"), key=lambda path: _natural(path.name))
+        paths = sorted(folder.glob("*.toml"), key=lambda path: natural_key(path.name))
     except OSError as error:
         reason = f"cannot be read: {error.strerror}; allowed: a readable folder"
         raise InputError(f"{shown_path(folder)}: {reason}") from error
@@ -136,7 +131,7 @@ def _scene_name(path: Path, real: Path) -> str:
     stem = path.stem
     if not re.fullmatch(_PIECE, stem):
         raise InputError(f"{shown_path(path)}: the file's name cannot name a scene; allowed: a name {_NAME_RULE}")
-    if stem in _TAKEN or any(name.startswith(stem + "/") for name in _shipped()):
+    if stem in RESERVED_GROUPS or any(name.startswith(stem + "/") for name in _shipped()):
         raise InputError(f"{shown_path(path)}: {stem} names a group of results; allowed: another file name")
     return stem
 

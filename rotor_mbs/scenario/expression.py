@@ -1,33 +1,31 @@
-"""Arithmetic in quotes, "11*pi/12", to a double: parsed by hand, never run as code. Knows nothing of scenes.
-
-sum      product (("+" | "-") product)*
-product  signed (("*" | "/") signed)*
-signed   "-" signed | power
-power    atom ("**" signed)?                 right to left, above the sign: -2**2 = -4
-atom     number | "pi" | "sqrt(" sum ")" | "hypot(" sum "," sum ")" | "(" sum ")"
-"""
+"""Arithmetic in quotes, "11*pi/12", to a double: parsed, never run as code. Must not know scenes."""
 
 from __future__ import annotations
 
+import ast
 import math
+import operator
 import re
 from collections.abc import Callable
 
-ALLOWED = "numbers, + - * / ** ( ), pi, sqrt(x), hypot(x, y)"
+ALLOWED = "numbers, + - * / ** ( ), pi, sqrt(x), hypot(x, y), deg(x)"
 MAX_LENGTH = 200  # characters
-MAX_DEPTH = 32  # signs, powers, brackets and calls inside one another
+MAX_DEPTH = 32  # signs, right operands and calls inside one another
 
-_TOKEN = re.compile(
-    r"[ \t]*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
-    r"|(?P<word>[A-Za-z_][A-Za-z_0-9]*)"
-    r"|(?P<mark>\*\*|[-+*/(),]))"
-)
-_OPERATIONS: dict[str, Callable[[float, float], float]] = {
-    "+": lambda x, y: x + y,
-    "-": lambda x, y: x - y,
-    "*": lambda x, y: x * y,
-    "/": lambda x, y: x / y,
-    "**": math.pow,
+# What Python would read but an expression may not hold: other characters, 0x10, 1j, 2pi, a comma that ends a list.
+_FORBIDDEN = re.compile(r"[^0-9A-Za-z.+\-*/(), \t]|(?<=[0-9.])(?![eE][+-]?[0-9])[A-Za-z]|,(?=[ \t]*\))|//")
+_LEADING_ZEROS = re.compile(r"(?<![0-9A-Za-z.])0+(?=[0-9])")
+_OPERATIONS: dict[type[ast.operator], tuple[str, Callable[[float, float], float]]] = {
+    ast.Add: ("+", operator.add),
+    ast.Sub: ("-", operator.sub),
+    ast.Mult: ("*", operator.mul),
+    ast.Div: ("/", operator.truediv),
+    ast.Pow: ("**", math.pow),
+}
+_FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
+    "sqrt": (math.sqrt, 1),
+    "hypot": (math.hypot, 2),
+    "deg": (math.radians, 1),
 }
 
 
@@ -42,131 +40,56 @@ class ExpressionError(ValueError):
 def evaluate(text: str) -> float:
     """The finite double that `text` stands for; every step is rounded as Python's floats are.
 
-    Raises ExpressionError, a ValueError, with one sentence that says what is allowed.
+    `deg` converts degrees to radians. Raises ExpressionError, a ValueError, which says what is allowed.
+
+    >>> evaluate("hypot(3, 4)/2")
+    2.5
     """
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"an expression of {len(text)} characters is longer than {MAX_LENGTH}")
-    parser = _Parser(_tokens(text))
-    value = parser.sum()
-    parser.expect("", "the end of the expression")
-    return value
+    forbidden = _FORBIDDEN.search(text)
+    if forbidden:
+        raise ExpressionError(f"{forbidden[0]!a} has no meaning in an expression")
+    try:
+        tree = ast.parse(_LEADING_ZEROS.sub("", text.strip(" \t")), mode="eval")
+    except (SyntaxError, MemoryError, RecursionError) as error:
+        raise ExpressionError(f"{_shown(text)} is not a complete expression") from error
+    return _value(tree.body, 1)
 
 
-def _tokens(text: str) -> list[str]:
-    """The pieces of `text`, ended by an empty one."""
-    tokens = []
-    position, end = 0, len(text.rstrip(" \t"))
-    while position < end:
-        match = _TOKEN.match(text, position)
-        if match is None:
-            rest = text[position:].lstrip(" \t")
-            raise ExpressionError(f"{rest[0]!a} has no meaning in an expression")
-        tokens.append(match[0].lstrip(" \t"))
-        position = match.end()
-    return [*tokens, ""]
-
-
-class _Parser:
-    """Recursive descent over the tokens, computing as it goes: no tree is kept."""
-
-    def __init__(self, tokens: list[str]) -> None:
-        self._tokens = tokens
-        self._position = 0
-        self._depth = 0
-
-    def sum(self) -> float:
-        value = self._product()
-        while self._next in ("+", "-"):
-            value = _apply(self._take(), value, self._product())
-        return value
-
-    def expect(self, token: str, called: str) -> None:
-        if self._next != token:
-            found = f"'{_short(self._next)}'" if self._next else "the end of the expression"
-            raise ExpressionError(f"{found} stands where {called} should")
-        self._take()
-
-    def _product(self) -> float:
-        value = self._signed()
-        while self._next in ("*", "/"):
-            value = _apply(self._take(), value, self._signed())
-        return value
-
-    def _signed(self) -> float:
-        self._depth += 1
-        if self._depth > MAX_DEPTH:
-            raise ExpressionError(f"an expression is nested deeper than {MAX_DEPTH}")
-        if self._next == "-":
-            self._take()
-            value = -self._signed()
-        else:
-            value = self._power()
-        self._depth -= 1
-        return value
-
-    def _power(self) -> float:
-        base = self._atom()
-        if self._next != "**":
-            return base
-        return _apply(self._take(), base, self._signed())
-
-    def _atom(self) -> float:
-        token = self._next
-        if token == "(":
-            self._take()
-            value = self.sum()
-            self.expect(")", "')'")
-            return value
-        if token[:1].isdigit() or token[:1] == ".":
-            return _finite(float(self._take()), _short(token))
-        if token == "pi":
-            self._take()
+def _value(node: ast.expr, depth: int) -> float:
+    if depth > MAX_DEPTH:
+        raise ExpressionError(f"an expression is nested deeper than {MAX_DEPTH}")
+    match node:
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            return _applied(_shown(ast.unparse(node)), float, number)
+        case ast.Name(id="pi"):
             return math.pi
-        if token == "sqrt":
-            return _apply_call("sqrt", math.sqrt, *self._arguments(1))
-        if token == "hypot":
-            return _apply_call("hypot", math.hypot, *self._arguments(2))
-        found = f"'{_short(token)}'" if token else "the end of the expression"
-        raise ExpressionError(f"{found} stands where a number should")
-
-    def _arguments(self, count: int) -> list[float]:
-        name = self._take()
-        self.expect("(", f"'(' after {name}")
-        values = [self.sum()]
-        while len(values) < count:
-            self.expect(",", f"',' (of {count} arguments of {name})")
-            values.append(self.sum())
-        self.expect(")", f"')' after {count} argument{'s' if count > 1 else ''} of {name}")
-        return values
-
-    @property
-    def _next(self) -> str:
-        return self._tokens[self._position]
-
-    def _take(self) -> str:
-        token = self._next
-        # The empty token that ends the list is never passed, so that `_next` always has an answer.
-        self._position = min(self._position + 1, len(self._tokens) - 1)
-        return token
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -_value(operand, depth + 1)
+        case ast.BinOp(op=op) if type(op) in _OPERATIONS:
+            sign, function = _OPERATIONS[type(op)]
+            # A sum of many terms is a chain of left operands: no deeper than its first one.
+            x, y = _value(node.left, depth), _value(node.right, depth + 1)
+            return _applied(f"{x:g} {sign} {y:g}", function, x, y)
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _FUNCTIONS:
+            function, count = _FUNCTIONS[name]
+            if len(arguments) != count:
+                raise ExpressionError(f"{name} takes {count} argument{'s' if count > 1 else ''}, not {len(arguments)}")
+            return _applied(name, function, *(_value(argument, depth + 1) for argument in arguments))
+    raise ExpressionError(f"{_shown(ast.unparse(node))} is not a number or an operation on numbers")
 
 
-def _apply(operation: str, x: float, y: float) -> float:
-    return _apply_call(f"{x:g} {operation} {y:g}", _OPERATIONS[operation], x, y)
-
-
-def _apply_call(called: str, function: Callable[..., float], *arguments: float) -> float:
+def _applied(called: str, function: Callable[..., float], *arguments: float) -> float:
+    """The finite value of the call; ExpressionError where there is none."""
     try:
         value = function(*arguments)
     except (ArithmeticError, ValueError):
         value = math.nan
-    return _finite(value, called)
-
-
-def _finite(value: float, called: str) -> float:
     if not math.isfinite(value):
         raise ExpressionError(f"{called} has no finite value")
     return value
 
 
-def _short(token: str) -> str:
-    return token if len(token) <= 40 else token[:37] + "..."
+def _shown(text: str) -> str:
+    return f"'{text}'" if len(text) <= 40 else f"'{text[:37]}...'"

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import copy
 import re
+from dataclasses import fields
 from typing import Any
 
 from rotor_mbs.scenario.lines import KeyPath
+from rotor_mbs.scenario.scene import Blade, Scene
 
 _PART = r"[A-Za-z_][A-Za-z0-9_]{0,59}(?:\[[0-9]{1,6}\])*"
 _KEY = re.compile(rf"{_PART}(?:\.{_PART})*")
@@ -19,20 +21,8 @@ FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (en
 _ABSENT = {("blade", "inertia"): [0.0] * 6}
 _PER_BLADE = (("bearing", "stiffness"), ("bearing", "damping"))
 
-_UNITS = {
-    "gravity": "m/s^2",
-    "duration": "s",
-    "blade.mass": "kg",
-    "blade.centre_of_mass": "m",
-    "blade.inertia": "kg m^2",
-    "blade.tip": "m",
-    "hub.inertia": "kg m^2",
-    "initial.angles": "rad",
-    "initial.rates": "rad/s",
-    "torque.rotor": "N m",
-    "bearing.stiffness": "N m/rad",
-    "bearing.damping": "N m s/rad",
-    "shaft.damping": "N m s/rad",
+_UNITS: dict[str, str] = {one.metadata["key"]: one.metadata["unit"] for one in fields(Scene)} | {
+    f"blade.{one.name}": one.metadata["unit"] for one in fields(Blade)
 }
 
 

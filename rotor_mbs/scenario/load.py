@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from pathlib import Path
 from typing import Any
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.lines import find_lines, line_of
 from rotor_mbs.scenario.reading import parse_toml, read_toml, shown_path
-from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.scene import Scene
 
 _MAX_FAULTS = 100  # lines for one file; nobody reads more, and a file of 1 MiB can hold 300 000
 
@@ -45,35 +43,3 @@ def _scene(text: str, tables: dict[str, Any], name: str, source: str) -> Scene:
     if len(found) > _MAX_FAULTS:
         shown.append(f"{source}: {len(found) - _MAX_FAULTS} more faults")
     raise InputError(shown)
-
-
-def scene_hash(scene: Scene) -> str:
-    """SHA-256, in hexadecimal, over all that a run of the scene depends on: its numbers, bit for bit, and outputs.
-
-    Name, title, figures and the text of the file (comments, order, how a number was written, one [blade] or several
-    equal ones) do not enter; neither does the tip where no tip path is asked for.
-    """
-    content = {
-        "gravity": scene.gravity.hex(),
-        "duration": scene.duration.hex(),
-        "samples": scene.samples,
-        "outputs": sorted(scene.outputs),
-        "blades": [_blade_content(blade, with_tip=scene.wants("tip")) for blade in scene.blades],
-        "hub_inertia": scene.hub_inertia.hex(),
-        "initial_angles": _hex(scene.initial_angles),
-        "initial_rates": _hex(scene.initial_rates),
-        "rotor_torque": [_hex(row) for row in scene.rotor_torque],
-        "bearing_stiffness": _hex(scene.bearing_stiffness),
-        "bearing_damping": _hex(scene.bearing_damping),
-        "shaft_damping": scene.shaft_damping.hex(),
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _blade_content(blade: Blade, *, with_tip: bool) -> list[list[str]]:
-    numbers = [(blade.mass,), blade.centre_of_mass, blade.inertia]
-    return [_hex(part) for part in ([*numbers, blade.tip] if with_tip else numbers)]
-
-
-def _hex(numbers: tuple[float, ...]) -> list[str]:
-    return [number.hex() for number in numbers]

@@ -1,11 +1,30 @@
-"""A scene as plain numbers: what every model gets, and all it gets. Knows no model and no file format."""
+"""A scene as plain numbers: what every model gets, and all it gets. Must not know a model or a file format.
+
+Each field of a scene says here which key of the scene file it comes from, its unit, and which part of a scene it is.
+The scene's hash, its rotor key, the units of a sweep and the written scene file are derived from that.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import MISSING, Field, dataclass, field, fields
+from typing import Any, Literal
 
 OUTPUTS = ("angles", "rates", "tip", "energy")
+
+Part = Literal["label", "run", "start", "rotor"]
+
+
+def scene_key(path: str, unit: str = "1", part: Part = "rotor", *, default: Any = MISSING, added: bool = False) -> Any:
+    """A field of Scene, read from the key `path` of the scene file.
+
+    part    label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
+    added   the key is younger than the stored hashes: at its default it does not enter them
+    """
+    return field(default=default, metadata={"key": path, "unit": unit, "part": part, "added": added})
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,10 +37,10 @@ class Blade:
     tip             (3,) m, the point whose path is drawn
     """
 
-    mass: float
-    centre_of_mass: tuple[float, float, float]
-    inertia: tuple[float, float, float, float, float, float]
-    tip: tuple[float, float, float]
+    mass: float = field(metadata={"unit": "kg"})
+    centre_of_mass: tuple[float, float, float] = field(metadata={"unit": "m"})
+    inertia: tuple[float, float, float, float, float, float] = field(metadata={"unit": "kg m^2"})
+    tip: tuple[float, float, float] = field(metadata={"unit": "m"})
 
     @property
     def is_point_mass(self) -> bool:
@@ -39,29 +58,29 @@ class Scene:
     """A rotor and what happens to it. Blade i hangs at phase 2π(i-1)/len(blades) about the shaft (+y); z is up.
 
     initial_angles, initial_rates   (1 + blades,) rad, rad/s: rotor, then a pitch per blade
-    rotor_torque                    ((t, τ), ...) s, N m: linear between, held outside; () where there is none;
+    rotor_torque                    ((t, τ), ...) s, N m: linear between, constant outside; () where there is none;
                                     two rows with equal t are a jump
     bearing_stiffness, _damping     (blades,) N m/rad, N m s/rad, about pitch 0
     shaft_damping                   N m s/rad
     text                            the TOML text it was read from
     """
 
-    name: str
-    title: str
-    figures: tuple[str, ...]
-    gravity: float
-    duration: float
-    samples: int
-    outputs: tuple[str, ...]
-    blades: tuple[Blade, ...]
-    hub_inertia: float
-    initial_angles: tuple[float, ...]
-    initial_rates: tuple[float, ...]
-    rotor_torque: tuple[tuple[float, float], ...] = ()
-    bearing_stiffness: tuple[float, ...] = ()
-    bearing_damping: tuple[float, ...] = ()
-    shaft_damping: float = 0.0
-    text: str = ""
+    name: str = scene_key("", part="label")
+    title: str = scene_key("title", part="label")
+    figures: tuple[str, ...] = scene_key("figures", part="label")
+    gravity: float = scene_key("gravity", "m/s^2")
+    duration: float = scene_key("duration", "s", "run")
+    samples: int = scene_key("samples", part="run")
+    outputs: tuple[str, ...] = scene_key("outputs", part="run")
+    blades: tuple[Blade, ...] = scene_key("blade")
+    hub_inertia: float = scene_key("hub.inertia", "kg m^2")
+    initial_angles: tuple[float, ...] = scene_key("initial.angles", "rad", "start")
+    initial_rates: tuple[float, ...] = scene_key("initial.rates", "rad/s", "start")
+    rotor_torque: tuple[tuple[float, float], ...] = scene_key("torque.rotor", "N m", default=())
+    bearing_stiffness: tuple[float, ...] = scene_key("bearing.stiffness", "N m/rad", default=())
+    bearing_damping: tuple[float, ...] = scene_key("bearing.damping", "N m s/rad", default=())
+    shaft_damping: float = scene_key("shaft.damping", "N m s/rad", default=0.0)
+    text: str = scene_key("", part="label", default="")
 
     @property
     def phases(self) -> tuple[float, ...]:
@@ -84,6 +103,11 @@ class Scene:
     def coordinate_labels(self) -> tuple[str, ...]:
         return ("rotor", *(f"pitch {i + 1}" for i in range(len(self.blades))))
 
+    @property
+    def rotor_key(self) -> tuple[object, ...]:
+        """The rotor's parameters and loads: equal for scenes that differ in start, run or label alone."""
+        return tuple(getattr(self, name) for name in _ROTOR_FIELDS)
+
     def wants(self, output: str) -> bool:
         return output in self.outputs
 
@@ -100,3 +124,39 @@ class Scene:
                 return tau0 + (tau1 - tau0) * (time - t0) / (t1 - t0)
             before = row
         return self.rotor_torque[-1][1]
+
+
+def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
+    """The dataclass fields of Scene that are of these parts, in order."""
+    return (one for one in fields(Scene) if one.metadata["part"] in parts)
+
+
+_ROTOR_FIELDS = tuple(one.name for one in scene_fields("rotor"))
+
+
+def scene_hash(scene: Scene) -> str:
+    """SHA-256, in hexadecimal, over all that a run of the scene depends on: its numbers, bit for bit, and outputs.
+
+    Name, title, figures and the text of the file (comments, order, how a number was written, one [blade] or several
+    equal ones) do not enter; neither does the tip where no tip path is asked for.
+    """
+    content: dict[str, object] = {}
+    for one in scene_fields("run", "start", "rotor"):
+        value = getattr(scene, one.name)
+        if one.name == "blades":
+            content["blades"] = [_blade_content(blade, with_tip=scene.wants("tip")) for blade in value]
+        elif not (one.metadata["added"] and value == one.default):
+            content[one.name] = sorted(value) if one.name == "outputs" else _exact(value)
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _blade_content(blade: Blade, *, with_tip: bool) -> list[object]:
+    values = [getattr(blade, one.name) for one in fields(Blade) if with_tip or one.name != "tip"]
+    return [_exact(value if isinstance(value, tuple) else (value,)) for value in values]
+
+
+def _exact(value: object) -> object:
+    """Doubles in hexadecimal, so that the text tells them apart bit for bit."""
+    if isinstance(value, tuple):
+        return [_exact(entry) for entry in value]
+    return value.hex() if isinstance(value, float) else value

@@ -43,12 +43,12 @@ def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: 
 
 
 def _scales(scenes: Sequence[Scene]) -> Array:
-    """(k,) J: of each run's energy, before it moves; found once for runs that share machine and spring energy."""
+    """(k,) J: of each run's energy, before it moves; computed once for runs that share rotor and spring energy."""
     found: dict[tuple[object, ...], float] = {}
     scales = []
     for scene in scenes:
         wound = scene.initial_angles if any(scene.bearing_stiffness) else ()
-        key = (id(scene.blades), scene.gravity, scene.bearing_stiffness, wound)
+        key = (scene.rotor_key, wound)
         if key not in found:
             angles = np.array([scene.initial_angles])
             found[key] = energy_scale(scene, Trajectory(np.zeros(1), angles, angles))
@@ -68,12 +68,12 @@ def clearly_ok(
 
 
 def _start_shares(scenes: Sequence[Scene]) -> Array:
-    """(k,) the rotor's inertia at the start with every pitch free, of the whole; all runs of a machine at once."""
+    """(k,) the rotor's inertia at the start with every pitch free, of the whole; all runs of a rotor at once."""
     shares = np.empty(len(scenes))
-    machines: dict[tuple[object, ...], list[int]] = {}
+    rotors: dict[tuple[object, ...], list[int]] = {}
     for i, scene in enumerate(scenes):
-        machines.setdefault((id(scene.blades), scene.hub_inertia), []).append(i)
-    for numbers in machines.values():
+        rotors.setdefault(scene.rotor_key, []).append(i)
+    for numbers in rotors.values():
         angles = np.array([scenes[i].initial_angles for i in numbers])
         shares[numbers] = rotor_inertia_shares(scenes[numbers[0]], angles)
     return shares

@@ -16,9 +16,6 @@ FORMAT_VERSION = 1
 CONVENTIONS = "CF-1.11"
 REFERENCE = "reference"
 
-# Groups at the top that are not scenes: no scene may take such a name.
-RESERVED = ("bench", "errata", "stability")
-
 
 class Quantity(NamedTuple):
     """A dataset: its dimensions (names of scales in the same group), unit, and what it is."""

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.store import hdf5, layout
+from rotor_mbs.scenario.names import RESERVED_GROUPS
+from rotor_mbs.store import hdf5
 from rotor_mbs.store.bench import GROUP, leaves
 from rotor_mbs.store.read import open_results
 
@@ -55,7 +56,7 @@ def _plan(sources: Iterable[Path]) -> tuple[dict[str, dict[str, Path]], dict[str
     others: dict[str, Path] = {}
     for source in sources:
         with open_results(source) as results:
-            others |= {name: source for name in layout.RESERVED if name in results.root and name != GROUP}
+            others |= {name: source for name in RESERVED_GROUPS if name in results.root and name != GROUP}
             for scene in results.scenes.values():
                 number = scene.attributes["scene_hash"]
                 known, runs = latest.get(scene.name, (number, {}))

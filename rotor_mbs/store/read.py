@@ -13,6 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.scenario.names import RESERVED_GROUPS
 from rotor_mbs.store import hdf5, layout
 
 
@@ -114,7 +115,7 @@ def open_results(path: Path) -> Iterator[Results]:
 
 def _scenes(group: Any, name: str) -> Iterator[StoredScene]:
     for key, item in group.items():
-        if not hdf5.is_group(item) or (not name and key in layout.RESERVED):
+        if not hdf5.is_group(item) or (not name and key in RESERVED_GROUPS):
             continue
         path = f"{name}/{key}" if name else key
         if "scene_hash" in item.attrs:

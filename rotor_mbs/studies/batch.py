@@ -15,9 +15,8 @@ from rotor_mbs.execution.environment import machine, numerics_fingerprint, versi
 from rotor_mbs.execution.pool import Finished, run_tasks
 from rotor_mbs.execution.progress import Progress
 from rotor_mbs.methods.catalogue import REFERENCE, find_method
-from rotor_mbs.scenario.load import scene_hash
 from rotor_mbs.scenario.resources import reference_folder
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.merge import merge, refuse_other_kinds
 from rotor_mbs.store.read import open_results

@@ -18,8 +18,7 @@ from rotor_mbs.execution.environment import numerics_fingerprint, versions
 from rotor_mbs.execution.servant import NoAnswerError, Servant, last_core
 from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
 from rotor_mbs.methods.ladders import STEP, Ladder
-from rotor_mbs.scenario.load import scene_hash
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.store.bench import STATUSES, Curve

@@ -18,8 +18,7 @@ from rotor_mbs.execution.environment import fingerprint, machine, versions
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.execution.progress import Progress
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.scenario.load import scene_hash
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.stability import Record, read_records, write_records

@@ -18,7 +18,7 @@ from rotor_mbs.execution.engines import Engine
 from rotor_mbs.execution.environment import machine, numerics_fingerprint, versions
 from rotor_mbs.methods.catalogue import check_names, find_method
 from rotor_mbs.scenario.design import validation_rows
-from rotor_mbs.scenario.load import scene_hash
+from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.store.sweep_layout import Plan

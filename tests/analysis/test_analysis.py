@@ -15,10 +15,10 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import claims, rounds_to
 from rotor_mbs.analysis.errata import effects, entries
 from rotor_mbs.analysis.escape_rate import escape_rate
-from rotor_mbs.analysis.order import natural
 from rotor_mbs.analysis.published import Asked, Condition, Published, errata, published
 from rotor_mbs.analysis.statistics import STATISTICS, measure
 from rotor_mbs.analysis.summary import finding
+from rotor_mbs.scenario.names import natural_order
 from rotor_mbs.store.errata import write_errata
 from rotor_mbs.store.read import open_results
 
@@ -215,4 +215,4 @@ def test_errata_are_read_in_order_and_effects_by_name(tmp_path: Path) -> None:
 
 def test_scenes_come_in_natural_order() -> None:
     names = ["paper/fig15-100kNm", "paper/fig15-1kNm", "paper/fig06-tenth", "paper/fig15-10kNm", "paper/fig06"]
-    assert natural(names) == [names[4], names[2], names[1], names[3], names[0]]
+    assert natural_order(names) == [names[4], names[2], names[1], names[3], names[0]]

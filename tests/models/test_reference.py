@@ -8,8 +8,8 @@ from support.scenes import PAPER, paper
 
 from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.scenario.load import scene_hash
 from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.store.read import open_results
 
 FROZEN = reference_folder() / "paper.h5"

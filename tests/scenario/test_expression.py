@@ -26,6 +26,9 @@ from rotor_mbs.scenario.expression import ALLOWED, MAX_DEPTH, MAX_LENGTH, evalua
         ("-pi/3", -math.pi / 3),
         ("hypot(0.08, 0.03)", math.hypot(0.08, 0.03)),
         ("sqrt(2)", math.sqrt(2.0)),
+        ("deg(180)", math.pi),
+        ("007", 7.0),
+        ("+".join("1" * 100), 100.0),
         ("1 - 2 - 3", -4.0),
         ("8/4/2", 1.0),
         ("2**3**2", 512.0),
@@ -82,6 +85,10 @@ def test_value(text: str, value: float) -> None:
         "hypot(1)",
         "hypot(1, 2, 3)",
         "pi(2)",
+        "deg(1, 2)",
+        "hypot(1, 2,)",
+        "sqrt(*1)",
+        "1 if 1 else 2",
         "2pi",
         "abs(1)",
         "__import__('os')",
@@ -106,12 +113,19 @@ def test_length_is_bounded() -> None:
         evaluate("1".ljust(MAX_LENGTH + 1))
 
 
-@pytest.mark.parametrize(("opening", "closing"), [("(", ")"), ("-", ""), ("1**", ""), ("sqrt(", ")")])
+@pytest.mark.parametrize(("opening", "closing"), [("1-(", ")"), ("-", ""), ("1**", ""), ("sqrt(", ")")])
 def test_depth_is_bounded(opening: str, closing: str) -> None:
     levels = MAX_DEPTH - 1
     assert math.isfinite(evaluate(opening * levels + "1" + closing * levels))
     with pytest.raises(ValueError, match="deeper"):
         evaluate(opening * MAX_DEPTH + "1" + closing * MAX_DEPTH)
+
+
+def test_brackets_alone_cannot_exhaust_the_parser() -> None:
+    count = (MAX_LENGTH - 1) // 2
+    assert evaluate("(" * count + "1" + ")" * count) == 1.0
+    with pytest.raises(ValueError, match="is not a complete expression"):
+        evaluate("(" * MAX_LENGTH)
 
 
 _CONSTANTS = st.floats(min_value=0, max_value=1e20, allow_subnormal=False).map(ast.Constant) | st.just(ast.Name("pi"))

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from dataclasses import Field, fields, replace
 from math import hypot, pi
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,10 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.lines import find_lines, line_of
-from rotor_mbs.scenario.load import load_scene, scene_hash
+from rotor_mbs.scenario.load import load_scene
 from rotor_mbs.scenario.physics import is_rigid_body_inertia, values_per_sample
 from rotor_mbs.scenario.resources import reference_folder, scenarios_folder
-from rotor_mbs.scenario.scene import OUTPUTS, Scene
+from rotor_mbs.scenario.scene import OUTPUTS, Scene, scene_hash
 
 # The captions: figures, q(0) in rad, dq/dt(0) in rad/s, rotor torque in N m.
 REST = (0.0, 0.0, 0.0, 0.0)
@@ -119,6 +120,15 @@ def test_torques_that_the_paper_does_not_print_say_so(paper: dict[str, Scene], t
 
 def test_all_hashes_of_the_paper_differ(paper: dict[str, Scene]) -> None:
     assert len({scene_hash(scene) for scene in paper.values()}) == len(paper)
+
+
+@pytest.mark.parametrize("one", fields(Scene), ids=lambda one: one.name)
+def test_every_field_enters_the_keys_that_its_part_asks_for(paper: dict[str, Scene], one: Field[Any]) -> None:
+    scene = paper["paper/fig11"]
+    value = getattr(scene, one.name)
+    changed = replace(scene, **{one.name: value[1:] if isinstance(value, tuple | str) and value else 3.0})
+    assert (scene_hash(changed) != scene_hash(scene)) == (one.metadata["part"] != "label")
+    assert (changed.rotor_key != scene.rotor_key) == (one.metadata["part"] == "rotor")
 
 
 def test_what_is_optional_is_left_out(tmp_path: Path) -> None:

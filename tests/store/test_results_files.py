@@ -14,8 +14,7 @@ from support.scenes import paper
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.scenario.load import scene_hash
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.record import Solution
 from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results

@@ -18,8 +18,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn import chain
 from rotor_mbs.scenario.bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.load import scene_hash
-from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.scene import Blade, Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Solution
 from rotor_mbs.store.merge import merge

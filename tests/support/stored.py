@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.scenario.load import scene_hash
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import compare
 from rotor_mbs.solution.record import Integration, Refined, Solution, Trajectory
 from rotor_mbs.store.merge import merge

@@ -85,12 +85,11 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
 
 
 def _machines(scenes: Sequence[Scene]) -> list[_Machine]:
-    """Of every scene; scenes that differ in their starts alone share one, and are seen to do so without much ado."""
+    """Of every scene; scenes of one rotor share one."""
     found: dict[tuple[object, ...], _Machine] = {}
     machines = []
     for scene in scenes:
-        key = (id(scene.blades), scene.gravity, scene.hub_inertia, scene.rotor_torque,
-               scene.bearing_stiffness, scene.bearing_damping, scene.shaft_damping)  # fmt: skip
+        key = scene.rotor_key
         if key not in found:
             found[key] = _machine(_without_start(scene))
         machines.append(found[key])

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from rotor_mbs.analysis.order import natural
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core.canvas import Panels, svg_text
@@ -20,6 +19,7 @@ from rotor_mbs.report.names import GREY, Look, look_of
 from rotor_mbs.report.pages import bench_tables as tables
 from rotor_mbs.report.pages import bench_texts as texts
 from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_floor
+from rotor_mbs.scenario.names import natural_order
 from rotor_mbs.store.bench import GROWTH, Curve, read_curves
 from rotor_mbs.store.read import open_results
 
@@ -48,7 +48,7 @@ def write_bench_report(results: Path, output: Path) -> Path:
     with open_results(results) as opened:
         machine = [(name, str(opened.attributes[name])) for name in _MACHINE if opened.attributes.get(name)]
     growth = {name: curves for name, curves in grouped.items() if name.startswith(f"{GROWTH}/")}
-    scenes = {name: grouped[name] for name in natural(grouped) if name not in growth}
+    scenes = {name: grouped[name] for name in natural_order(grouped) if name not in growth}
     files = page_names(scenes)
     pages = {INDEX: render("bench", _index(scenes, growth, files, machine))}
     pages["bench.csv"] = tables.csv_text([curve for curves in scenes.values() for curve in curves])
