@@ -7,7 +7,8 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rotor_mbs.execution.engines import Engine, open_engine
+from rotor_mbs.execution.engines import open_engine
+from rotor_mbs.execution.pool import ImportedCall, TaskPool
 
 
 def sweep(arguments: argparse.Namespace) -> int:
@@ -19,12 +20,12 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _engine(arguments: argparse.Namespace) -> Iterator[Engine]:
-    engine = open_engine(arguments.engine, arguments.jobs, "rotor_mbs.studies.sweep_work:prepare")
+def _engine(arguments: argparse.Namespace) -> Iterator[TaskPool]:
+    engine = open_engine(arguments.engine, arguments.jobs, ImportedCall("rotor_mbs.studies.sweep_work:prepare"))
     try:
         yield engine
     finally:
-        engine.stop()
+        engine.close()
 
 
 @contextmanager

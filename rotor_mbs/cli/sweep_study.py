@@ -14,10 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.execution.engines import Engine
 from rotor_mbs.execution.meter import Meter
-from rotor_mbs.execution.pool import Finished
-from rotor_mbs.execution.queue import Queue
+from rotor_mbs.execution.pool import Finished, TaskPool, run_in
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.judgement import is_held
@@ -31,12 +29,11 @@ _MANY = 1_000_000  # runs that are not started without being asked for twice
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 
-def sweep_on(engine: Engine, arguments: argparse.Namespace) -> int:
+def sweep_on(engine: TaskPool, arguments: argparse.Namespace) -> int:
     """Runs what is missing; 1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
     study = load_sweep(arguments.file)
     work = plan_work(study, arguments.method or (), arguments.part, arguments.timeout)
     runs = work.last - work.first
-    engine.begin(work.in_threads)
     if arguments.dry_run:
         return _tell_estimate(work, engine, arguments)
     if runs > _MANY and not arguments.yes:
@@ -64,17 +61,16 @@ def sweep_on(engine: Engine, arguments: argparse.Namespace) -> int:
 
 
 def execute(
-    work: Work, engine: Engine, store: SweepStore, meter: Meter, perform: Callable[[Chunk], Rows | Receipt] = perform
+    work: Work, engine: TaskPool, store: SweepStore, meter: Meter, perform: Callable[[Chunk], Rows | Receipt] = perform
 ) -> None:
     """Runs all that the store misses. Raises StoreError, InputError, MethodRefusal, KeyboardInterrupt."""
-    queue = Queue(engine, perform, Chunk.parts, _hard_limit, 1 if work.in_threads else engine.workers)
-    for ended in queue.run(_placed(work, engine, store)):
-        receipts = [_receipt(end, store) for end in ended]
-        store.note(receipts)
-        meter.add(Counter(SWEEP_STATUSES[code] for receipt in receipts for code in receipt.statuses))
+    for ended in run_in(engine, perform, _placed(work, engine, store), _hard_limit, Chunk.parts):
+        receipt = _receipt(ended, store)
+        store.note([receipt])
+        meter.add(Counter(SWEEP_STATUSES[code] for code in receipt.statuses))
 
 
-def _placed(work: Work, engine: Engine, store: SweepStore) -> Iterator[Chunk]:
+def _placed(work: Work, engine: TaskPool, store: SweepStore) -> Iterator[Chunk]:
     """The missing runs; workers that share the disk write them themselves.
 
     But for the first ones, which come back: each worker has one to do while this process lays out the file.
@@ -123,7 +119,7 @@ def _exit_status(work: Work, store: SweepStore) -> int:
     return int(any(held[method] for method in set(failed.tolist())))
 
 
-def _tell_estimate(work: Work, engine: Engine, arguments: argparse.Namespace) -> int:
+def _tell_estimate(work: Work, engine: TaskPool, arguments: argparse.Namespace) -> int:
     runs = work.last - work.first
     row = work.plan.row.itemsize
     seconds = estimate_seconds(work, engine)

@@ -4,51 +4,72 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from typing import Any, TypeVar
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.engines import ENGINE_FORMS, Engine
-from rotor_mbs.execution.worker import call
+from rotor_mbs.execution.pool import ImportedCall
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 _CONNECT_S = 3.0
-_PREPARE_S = 60.0
+_INITIALIZE_S = 60.0
 
 
-def open_cluster(address: str, prepare: str = "") -> Engine:
+def open_cluster(address: str, initializer: ImportedCall | None = None) -> Cluster:
     """The cluster whose scheduler is at `address`, tcp://host:port. Raises InputError where none answers.
 
-    prepare   "module:name", a function to call on it before there are tasks
+    initializer   called once per worker before there are tasks, to load their code
     """
+    forms = "local, or dask:tcp://host:port"
     try:
-        from distributed import Client, KilledWorker
+        from distributed import Client
     except ImportError as exc:
         raise InputError("--engine dask: dask is not installed; pip install distributed") from exc
     if not _answers(address):
-        raise InputError(f"--engine dask:{address}: no dask scheduler answers there; allowed: {ENGINE_FORMS}")
+        raise InputError(f"--engine dask:{address}: no dask scheduler answers there; allowed: {forms}")
     make: Any = Client
     client = make(address, timeout=_CONNECT_S, set_as_default=False)
     workers = sum(client.nthreads().values())
     if not workers:
         client.close()
         raise InputError(f"--engine dask:{address}: the scheduler has no workers; allowed: one with workers")
-    # pure=False: two equal calls are two runs.
-    executor = client.get_executor(pure=False)
+    cluster = Cluster(client, workers)
+    if initializer is not None:
+        for _ in range(workers):
+            cluster.submit(_call, initializer, _INITIALIZE_S)
+    return cluster
 
-    def cause(error: BaseException) -> str:
+
+class Cluster:
+    """Runs tasks on the workers of a dask client; a TaskPool."""
+
+    shares_disk = False
+
+    def __init__(self, client: Any, workers: int) -> None:
+        self._client, self.workers = client, workers
+        self._executor = client.get_executor(pure=False)  # two equal calls are two runs
+
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
+        future: Future[R] = self._executor.submit(_with_time_limit, work, task, timeout_s)
+        return future
+
+    def failure(self, error: BaseException) -> str:
+        from distributed import KilledWorker
+
         return "worker_died" if isinstance(error, KilledWorker) else "error"
 
-    limited = _Limited(executor)
-    for _ in range(workers if prepare else 0):
-        limited.submit(call, prepare, _PREPARE_S)
-    return Engine(limited, workers, cause, client.close)
+    def close(self) -> None:
+        self._client.close()
+
+
+def _call(function: Callable[[], None]) -> None:
+    function()
 
 
 def _answers(address: str) -> bool:
-    """Whether a scheduler greets there: a client that finds none waits long, and longer when it is closed."""
+    """Whether a scheduler answers there: a client that finds none waits long, and longer when it is closed."""
     import asyncio
     import logging
 
@@ -62,26 +83,13 @@ def _answers(address: str) -> bool:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         asyncio.run(asyncio.wait_for(greet(), _CONNECT_S))
-    except Exception:  # whatever a stranger at that address may answer
+    except Exception:  # whatever another program at that address may answer
         return False
     return True
 
 
-class _Limited(Executor):
-    """Gives every task its time limit: dask has none of its own."""
-
-    def __init__(self, executor: Executor) -> None:
-        self._executor = executor
-
-    def submit(self, work: Callable[..., Any], /, *args: Any, **_: Any) -> Future[Any]:
-        return self._executor.submit(_ended_when_late, work, *args)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        self._executor.shutdown(wait, cancel_futures=cancel_futures)
-
-
-def _ended_when_late(work: Callable[[T], R], task: T, timeout_s: float) -> R:
-    """Ends this worker process where the task takes too long; its supervisor starts a new one.
+def _with_time_limit(work: Callable[[T], R], task: T, timeout_s: float) -> R:
+    """Ends this worker process where the task takes too long (dask has no time limits); its nanny starts a new one.
 
     By a watchdog outside the interpreter: an engine that hangs may hold the interpreter's lock.
     """

@@ -1,97 +1,58 @@
-"""Tasks in parallel processes of their own, each with a time limit; one that dies or hangs takes no other with it.
+"""Tasks in parallel worker processes, each task with a time limit. Knows nothing of scenes, models or files.
 
-Knows nothing of scenes, models or files: it is given a picklable function and its arguments.
+Every worker is a pebble pool of one process: processes of one pebble pool share a pipe and its locks, so that a process
+killed while it waits, or while it writes a result, would stop the others (pebble 5.2).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+import gc
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from importlib import import_module
+from multiprocessing import resource_tracker
 from queue import SimpleQueue
-from typing import Any, Generic, TypeVar
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
-from rotor_mbs.execution.interrupts import interrupts_put_off
-from rotor_mbs.execution.servant import NoAnswerError, Servant
-from rotor_mbs.execution.worker import Worker
+from rotor_mbs.execution.collector import collect_seldom
+
+if TYPE_CHECKING:  # loaded with the first process
+    from pebble import ProcessPool
 
 T = TypeVar("T")
 R = TypeVar("R")
 
+# One thread per process: the processes are the parallelism, and timings must not depend on a library's threads.
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
-# Tasks that a process may have side by side.
-_HANDS = 2
+_PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
+_RETRY_START_S = 1.0  # after the system had no room for a process
+_POLL_S = 1.0  # how often a waiting thread looks whether its pool still works
 
 
-class ProcessPool(Executor):
-    """`submit(work, task, timeout_s)` gives a future: the work's result or what it raised, or a NoAnswerError.
+class TaskLostError(Exception):
+    """A task left no result. failure: "timed_out" where it was over its limit, "worker_died" where its process died."""
 
-    Half of the processes start at once; `begin` says what the other half of the workers are.
-
-    prepare   "module:name", a function that each process calls first, while this one goes on
-    """
-
-    def __init__(self, workers: int, prepare: str = "") -> None:
-        self._workers, self._prepare = workers, prepare
-        self._threads = ThreadPoolExecutor(workers)
-        self._servants: list[Servant] = []
-        self._free: SimpleQueue[tuple[Servant, int]] = SimpleQueue()
-        self._has_begun = False
-        self._add(-(-workers // _HANDS))
-
-    def begin(self, *, in_threads: bool) -> None:
-        """Before the first task: whether two may share a process, each in its thread, as work does well that leaves
-        the interpreter's lock alone and needs no main thread. It saves the other process's start; should one task kill
-        the process, both are lost."""
-        self._has_begun = True
-        hands = range(_HANDS) if in_threads else range(1)
-        self._add(0 if in_threads else self._workers - len(self._servants))
-        for hand in [(servant, hand) for hand in hands for servant in self._servants][: self._workers]:
-            self._free.put(hand)
-
-    def submit(self, work: Callable[..., Any], /, *args: Any, **_: Any) -> Future[Any]:
-        if not self._has_begun:
-            self.begin(in_threads=False)
-        task, timeout_s = args
-        return self._threads.submit(self._answer, work, task, timeout_s)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Ends the processes: now with cancel_futures, else when all is done, if that is waited for."""
-        if not cancel_futures:
-            self._threads.shutdown(wait)
-        if wait or cancel_futures:
-            with interrupts_put_off():
-                self._threads.shutdown(wait=False, cancel_futures=True)
-                for servant in self._servants:
-                    servant.kill()
-                for servant in self._servants:
-                    servant.close()
-                self._threads.shutdown(wait)
-
-    def _add(self, processes: int) -> None:
-        for _ in range(processes):
-            servant = Servant(Worker(self._prepare), hands=min(_HANDS, self._workers))
-            servant.start()
-            self._servants.append(servant)
-
-    def _answer(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
-        servant, hand = self._free.get()
-        try:
-            result, error = servant.ask((work, task), timeout_s, hand)
-        except NoAnswerError as exc:
-            raise exc.with_traceback(None) from None  # it would hold the process's lines as long as the future is kept
-        finally:
-            self._free.put((servant, hand))
-        if error is not None:
-            raise error
-        found: R = result
-        return found
+    def __init__(self, message: str, failure: str) -> None:
+        super().__init__(message)
+        self.failure = failure
 
 
 @dataclass(frozen=True, slots=True)
 class Finished(Generic[T, R]):
-    """A task's end. Either `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`;
-    error: what the task itself raised."""
+    """The end of a task: `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`.
+
+    error   what the task itself raised, for the failure "error"
+    """
 
     task: T
     value: R | None = None
@@ -100,36 +61,367 @@ class Finished(Generic[T, R]):
     error: BaseException | None = None
 
 
-def run_tasks(work: Callable[[T], R], tasks: Sequence[T], workers: int, timeout_s: float) -> Iterator[Finished[T, R]]:
-    """Results as they come. A task over `timeout_s` has its process ended, as have all on an interrupt."""
+class TaskPool(Protocol):
+    """What runs tasks: worker processes of this machine (`WorkerPool`), or a cluster.
+
+    workers       how many tasks run at once
+    shares_disk   whether the workers see the files of this process
+    """
+
+    workers: int
+    shares_disk: bool
+
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]: ...
+
+    def failure(self, error: BaseException) -> str:
+        """Why a future failed: "timed_out", "worker_died", or "error" for what the task itself raised."""
+        ...
+
+    def close(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class ImportedCall:
+    """A function by its name "module:function", for an initializer whose module only the worker imports."""
+
+    target: str
+
+    def __call__(self) -> None:
+        module, _, name = self.target.partition(":")
+        getattr(import_module(module), name)()
+
+
+class WorkerPool:
+    """Worker processes that start at once, each of which keeps its state between tasks. A context manager.
+
+    The processes are started afresh (spawn), ignore Ctrl-C, and end with this one. A process that dies, or is ended at
+    a time limit, is replaced.
+
+    Parameters
+    ----------
+    workers
+        Number of processes.
+    initializer
+        Called first in every process; must be picklable. What it raises becomes the error of that process's tasks.
+    core
+        The core that the processes are bound to, where the system allows it; None for any.
+
+    Examples
+    --------
+    >>> with WorkerPool(1) as pool:
+    ...     pool.submit(abs, -3, timeout_s=10.0).result()
+    3
+    """
+
+    shares_disk = True
+
+    def __init__(self, workers: int, initializer: Callable[[], None] | None = None, core: int | None = None) -> None:
+        self.workers = workers
+        self._threads = ThreadPoolExecutor(workers)
+        self._processes = [_Process(initializer, core) for _ in range(workers)]
+        self._free: SimpleQueue[_Process] = SimpleQueue()
+        for process in self._processes:
+            self._threads.submit(process.start)
+            self._free.put(process)
+
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
+        """The future of `work(task)`: its result, what it raised, or a TaskLostError.
+
+        work, task and the result must be picklable. The time limit counts from when a process begins with the task.
+        """
+        return self._threads.submit(self._run, work, task, timeout_s)
+
+    def failure(self, error: BaseException) -> str:
+        return error.failure if isinstance(error, TaskLostError) else "error"
+
+    def close(self) -> None:
+        """Ends the processes at once, with what they do. Futures that were running raise TaskLostError."""
+        with delayed_interrupts():
+            for process in self._processes:
+                process.cancel()
+            self._threads.shutdown(cancel_futures=True)
+            with ThreadPoolExecutor(self.workers) as closing:
+                list(closing.map(_Process.close, self._processes))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
+        process = self._free.get()
+        try:
+            answer = process.run(pickle.dumps((work, task)), timeout_s)
+        except TaskLostError as exc:
+            raise exc.with_traceback(None) from None  # its frames would keep the dead process's pipes open
+        finally:
+            self._free.put(process)
+        result, error = pickle.loads(answer)
+        if error is not None:
+            raise error
+        found: R = result
+        return found
+
+
+def open_pool(workers: int, initializer: Callable[[], None] | None = None, core: int | None = None) -> WorkerPool:
+    """A pool of worker processes of this machine; see `WorkerPool`."""
+    return WorkerPool(workers, initializer, core)
+
+
+def run_tasks(
+    work: Callable[[T], R],
+    tasks: Sequence[T],
+    workers: int,
+    timeout_s: float | Callable[[T], float],
+    split: Callable[[T], Sequence[T]] | None = None,
+) -> Iterator[Finished[T, R]]:
+    """`work(task)` for all tasks in parallel processes; results as they come, retried as `run_in` does.
+
+    Parameters
+    ----------
+    timeout_s
+        Time limit of a task in s, or a function of the task.
+    split
+        The parts of a task that stands for many runs; an empty sequence for one that cannot be split.
+    """
     if not tasks:
         return
-    pool = ProcessPool(min(workers, len(tasks)))
-    try:
-        futures: dict[Future[R], T] = {pool.submit(work, task, timeout_s): task for task in tasks}
-        for future in as_completed(futures):
-            yield _finished(futures[future], future)
-    finally:
-        pool.shutdown(cancel_futures=True)
+    with open_pool(min(workers, len(tasks))) as pool:
+        yield from run_in(pool, work, tasks, timeout_s, split)
 
 
-def _finished(task: T, future: Future[R]) -> Finished[T, R]:
-    try:
-        return Finished(task, future.result())
-    except NoAnswerError as exc:
-        return Finished(task, failure=cause_of(exc), message=str(exc))
-    except Exception as exc:
-        return Finished(task, None, "error", in_words(exc), exc)
+def run_in(
+    pool: TaskPool,
+    work: Callable[[T], R],
+    tasks: Iterable[T],
+    timeout_s: float | Callable[[T], float],
+    split: Callable[[T], Sequence[T]] | None = None,
+) -> Iterator[Finished[T, R]]:
+    """The same in a pool that is open; `tasks` are taken as workers become free.
+
+    A task whose worker died is tried once more at the end, alone. One that can be split is split first, also where it
+    was over its time limit.
+    """
+    again: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
+
+    def completed(tasks: Iterable[T], at_once: int) -> Iterator[Finished[T, R]]:
+        return _completed(pool, work, iter(tasks), timeout_s, at_once)
+
+    for source in (tasks, again["timed_out"]):
+        for end in completed(source, _PER_WORKER * pool.workers):
+            parts = split(end.task) if split is not None and end.failure in again else ()
+            if parts or end.failure == "worker_died":
+                again[end.failure].extend(parts or [end.task])
+            else:
+                yield end
+    for end in completed(again["worker_died"], 1):
+        if end.failure == "worker_died":
+            yield replace(end, message=f"{end.message}, and again when it was tried alone")
+        else:
+            yield end
 
 
-def cause_of(error: BaseException) -> str:
-    """Why a task of a pool failed: "timed_out", "worker_died", or "error" for what it raised itself."""
-    if not isinstance(error, NoAnswerError):
-        return "error"
-    return "timed_out" if error.timed_out else "worker_died"
+def _completed(
+    pool: TaskPool,
+    work: Callable[[T], R],
+    tasks: Iterator[T],
+    timeout_s: float | Callable[[T], float],
+    at_once: int,
+) -> Iterator[Finished[T, R]]:
+    waiting: dict[Future[R], T] = {}
+    for task in tasks:
+        waiting[pool.submit(work, task, timeout_s(task) if callable(timeout_s) else timeout_s)] = task
+        if len(waiting) >= at_once:
+            yield from _ended(pool, waiting)
+    while waiting:
+        yield from _ended(pool, waiting)
 
 
-def in_words(error: BaseException) -> str:
-    """What a task raised, in one line: its type, and the first line of what it says."""
+def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, R]]:
+    for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+        task, error = waiting.pop(future), future.exception()
+        if error is None:
+            yield Finished(task, future.result())
+        elif (failure := pool.failure(error)) == "error":
+            yield Finished(task, None, failure, one_line(error), error)
+        else:
+            yield Finished(task, None, failure, str(error))
+
+
+def one_line(error: BaseException) -> str:
+    """The type of an exception and the first line of its text."""
     text = str(error).strip().splitlines()
     return f"{type(error).__name__}: {text[0] if text else 'no message'}"
+
+
+def last_core() -> int | None:
+    """The core to time on: the last allowed one, as the first serves most interrupts; None where that is not known."""
+    return max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
+
+
+@contextmanager
+def delayed_interrupts() -> Iterator[None]:
+    """Delays Ctrl-C and SIGTERM to the end of the block, so that other processes are ended all or not at all.
+
+    Without effect in other threads than the main one, where signals do not arrive.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    received: list[int] = []
+    before: dict[signal.Signals, Any] = {}
+    try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, lambda number, _: received.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        if received:
+            signal.raise_signal(received[0])
+
+
+class _Process:
+    """One worker process; started again where it has died. Used by one thread at a time, but for `cancel`."""
+
+    def __init__(self, *initial: object) -> None:
+        self._initial = initial
+        self._lock = threading.RLock()
+        self._pool: ProcessPool | None = None
+        self._future: Future[bytes] | None = None
+        self._is_cancelled = False
+
+    def start(self) -> None:
+        """Starts the process, which loads its code by itself; where that fails, the first task tries again."""
+        with self._lock, suppress(OSError, RuntimeError):
+            if not self._is_cancelled:
+                self._started()
+
+    def run(self, request: bytes, timeout_s: float) -> bytes:
+        """The answer of the process. Raises TaskLostError."""
+        try:
+            with self._lock:
+                if self._is_cancelled:
+                    raise CancelledError
+                pool = self._started()
+                future = self._future = pool.schedule(_answer, [request], timeout=timeout_s)
+            return _result(future, pool)
+        except TimeoutError:
+            raise TaskLostError(f"ended after {timeout_s:g} s", "timed_out") from None
+        except (OSError, RuntimeError, CancelledError) as exc:
+            self.close()
+            code = getattr(exc, "exitcode", None)
+            reason = f"exit code {code}" if code is not None else str(exc) or "ended by this process"
+            raise TaskLostError(f"its process died ({reason})", "worker_died") from None
+
+    def cancel(self) -> None:
+        """Ends what the process does; from any thread."""
+        with self._lock:
+            self._is_cancelled = True
+            if self._future is not None:
+                self._future.cancel()
+
+    def close(self) -> None:
+        with self._lock:
+            if self._pool is not None:
+                self._pool.stop()
+                self._pool.join()
+            self._pool = self._future = None
+
+    def _started(self) -> ProcessPool:
+        """The pool with the process, a new one where the old one is broken. Raises OSError, RuntimeError."""
+        from pebble import ProcessPool
+
+        if self._pool is not None and not self._pool.active:
+            self.close()
+        if self._pool is None:
+            for name in ONE_THREAD:
+                os.environ.setdefault(name, "1")
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPool(1, initializer=_initialize, initargs=self._initial, context=context)
+            try:
+                with _blocked_interrupts():
+                    _ = self._pool.active  # starts the process
+            except (OSError, RuntimeError):
+                time.sleep(_RETRY_START_S)  # the system had no room; there may be some then
+                raise
+        return self._pool
+
+
+def _result(future: Future[bytes], pool: ProcessPool) -> bytes:
+    """What the process answers. Raises what it failed with, RuntimeError where the pool broke."""
+    while not future.done():
+        with suppress(TimeoutError):  # of this call: the process is still working
+            future.exception(_POLL_S)
+        if not pool.active and not future.done():
+            raise RuntimeError("killed before its task began")
+    return future.result()
+
+
+@contextmanager
+def _blocked_interrupts() -> Iterator[None]:
+    """Processes and threads started in the block do not receive Ctrl-C, not even while they load Python."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # started in the block, it would unblock the signal
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# What the worker process does
+
+_initial_error: Exception | None = None
+
+
+def _initialize(initializer: Callable[[], None] | None, core: int | None) -> None:
+    global _initial_error
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's handler would wait for the engine to return
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    if core is not None and hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {core})
+    threshold = gc.get_threshold()
+    collect_seldom()
+    try:
+        if initializer is not None:
+            initializer()
+    except Exception as exc:
+        _initial_error = exc
+    gc.freeze()
+    gc.set_threshold(*threshold)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+    os._exit(1)
+
+
+def _answer(request: bytes) -> bytes:
+    """Pickled (result, error) of a pickled (function, task): what cannot be pickled is an error of the task."""
+    try:
+        if _initial_error is not None:
+            raise _initial_error
+        work, task = pickle.loads(request)
+        return pickle.dumps((work(task), None))
+    except BaseException as exc:
+        return pickle.dumps((None, _picklable(exc)))
+
+
+def _picklable(error: BaseException) -> Exception:
+    """The error itself, where it arrives as it is sent; SystemExit and the like must not end the parent."""
+    if isinstance(error, Exception):
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:
+            return RuntimeError(one_line(error))
+        return error
+    return RuntimeError(one_line(error))

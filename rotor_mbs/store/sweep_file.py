@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.execution.interrupts import interrupts_put_off
+from rotor_mbs.execution.pool import delayed_interrupts
 from rotor_mbs.store import hdf5, sweep_layout
 from rotor_mbs.store.chunk_index import ChunkIndex
 from rotor_mbs.store.read import open_results
@@ -27,7 +27,7 @@ class SweepFile:
     filled in any order, by anyone, ends with the same bytes.
     """
 
-    @interrupts_put_off()
+    @delayed_interrupts()
     def __init__(self, plan: Plan, first: int, last: int) -> None:
         self._memory = SparseFile()
         self._file = hdf5.new_file_in(self._memory)
@@ -44,7 +44,7 @@ class SweepFile:
         """Of all its runs, in the file that is to be."""
         return Places(path, self._first, self._places, self._sizes)
 
-    @interrupts_put_off()
+    @delayed_interrupts()
     def complete(self, file: BinaryIO, messages: Mapping[int, str]) -> None:
         """Writes all that is not a run's around the runs. May be done again if it breaks off. Raises OSError."""
         if messages:
@@ -55,7 +55,7 @@ class SweepFile:
             write_at(file, place, content)
         file.truncate(self._memory.size)
 
-    @interrupts_put_off()
+    @delayed_interrupts()
     def close(self) -> None:
         self._file.close()
 

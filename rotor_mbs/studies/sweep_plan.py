@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.engines import Engine
 from rotor_mbs.execution.environment import machine, numerics_fingerprint, versions
+from rotor_mbs.execution.pool import TaskPool
 from rotor_mbs.methods.catalogue import check_names, find_method
 from rotor_mbs.scenario.design import validation_rows
 from rotor_mbs.scenario.scene import scene_hash
@@ -49,11 +49,6 @@ class Work:
     @property
     def rows(self) -> int:
         return self.sweep.design.count
-
-    @property
-    def in_threads(self) -> bool:
-        """Whether two of its tasks may share a process: the fast path leaves the interpreter's lock alone."""
-        return self.methods == (ENSEMBLE_METHOD,)
 
     @cached_property
     def plan(self) -> Plan:
@@ -183,7 +178,7 @@ def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_
     return Work(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)
 
 
-def estimate_seconds(work: Work, engine: Engine) -> float:
+def estimate_seconds(work: Work, engine: TaskPool) -> float:
     """How long all runs will take, from one chunk of each method; infinite where one did not end in its time."""
     seconds = 0.0
     for k in range(len(work.methods)):
@@ -193,7 +188,7 @@ def estimate_seconds(work: Work, engine: Engine) -> float:
     return seconds
 
 
-def _seconds_per_run(work: Work, first: int, engine: Engine) -> float:
+def _seconds_per_run(work: Work, first: int, engine: TaskPool) -> float:
     chunk = next(work.chunks([(first, first + min(work.rows, _ENSEMBLE_RUNS))]))
     try:
         # The first one loads and compiles, which all others find done.
@@ -201,7 +196,7 @@ def _seconds_per_run(work: Work, first: int, engine: Engine) -> float:
         start = time.perf_counter()
         engine.submit(perform, chunk, work.time_limit_s).result()
     except Exception as error:
-        if engine.cause(error) == "error":
+        if engine.failure(error) == "error":
             raise
         return float("inf")
     return (time.perf_counter() - start) / len(chunk.values)

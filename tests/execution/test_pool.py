@@ -1,52 +1,40 @@
-"""Processes that answer: each task's end is its own, whoever dies, hangs or is ended beside it."""
+"""Worker processes: a task's end is its own, whichever other process dies, hangs or is ended."""
 
 from __future__ import annotations
 
-import errno
 import gc
 import os
+import resource
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rotor_mbs.execution import servant
-from rotor_mbs.execution.pool import ProcessPool, cause_of, run_tasks
-from rotor_mbs.execution.servant import NoAnswerError, Servant
+from rotor_mbs.execution.pool import ImportedCall, TaskLostError, open_pool, run_in, run_tasks
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
 
 
-@contextmanager
-def _pool(workers: int, *, in_threads: bool) -> Iterator[ProcessPool]:
-    pool = ProcessPool(workers)
-    pool.begin(in_threads=in_threads)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
 def _meet(folder: str) -> int:
-    """Waits until another task has come here, too: its process."""
+    """Waits until another task is in this folder, too; returns its process id."""
     place = Path(folder)
     (place / f"{os.getpid()}-{time.monotonic_ns()}").touch()
     end = time.monotonic() + _LONG_S
     while len(list(place.iterdir())) < 2 and time.monotonic() < end:
         time.sleep(0.01)
-    assert len(list(place.iterdir())) == 2, "nobody came"
+    assert len(list(place.iterdir())) == 2
     return os.getpid()
 
 
-def _die(folder: str) -> None:
+def _meet_and_die(folder: str) -> None:
     _meet(folder)
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -60,182 +48,250 @@ def _pid(_: object) -> int:
     return os.getpid()
 
 
-def _raise(error: Exception) -> None:
+def _raise(error: BaseException) -> None:
     raise error
 
 
-@pytest.mark.parametrize("in_threads", [False, True])
-def test_two_tasks_at_once_are_in_two_processes_or_in_two_threads_of_one(tmp_path: Path, in_threads: bool) -> None:
-    with _pool(2, in_threads=in_threads) as pool:
-        pids = [pool.submit(_meet, str(tmp_path), _LONG_S) for _ in range(2)]
-        found = {future.result() for future in pids}
-    assert len(found) == (1 if in_threads else 2)
+def _end(_: object) -> None:
+    os._exit(3)
+
+
+def test_two_tasks_at_once_are_in_two_processes(tmp_path: Path) -> None:
+    with open_pool(2) as pool:
+        futures = [pool.submit(_meet, str(tmp_path), _LONG_S) for _ in range(2)]
+        found = {future.result() for future in futures}
+    assert len(found) == 2
     assert os.getpid() not in found
 
 
-@pytest.mark.parametrize("in_threads", [False, True])
-def test_who_dies_takes_those_of_its_process_and_the_next_find_another(tmp_path: Path, in_threads: bool) -> None:
-    with _pool(2, in_threads=in_threads) as pool:
-        futures = [pool.submit(_die, str(tmp_path), _LONG_S), pool.submit(_meet_and_sleep, str(tmp_path), 2.0)]
-        causes = [cause_of(error) for future in futures if (error := future.exception()) is not None]
-        assert causes == (["worker_died"] * 2 if in_threads else ["worker_died", "timed_out"])
-        dead = {int(file.name.split("-")[0]) for file in tmp_path.iterdir()}
-        assert not dead & {pool.submit(_pid, None, _LONG_S).result() for _ in range(4)}
-
-
-def test_a_late_task_is_ended_and_told_so(tmp_path: Path) -> None:
-    with _pool(2, in_threads=True) as pool:
-        late = pool.submit(_meet_and_sleep, str(tmp_path), 0.5)
-        beside = pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S)
-        with pytest.raises(NoAnswerError, match=r"ended after 0\.5 s") as ended:
+def test_death_and_time_out_are_told_apart_and_cost_one_task_each(tmp_path: Path) -> None:
+    with open_pool(2) as pool:
+        died = pool.submit(_meet_and_die, str(tmp_path), _LONG_S)
+        late = pool.submit(_meet_and_sleep, str(tmp_path), 2.0)
+        with pytest.raises(TaskLostError, match="exit code -9") as death:
+            died.result()
+        with pytest.raises(TaskLostError, match="ended after 2 s") as end:
             late.result()
-        assert ended.value.timed_out
-        with pytest.raises(NoAnswerError, match="exit code -9"):
-            beside.result()
+        assert (pool.failure(death.value), pool.failure(end.value)) == ("worker_died", "timed_out")
+        before = {int(file.name.split("-")[0]) for file in tmp_path.iterdir()}
+        assert not before & {pool.submit(_pid, None, _LONG_S).result() for _ in range(4)}
 
 
-def test_a_process_killed_while_it_waits_fails_one_task_and_is_replaced() -> None:
-    with _pool(1, in_threads=False) as pool:
+def test_a_process_killed_while_it_waits_is_replaced() -> None:
+    """The task that finds it dead may be lost, and is then tried again; the pool goes on."""
+    with open_pool(1) as pool:
         pid = pool.submit(_pid, None, _LONG_S).result()
         os.kill(pid, signal.SIGKILL)
-        with pytest.raises(NoAnswerError, match="its process died"):
-            pool.submit(_pid, None, _LONG_S).result()
+        assert [end.value != pid and not end.failure for end in run_in(pool, _pid, [0, 1], _LONG_S)] == [True] * 2
+        os.kill(pool.submit(_pid, None, _LONG_S).result(), signal.SIGKILL)
+        time.sleep(0.5)  # the death has been noticed
         assert pool.submit(_pid, None, _LONG_S).result() != pid
 
 
-def test_what_a_task_raises_arrives_and_its_process_goes_on() -> None:
-    with _pool(1, in_threads=False) as pool:
-        pid = pool.submit(_pid, None, _LONG_S).result()
-        with pytest.raises(ZeroDivisionError, match="by nothing"):
-            pool.submit(_raise, ZeroDivisionError("by nothing"), _LONG_S).result()
-        assert pool.submit(_pid, None, _LONG_S).result() == pid
+def _large(size: int) -> bytes:
+    return bytes(size)
 
 
-def test_a_limit_beyond_what_a_system_can_wait_is_none() -> None:
-    with _pool(1, in_threads=False) as pool:
-        assert pool.submit(_pid, None, 1e300).result() > 0
+def test_a_process_killed_while_it_sends_a_result_does_not_stop_the_pool() -> None:
+    with open_pool(1) as pool:
+        for _ in range(5):
+            pid = pool.submit(_pid, None, _LONG_S).result()
+            large = pool.submit(_large, 1 << 28, _LONG_S)
+            time.sleep(0.1)
+            os.kill(pid, signal.SIGKILL)
+            assert large.exception() is None or isinstance(large.exception(), TaskLostError)
+        assert pool.submit(_pid, None, _LONG_S).exception() is None
 
 
-def test_stopped_it_ends_what_it_does_and_begins_nothing_more(tmp_path: Path) -> None:
-    pool = ProcessPool(2)
-    pool.begin(in_threads=True)
-    at_work = [pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S) for _ in range(2)]
-    waiting = pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S)
-    while len(list(tmp_path.iterdir())) < 2:
-        time.sleep(0.01)
-    start = time.monotonic()
-    pool.shutdown(cancel_futures=True)
-    assert time.monotonic() - start < 0.5 * _LONG_S
-    assert all(isinstance(future.exception(), NoAnswerError) for future in at_work)
-    with pytest.raises(CancelledError):
-        waiting.result()
-
-
-class _Odd(Exception):
+class _Unusual(Exception):
     """Is pickled, but not made of what it was pickled to."""
 
     def __init__(self, one: str, other: str) -> None:
         super().__init__(f"{one} and {other}")
 
 
-class _NotMadeHere:
+class _FailsToUnpickle:
     def __reduce__(self) -> tuple[Any, ...]:
         return _raise, (ZeroDivisionError("by nothing"),)
 
 
-def test_what_cannot_be_sent_as_it_is_is_told_in_words() -> None:
-    with _pool(1, in_threads=False) as pool:
-        pid = pool.submit(_pid, None, _LONG_S).result()
-        with pytest.raises(RuntimeError, match="_Odd: this and that"):
-            pool.submit(_raise_odd, None, _LONG_S).result()
-        with pytest.raises(RuntimeError, match="ZeroDivisionError: by nothing"):
-            pool.submit(_pid, _NotMadeHere(), _LONG_S).result()
-        with pytest.raises(RuntimeError, match="pickle"):
-            pool.submit(_function, None, _LONG_S).result()
-        assert pool.submit(_pid, None, _LONG_S).result() == pid
-
-
-def _raise_odd(_: object) -> None:
-    raise _Odd("this", "that")
+def _raise_unusual(_: object) -> None:
+    raise _Unusual("this", "that")
 
 
 def _function(_: object) -> object:
     return lambda: None
 
 
-def test_code_that_cannot_be_loaded_in_advance_is_the_first_task_s_affair() -> None:
-    pool = ProcessPool(1, "no_such_module:prepare")
-    try:
-        assert pool.submit(_pid, None, _LONG_S).result() > 0
-    finally:
-        pool.shutdown(cancel_futures=True)
+@pytest.mark.parametrize(
+    ("work", "task", "error", "text"),
+    [
+        (_raise, ZeroDivisionError("by nothing"), ZeroDivisionError, "by nothing"),
+        (_raise, SystemExit(3), RuntimeError, "SystemExit: 3"),
+        (_raise_unusual, None, RuntimeError, "_Unusual: this and that"),
+        (_pid, _FailsToUnpickle(), ZeroDivisionError, "by nothing"),
+        (_function, None, Exception, "pickle"),
+    ],
+)
+def test_an_error_of_a_task_arrives_and_its_process_goes_on(
+    work: Callable[[object], object], task: object, error: type[Exception], text: str
+) -> None:
+    with open_pool(1) as pool:
+        pid = pool.submit(_pid, None, _LONG_S).result()
+        with pytest.raises(error, match=text):
+            pool.submit(work, task, _LONG_S).result()
+        assert pool.submit(_pid, None, _LONG_S).result() == pid
 
 
-def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(servant, "_AGAIN_S", 0.01)
-    start = Servant._start
-    with _pool(1, in_threads=False) as pool:
-        os.kill(pool.submit(_pid, None, _LONG_S).result(), signal.SIGKILL)
-        monkeypatch.setattr(Servant, "_start", _no_room)
-        with pytest.raises(NoAnswerError, match="its process died"):
-            pool.submit(_pid, None, _LONG_S).result()
-        with pytest.raises(NoAnswerError, match="could not be started") as refused:
-            pool.submit(_pid, None, _LONG_S).result()
-        assert not refused.value.timed_out
-        monkeypatch.setattr(Servant, "_start", start)
-        assert pool.submit(_pid, None, _LONG_S).result() > 0
+def test_an_infinite_time_limit_is_none() -> None:
+    with open_pool(1) as pool:
+        assert pool.submit(_pid, None, float("inf")).result() > 0
 
 
-def _no_room(_: Servant) -> None:
-    raise OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
+def test_closing_ends_running_tasks_and_starts_no_others(tmp_path: Path) -> None:
+    pool = open_pool(2)
+    running = [pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S) for _ in range(2)]
+    waiting = pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S)
+    while len(list(tmp_path.iterdir())) < 2:
+        time.sleep(0.01)
+    start = time.monotonic()
+    pool.close()
+    assert time.monotonic() - start < 0.5 * _LONG_S
+    assert all(isinstance(future.exception(), TaskLostError) for future in running)
+    with pytest.raises(CancelledError):
+        waiting.result()
+
+
+_state: list[int] = []
+
+
+def _set_state(number: int) -> None:
+    _state.append(number)
+
+
+def _add_to_state(number: int) -> list[int]:
+    _state.append(number)
+    return _state
+
+
+def _cores(_: object) -> set[int]:
+    return os.sched_getaffinity(0)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="no process affinity here")
+def test_one_process_on_one_core_keeps_its_state() -> None:
+    core = max(os.sched_getaffinity(0))
+    with open_pool(1, partial(_set_state, 5), core) as pool:
+        assert pool.submit(_cores, None, _LONG_S).result() == {core}
+        pool.submit(_add_to_state, 6, _LONG_S).result()
+        assert pool.submit(_add_to_state, 7, _LONG_S).result() == [5, 6, 7]
+
+
+def test_an_error_of_the_initializer_is_the_error_of_its_tasks() -> None:
+    with open_pool(1, ImportedCall("no_such_module:load")) as pool, pytest.raises(ModuleNotFoundError, match="no_such"):
+        pool.submit(_pid, None, _LONG_S).result()
+
+
+def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time() -> None:
+    with open_pool(1) as pool:
+        pid = pool.submit(_pid, None, _LONG_S).result()
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (3, limits[1]))
+        try:
+            os.kill(pid, signal.SIGKILL)
+            for _ in range(2):
+                with pytest.raises(TaskLostError, match="died") as refused:
+                    pool.submit(_pid, None, _LONG_S).result()
+                assert refused.value.failure == "worker_died"
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+        assert pool.submit(_pid, None, _LONG_S).result() != pid
+
+
+def _die_once(folder: str) -> str:
+    marks = list(Path(folder).iterdir())
+    (Path(folder) / f"{len(marks)}").touch()
+    if not marks:
+        os._exit(1)
+    return "done"
+
+
+def test_a_task_whose_worker_died_is_tried_once_more(tmp_path: Path) -> None:
+    ends = list(run_tasks(_die_once, [str(tmp_path)], 1, _LONG_S))
+    assert [(end.value, end.failure) for end in ends] == [("done", "")]
+    ends = list(run_tasks(_end, [None], 1, _LONG_S))
+    assert [(end.failure, end.message) for end in ends] == [
+        ("worker_died", "its process died (exit code 3), and again when it was tried alone")
+    ]
+
+
+def _sum(numbers: tuple[int, ...]) -> int:
+    if 3 in numbers:
+        os._exit(1)
+    if 7 in numbers:
+        time.sleep(_LONG_S)
+    return sum(numbers)
+
+
+def _split(numbers: tuple[int, ...]) -> list[tuple[int, ...]]:
+    return [(number,) for number in numbers] if len(numbers) > 1 else []
+
+
+def test_a_lost_task_of_many_runs_is_split_and_only_one_run_is_lost() -> None:
+    def limit(numbers: tuple[int, ...]) -> float:
+        return 1.0 if 7 in numbers else _LONG_S
+
+    ends = list(run_tasks(_sum, [(0, 1), (2, 3), (4, 5), (6, 7)], 2, limit, _split))
+    assert {end.task: end.value if not end.failure else end.failure for end in ends} == {
+        (0, 1): 1, (4, 5): 9, (2,): 2, (3,): "worker_died", (6,): 6, (7,): "timed_out",
+    }  # fmt: skip
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
-def test_the_dead_leave_no_open_files() -> None:
+def test_dead_processes_leave_no_open_files() -> None:
     list(run_tasks(_pid, [0], 1, _LONG_S))  # opens what stays open
     before = len(list(Path("/proc/self/fd").iterdir()))
     gc.disable()
     try:
-        ended = list(run_tasks(_end, list(range(6)), 2, _LONG_S))
+        ended = list(run_tasks(_end, list(range(4)), 2, _LONG_S))
         assert len(list(Path("/proc/self/fd").iterdir())) <= before
     finally:
         gc.enable()
-    assert [end.failure for end in ended] == ["worker_died"] * 6
+    assert [end.failure for end in ended] == ["worker_died"] * 4
 
 
-def _end(_: int) -> None:
-    os._exit(3)
+_BUSY_PROGRAM = """
+import os, sys, time
+from rotor_mbs.execution.pool import open_pool
 
+def busy(_):
+    print(os.getpid(), file=sys.stderr, flush=True)
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        pass
 
-_LONG_TASKS = """
-import sys, time
-from rotor_mbs.execution.pool import ProcessPool
-from rotor_mbs.execution.servant import Servant
-
-def slowly(self, kill=Servant.kill):
-    time.sleep(0.3)
-    kill(self)
-
-Servant.kill = slowly
 if __name__ == "__main__":
-    pool = ProcessPool(2)
-    try:
-        tasks = [pool.submit(time.sleep, 60.0, 90.0) for _ in range(4)]
-        time.sleep(0.5)
-        print("at work", flush=True)
+    with open_pool(2) as pool:
+        tasks = [pool.submit(busy, None, 90) for _ in range(4)]
         tasks[0].result()
-    finally:
-        pool.shutdown(cancel_futures=True)
 """
 
 
-def test_a_second_interrupt_does_not_keep_it_from_its_end() -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", _LONG_TASKS], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        time.sleep(0.2)  # it is ending the first process
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=20.0)  # the tasks take a minute
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks for processes in /proc")
+@pytest.mark.parametrize("signals", [[signal.SIGINT], [signal.SIGINT, signal.SIGINT], [signal.SIGKILL]])
+def test_workers_end_with_their_parent(tmp_path: Path, signals: list[signal.Signals]) -> None:
+    """Interrupted once or twice, or killed: no worker goes on."""
+    program = tmp_path / "program.py"
+    program.write_text(_BUSY_PROGRAM)
+    with subprocess.Popen([sys.executable, str(program)], stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        pids = [int(process.stderr.readline()) for _ in range(2)]
+        for number in signals:
+            process.send_signal(number)
+            time.sleep(0.05)
+        process.wait(20.0)
+        process.stderr.read()
+    end = time.monotonic() + 20.0
+    while any(Path(f"/proc/{pid}").exists() for pid in pids) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)

@@ -70,7 +70,7 @@ def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, durat
             engine.submit(perform, chunk, 60.0).result()
         after = engine.submit(_resident, None, 60.0).result()
     finally:
-        engine.stop()
+        engine.close()
     print(f"\n{method}, {samples} samples: {before:.1f} MB after 1,000 runs, {after:.1f} MB after 11,000")
     assert after - before < 20.0
 

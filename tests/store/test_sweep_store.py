@@ -340,40 +340,6 @@ def test_a_second_sweep_is_refused_until_the_first_one_ends_however_it_ends(tmp_
         FolderLock(tmp_path, Path("s.h5")).release()
 
 
-_INTERRUPTED = """
-import os, signal, sys
-from pathlib import Path
-sys.path[:0] = [sys.argv[1], sys.argv[3]]
-from test_sweep_store import _plan
-from rotor_mbs.store.sweep_file import SweepFile
-from rotor_mbs.store.sweep_memory import SparseFile
-
-def interrupted(*arguments, write=SparseFile.write):
-    SparseFile.write = write
-    os.kill(os.getpid(), getattr(signal, sys.argv[2]))
-    return write(*arguments)
-
-def interrupt(number, frame):
-    raise KeyboardInterrupt
-
-signal.signal(signal.SIGTERM, interrupt)
-file = SweepFile(_plan(), 0, 23)
-SparseFile.write = interrupted
-try:
-    file.complete(Path(os.devnull).open("wb", buffering=0), {0: "a message"})
-except KeyboardInterrupt:
-    print("interrupted")
-"""
-
-
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
-def test_an_interrupt_waits_until_the_file_library_is_done(number: str) -> None:
-    """Within what it calls back, it would leave the library broken, and the process would end in a crash."""
-    script = [sys.executable, "-c", _INTERRUPTED, str(Path(__file__).parent), number, str(Path(__file__).parents[1])]
-    ended = subprocess.run(script, capture_output=True, text=True)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
-
-
 # 64 chunks fill a leaf of the index; 5,000 make a tree of three levels.
 @pytest.mark.parametrize("rows", [1, 64, 65, 5000])
 def test_places_read_from_the_index_are_those_that_the_library_tells(rows: int) -> None:

@@ -200,7 +200,7 @@ def test_a_fast_run_is_integration_and_arrays_but_for_a_tenth(tmp_path: Path) ->
     try:
         shares = [engine.submit(_shares, chunks, 60.0).result() for _ in range(1 + _ROUNDS)]
     finally:
-        engine.stop()
+        engine.close()
     spent, beside, filling = 1e3 * np.median(shares[1:], axis=0) / runs  # ms a run; the first one compiles
     _own_time(tmp_path, 201, 64)  # loads
     more = [_own_time(tmp_path, 201, 8192) - _own_time(tmp_path, 201, 2048) for _ in range(3)]

@@ -121,11 +121,10 @@ def test_a_run_that_kills_its_worker_is_found_and_the_rest_goes_on(
     monkeypatch.setenv("ROTOR_TEST_MARKS", str(marks))
     work = plan_work(load_sweep(_file(tmp_path, draws=16)), [method], (1, 1), 60.0)
     engine = open_engine("local", 2)
-    engine.begin(method == "lagrange/taylor")  # where a run dies that shares its process, others die with it
     with SweepStore(tmp_path / "o.h5", work.plan, 0, 32, 10**9) as store:
         execute(work, engine, store, Meter(32, 0), _poisoned)
         statuses = [SWEEP_STATUSES[code] for code in store.statuses]
-    engine.stop()
+    engine.close()
     assert statuses == ["ok"] * 5 + ["worker_died"] + ["ok"] * 26
     # Tried with its chunk, then once more, alone.
     assert marks.read_text().split() == (["8", "1"] if method == "lagrange/taylor" else ["1", "1"])
@@ -148,7 +147,7 @@ def test_a_run_that_hangs_is_ended_and_the_rest_goes_on(tmp_path: Path, monkeypa
     with SweepStore(tmp_path / "o.h5", work.plan, 0, 8, 10**9) as store:
         execute(work, engine, store, Meter(8, 0), _hanging)
         assert [SWEEP_STATUSES[code] for code in store.statuses] == ["ok"] * 2 + ["timed_out"] + ["ok"] * 5
-    engine.stop()
+    engine.close()
 
 
 def _journal_size(output: Path) -> int:
