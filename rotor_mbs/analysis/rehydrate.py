@@ -1,25 +1,25 @@
-"""A stored run back as the scene, run and reference it was, so that the one judgement can be passed on it again."""
+"""A stored run back as scene, solution and reference, so that it can be judged again from its samples."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rotor_mbs.scenario.load import parse_scene
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Solution, Trajectory
+from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
-
-ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 
 @dataclass(frozen=True)
-class Restored:
-    """scene: as its stored text says; run: None where not even times are stored; reference: None where there is none.
+class Rehydrated:
+    """scene: as its stored text says; run: None where its arrays cannot be used; reference: None where there is none.
 
-    faults   a line for every channel that is missing, of the wrong length, or not finite
+    faults   a line for every array that is missing, of another shape, or not finite
     """
 
     scene: Scene
@@ -28,39 +28,33 @@ class Restored:
     faults: list[str]
 
 
-def restore(stored: StoredScene, run: StoredRun) -> Restored:
+def rehydrate(stored: StoredScene, run: StoredRun) -> Rehydrated:
     """Raises InputError where the stored scene text is no scene."""
     scene = parse_scene(str(stored.attributes["scene_toml"]), stored.name)
     faults = _faults(scene, run)
     reference = None
     if stored.reference is not None and not _faults(scene, stored.reference, complete=False):
         reference = _trajectory(scene, stored.reference)
-    if faults and not _is_shorter_only(scene, run):
-        return Restored(scene, None, reference, faults)
+    if faults and _faults(scene, run, complete=False):  # more is wrong than that the run stops early
+        return Rehydrated(scene, None, reference, faults)
     facts = run.attributes
     engine = Integration(
         bool(facts.get("engine_success", 0)),
         str(facts.get("engine_message", "")),
         out_of_time=run.status == "timed_out" and not facts.get("engine_success", 0),
     )
-    trajectory = _trajectory(scene, run)
-    return Restored(scene, Solution(run.method, trajectory, engine, run.settings, 0.0, [0.0], 0.0), reference, faults)
-
-
-def _is_shorter_only(scene: Scene, run: StoredRun) -> bool:
-    """Whether all that is wrong is that the run stops early, with every channel at the same sample."""
-    return not _faults(scene, run, complete=False)
+    found = Solution(scene, run.method, _trajectory(scene, run), engine, run.settings)
+    return Rehydrated(scene, found, reference, faults)
 
 
 def _faults(scene: Scene, run: StoredRun, complete: bool = True) -> list[str]:
     """complete: every sample must be there; else as many as there are times."""
-    expected = ["time", *(name for name in ("angles", "rates", "tip") if scene.wants(name))]
-    expected += [*ENERGIES, "energy_error"] if scene.wants("energy") else []
-    if run.method == "reference":
-        expected += ["angle_uncertainty"]
-    shapes = {"angles": (1 + len(scene.blades),), "rates": (1 + len(scene.blades),), "tip": (len(scene.blades), 3)}
     rows = scene.samples if complete or "time" not in run else len(run.array("time"))
-    return [fault for name in expected if (fault := _fault(run, name, (rows, *shapes.get(name, ()))))]
+    expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
+    for quantity in quantities(scene.outputs):
+        if quantity.required or (quantity.name == "angle_uncertainty" and run.method == REFERENCE):
+            expected[quantity.name] = (rows, *row_shape(quantity, scene))
+    return [fault for name, shape in expected.items() if (fault := _fault(run, name, shape))]
 
 
 def _fault(run: StoredRun, name: str, shape: tuple[int, ...]) -> str:
@@ -77,13 +71,9 @@ def _fault(run: StoredRun, name: str, shape: tuple[int, ...]) -> str:
 
 
 def _trajectory(scene: Scene, run: StoredRun) -> Trajectory:
-    """Angles and rates that were not asked for are zeros, and not to be judged."""
+    """Angles and rates that were not asked for are zeros, which are not judged."""
     time = run.array("time")
     blank = np.zeros((len(time), 1 + len(scene.blades)))
-    named: dict[str, Any] = {
-        name: run.array(name) if name in run else None for name in ("tip", *ENERGIES, "constraint_error")
-    }
-    angles: Array = run.array("angles") if "angles" in run else blank
-    rates: Array = run.array("rates") if "rates" in run else blank
-    growth = run.array("error_growth") if "error_growth" in run else None
-    return Trajectory(time, angles, rates, growth=growth, **named)
+    names = {quantity.name for quantity in known_quantities(scene.outputs) if quantity.is_over_time}
+    found = {name: run.array(name) for name in names if name in run}
+    return Trajectory(**{"time": time, "angles": blank, "rates": blank, **found})

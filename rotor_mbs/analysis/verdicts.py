@@ -14,12 +14,13 @@ import numpy as np
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
-from rotor_mbs.analysis.rehydrate import Restored, restore
+from rotor_mbs.analysis.rehydrate import Rehydrated, rehydrate
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import energy_slack, is_held, judge
-from rotor_mbs.solution.metrics import compare, energy_scale
-from rotor_mbs.solution.record import Array, Solution, Trajectory
+from rotor_mbs.solution.judgement import energy_slack, is_held, judge, quantity_bound, quantity_errors
+from rotor_mbs.solution.metrics import Metrics, compare, energy_scale
+from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import Results, StoredRun, StoredScene
 
@@ -59,7 +60,7 @@ def verdicts(results: Results, frozen: Sequence[Results], bounds: Bounds) -> lis
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
         for scene in results.scenes.values():
             for run in scene.runs.values():
-                found += _of_run(run, bounds, restore(scene, run), _motion_ends(scene))
+                found += _of_run(run, bounds, rehydrate(scene, run), _motion_ends(scene))
             found += _of_reference(scene, shipped.get(scene.name), bounds)
         found += _of_paper(results, bounds)
     return found
@@ -79,26 +80,26 @@ def _motion_ends(scene: StoredScene) -> bool:
     return reference.status == "singular"
 
 
-def _of_run(run: StoredRun, bounds: Bounds, restored: Restored, motion_ends: bool) -> Iterator[Verdict]:
+def _of_run(run: StoredRun, bounds: Bounds, found: Rehydrated, motion_ends: bool) -> Iterator[Verdict]:
     """A run that stops early and says so is complete where nothing more was to be had of it."""
-    says_so = restored.run is not None and run.status not in ("ok", "inaccurate")
+    says_so = found.run is not None and run.status not in ("ok", "inaccurate")
     excused = says_so and (motion_ends or not is_held(run.method))
-    faults = [] if excused else restored.faults
+    faults = [] if excused else found.faults
     look = "; ".join(faults) or "every channel, row and number is there"
     if faults and run.status != "ok":
         look += f"; stored as {run.status}: {run.attributes.get('message', '')}"
     yield _make("complete", run, "all", float(len(faults)), bounds, "faults", look)
-    if restored.run is None:
+    if found.run is None:
         return
-    yield _status(run, bounds, restored, restored.run)
-    if len(restored.run.trajectory.time):
-        yield from _of_samples(run, bounds, restored.scene, restored.run)
+    yield _status(run, bounds, found, found.run)
+    if len(found.run.trajectory.time):
+        yield from _of_samples(run, bounds, found.scene, found.run)
         if is_held(run.method) and run.method != REFERENCE:
-            yield from _of_right_model(run, bounds, restored, restored.run.trajectory)
+            yield from _of_corrected_model(run, bounds, found, found.run.trajectory)
 
 
-def _status(run: StoredRun, bounds: Bounds, restored: Restored, recorded: Solution) -> Verdict:
-    judged = judge(restored.scene, recorded, restored.reference)
+def _status(run: StoredRun, bounds: Bounds, found: Rehydrated, recorded: Solution) -> Verdict:
+    judged = judge(found.scene, recorded, found.reference)
     claimed = bool(run.attributes.get("false_success", 0))
     faults = (judged.status != run.status) + (judged.false_success != claimed)
     look = f"stored {run.status}, its samples say {judged.status} {judged.message}".rstrip()
@@ -156,10 +157,10 @@ def _energies_off(scene: Scene, trajectory: Trajectory) -> dict[str, float]:
     }
 
 
-def _of_right_model(run: StoredRun, bounds: Bounds, restored: Restored, trajectory: Trajectory) -> Iterator[Verdict]:
-    """What only a model that claims to be right is held to: the reference, the energy balance, exact solutions."""
-    scene = restored.scene
-    metrics = compare(scene, trajectory, restored.reference)
+def _of_corrected_model(run: StoredRun, bounds: Bounds, found: Rehydrated, trajectory: Trajectory) -> Iterator[Verdict]:
+    """What is asked only of a model that claims the corrected equations: reference, energy balance, exact solutions."""
+    scene = found.scene
+    metrics = compare(scene, trajectory, found.reference)
     if scene.wants("angles") and "angle_error_per_growth" in metrics:
         look = f"{metrics['angle_error_max']:.1e} rad up to {metrics['horizon_s']:.2f} s: a term, a parameter, the step"
         yield _make("agreement", run, "angles", metrics["angle_error_per_growth"], bounds, "per growth", look)
@@ -167,15 +168,22 @@ def _of_right_model(run: StoredRun, bounds: Bounds, restored: Restored, trajecto
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
         look = "a force without its potential, a wrong mass matrix, or too long a step"
         yield _make("energy", run, "balance", drift, bounds, "of scale", look)
-    if trajectory.constraint_error is not None:
-        arm = max(math.hypot(*blade.centre_of_mass) for blade in scene.blades)
-        gap = metrics["constraint_error_max"] / arm
-        yield _make("gap", run, "joints", gap, bounds, "of arm", "a joint of the chain that is not held, or its marker")
+    yield from _of_quantities(run, bounds, scene, metrics)
     exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
     if exact is not None:
         name, angle = exact
         off = float(np.abs(trajectory.angles[:, 0] - angle).max())
         yield _make("exact", run, "rotor angle", off, bounds, "rad", f"{name}, solved by hand")
+
+
+def _of_quantities(run: StoredRun, bounds: Bounds, scene: Scene, metrics: Metrics) -> Iterator[Verdict]:
+    """Every quantity that is judged by a rule of its declaration."""
+    for quantity, rule, error in quantity_errors(scene, metrics):
+        bound = quantity_bound(rule, bounds, run.method)
+        if bound is not None:
+            check, channel = rule.check or quantity.name, rule.channel or quantity.name
+            unit = rule.unit or quantity.units
+            yield Verdict(check, run.scene, run.method, channel, error, bound, unit, rule.look_at or quantity.long_name)
 
 
 def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Verdict]:

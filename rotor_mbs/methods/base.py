@@ -9,7 +9,8 @@ from typing import Protocol
 
 from rotor_mbs.methods.time_limit import time_limit
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Integration, Item, Solution, Trajectory
+from rotor_mbs.solution.record import Integration, Item, Trajectory
+from rotor_mbs.solution.solution import Solution
 
 
 class Solver(Protocol):
@@ -66,4 +67,4 @@ def solve(
             gc.enable()
     start = time.perf_counter()
     trajectory = solver.observe()
-    return Solution(name, trajectory, integration, chosen, setup, run_times, time.perf_counter() - start)
+    return Solution(scene, name, trajectory, integration, chosen, setup, run_times, time.perf_counter() - start)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import allowed_of, rotor_inertia_shares
 from rotor_mbs.solution.metrics import energy_scale
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.quantities import Array
+from rotor_mbs.solution.record import Integration, Trajectory
 
 # Of the rotor's inertia at the start: above it, no start is singular.
 _CLEAR_SHARE = 1e-6

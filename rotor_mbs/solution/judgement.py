@@ -1,43 +1,41 @@
-"""The one judgement of a run, from its state: runner, bench, check and report all use it. Knows no engine, no results.
+"""The one judgement of a run, from its samples: batches, bench, check and report use it. Knows no engine and no file.
 
-What a method is held to stands in reference/accuracy.toml alone, where `check` reads it too: a status and a verdict
-cannot be true to different numbers.
+The bounds are those of reference/accuracy.toml, which `check` reads, too, and those that a quantity brings: a status
+and a verdict cannot follow from different numbers.
 
-An engine's word counts only against it: a run it calls failed is never ok, a run it calls good is looked at all the
-same. The printed model is not held to the reference or to its energy: that it departs from them is the finding.
+An engine's report can only lower a status: a run that it calls failed is never ok, a run that it calls good is examined
+all the same. The printed equations are not judged against the reference or by their energy: that they depart from them
+is the finding.
 """
 
 from __future__ import annotations
 
 import functools
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
-from rotor_mbs.scenario.bounds import shipped_bounds
+from rotor_mbs.scenario.bounds import Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import Metrics, compare
-from rotor_mbs.solution.record import Array, Solution, Trajectory
-
-STATUSES = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out")
+from rotor_mbs.solution.quantities import Array, Comparison, Quantity, known_quantities
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.solution import Solution
 
 
 @dataclass(frozen=True, slots=True)
 class Allowed:
-    """What a method's runs are held to.
+    """The bounds on a method's runs.
 
     angle    relative error (of the largest angle, at least 1 rad) per unit of error growth: the scene's own growth,
              which is not the method's fault, carries every local error on (samples before the horizon)
     energy   of the scene's energy scale, over the whole run; see `energy_conditioning`
-    gap      of the longest arm: the largest opening of a joint; 0 where the model has no joints that can open
     """
 
     angle: float
     energy: float
-    gap: float
 
 
 # Share of the rotor's inertia that is left once every pitch is free: below this a run that broke off broke off there.
@@ -46,18 +44,18 @@ _SINGULAR_SHARE = 1e-3
 # Round-off of a run's state, what it becomes over some hundred steps; magnified it may add to the energy error.
 _ROUND_OFF = 1e-14
 
-# A hundredth: of the energy scale, of the longest arm, or of the largest angle beyond what the scene itself makes of
-# an error at the start.
+# A hundredth: of the energy scale, of what a quantity is relative to, or of the largest angle beyond what the scene
+# itself makes of an error at the start.
 _RESEMBLES = 1e-2
 
 # Below this share the last bit of a pitch decides the rotor's inertia: (π/2 known to 1e-16)², a hundredfold. What comes
-# after such a sample follows from round-off alone, however well an engine likes it.
+# after such a sample follows from round-off alone, whatever an engine reports.
 _NO_INERTIA = 1e-30
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
-    """status: one of STATUSES; message: one line, "" where all is well; false_success: the engine claimed too much."""
+class Judgement:
+    """status: one of RUN_STATUSES; message: one line, "" for ok; false_success: the engine claimed too much."""
 
     status: str
     message: str
@@ -67,11 +65,17 @@ class Verdict:
 
 @functools.cache
 def allowed_of(method: str) -> Allowed | None:
-    """What "model/integrator" is held to; None for methods that are not held to anything (the printed model)."""
-    angle, energy, gap = (shipped_bounds().find(check, method) for check in ("agreement", "energy", "gap"))
+    """The bounds on "model/integrator"; None for methods that have none (the printed equations)."""
+    angle, energy = (shipped_bounds().find(check, method) for check in ("agreement", "energy"))
     if angle is None or energy is None:
         return None
-    return Allowed(angle.value, energy.value, gap.value if gap else 0.0)
+    return Allowed(angle.value, energy.value)
+
+
+def quantity_bound(rule: Comparison, bounds: Bounds, method: str) -> float | None:
+    """The bound on a quantity's number for a method; None where the number is not judged."""
+    entry = bounds.find(rule.check, method) if rule.check else None
+    return entry.value if entry else rule.bound
 
 
 def is_held(method: str) -> bool:
@@ -79,8 +83,8 @@ def is_held(method: str) -> bool:
     return not method.startswith("printed")
 
 
-def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Verdict:
-    """Finite? End reached? Through a singularity? Energy balance, joints, reference? The first no names the status."""
+def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
+    """Finite? End reached? Through a singularity? Energy, quantities, reference? The first no names the status."""
     metrics = compare(scene, run.trajectory, reference)
     status, message = _broken_off(scene, run)
     if not status and is_held(run.method):
@@ -88,7 +92,7 @@ def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Verdict:
     if not status:
         status, message = _inaccurate(scene, run, metrics)
     false_success = run.integration.success and not _is_close(scene, status, metrics)
-    return Verdict(status, message, false_success, metrics)
+    return Judgement(status, message, false_success, metrics)
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
@@ -99,16 +103,20 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
     if status != "inaccurate":
         return status == "ok"
     errors = [metrics.get(name, 0.0) for name in ("energy_drift_max", "angle_error_per_growth")]
-    return all(error <= _RESEMBLES for error in [*errors, _open_share(scene, metrics)])
+    errors += [error for _, rule, error in quantity_errors(scene, metrics) if rule.relative_to]
+    return all(error <= _RESEMBLES for error in errors)
 
 
-def _open_share(scene: Scene, metrics: Metrics) -> float:
-    """The largest opening of a joint, of the longest arm; 0 where the model has no joints that can open."""
-    return metrics.get("constraint_error_max", 0.0) / max(math.hypot(*blade.centre_of_mass) for blade in scene.blades)
+def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, Comparison, float]]:
+    """What each judged quantity's number comes to, of what it is relative to; only those that the run has."""
+    for quantity in known_quantities(scene.outputs):
+        rule = quantity.judgement
+        if rule is not None and rule.metric in metrics:
+            yield quantity, rule, metrics[rule.metric] / (rule.relative_to(scene) if rule.relative_to else 1.0)
 
 
 def _broken_off(scene: Scene, run: Solution) -> tuple[str, str]:
-    """Runs that did not get to the end, or were called failed by their engine; ("", "") for the others."""
+    """Runs that did not reach the end, or that their engine calls failed; ("", "") for the others."""
     integration, samples = run.integration, len(run.trajectory.time)
     complete = samples == scene.samples
     if complete and integration.success:
@@ -116,12 +124,12 @@ def _broken_off(scene: Scene, run: Solution) -> tuple[str, str]:
     reached = f"at t = {run.trajectory.time[-1]:.6g} s of {scene.duration:g} s" if samples else "at the start"
     if integration.out_of_time:
         return "timed_out", f"{integration.message}, {reached}"
-    said = integration.message or ("the engine reported success" if integration.success else "no reason given")
+    reported = integration.message or ("the engine reported success" if integration.success else "no reason given")
     if smallest_rotor_inertia_share(scene, run.trajectory) < _SINGULAR_SHARE:
-        return "singular", f"every pitch at ±π/2 leaves the rotor next to no inertia, {reached}; {said}"
+        return "singular", f"every pitch at ±π/2 leaves the rotor next to no inertia, {reached}; {reported}"
     if integration.success:
-        return "diverged", f"no finite sample after the last one {reached}; {said}"
-    return "solver_failed", f"{said}; {reached}"
+        return "diverged", f"no finite sample after the last one {reached}; {reported}"
+    return "solver_failed", f"{reported}; {reached}"
 
 
 def _through_singularity(scene: Scene, run: Solution, reference: Trajectory | None) -> tuple[str, str]:
@@ -143,9 +151,11 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
     energy = allowed.energy + energy_slack(scene, run.trajectory)
     if not metrics.get("energy_drift_max", 0.0) <= energy:
         return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of its scale, allowed {energy:.0e}"
-    gap = _open_share(scene, metrics)
-    if not gap <= allowed.gap:
-        return "inaccurate", f"a joint opens by {gap:.1e} of the longest arm, allowed {allowed.gap:.0e}"
+    for _, rule, error in quantity_errors(scene, metrics):
+        bound = quantity_bound(rule, shipped_bounds(), run.method)
+        if bound is not None and not error <= bound:
+            fault = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()
+            return "inaccurate", f"{fault.format(value=f'{error:.1e}')}, allowed {bound:.0e}"
     if not metrics.get("angle_error_per_growth", 0.0) <= allowed.angle:
         return "inaccurate", (
             f"angle error {metrics['angle_error_max']:.1e} rad before the horizon, "
@@ -163,7 +173,7 @@ def energy_conditioning(scene: Scene, run: Trajectory) -> float:
     """By how much the energy magnifies round-off of the state, beyond the ordinary; at least 1.
 
     Near a pitch of π/2 the rates grow like 1/√share while the energy stays: the terms that sum up to it are 1/√share
-    times larger than it. A pitch that moves less than a right angle between samples is looked at on its way, too.
+    times larger than it. A pitch that moves less than a right angle between samples is examined between them, too.
     """
     steps = np.abs(np.diff(run.angles[:, 1:], axis=0)).max(initial=0.0)
     shares = rotor_inertia_shares(scene, run.angles)
@@ -208,16 +218,16 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
     whole = np.full(len(angles), scene.hub_inertia)
     for i, blade in enumerate(scene.blades):
         s, c = np.sin(angles[:, 1 + i]), np.cos(angles[:, 1 + i])
-        free, held = _shaft_inertia_forms(blade)
+        free, fixed = _shaft_inertia_forms(blade)
         remaining += free[0] * s * s + free[1] * c * c + free[2] * s * c
-        whole += held[0] * s * s + held[1] * c * c + held[2] * s * c
+        whole += fixed[0] * s * s + fixed[1] * c * c + fixed[2] * s * c
     shares: Array = remaining / whole
     return shares
 
 
 @functools.lru_cache(maxsize=512)
 def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]]:
-    """Coefficients of s², c², s c (s, c of the pitch) in S and in the inertia about the shaft, kg m².
+    """Coefficients of s², c², s c (s, c of the pitch) in S and in the inertia about the shaft (pitches fixed), kg m².
 
     In exact arithmetic until the end: for a point mass the first vanishes, and its rounding must not pass for inertia.
     """
@@ -226,7 +236,7 @@ def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]
     xx, yy, zz, xy, xz, yz = map(Fraction, blade.inertia)
     xx, yy, zz = xx + m * (y * y + z * z), yy + m * (x * x + z * z), zz + m * (x * x + y * y)
     xy, xz, yz = xy - m * x * y, xz - m * x * z, yz - m * y * z
-    held = [xx, yy, 2 * xy]
+    fixed = [xx, yy, 2 * xy]
     taken = [xz * xz, yz * yz, 2 * xz * yz] if blade.has_pitch_inertia else [Fraction(0)] * 3
-    free = [a - b / zz if b else a for a, b in zip(held, taken, strict=True)]
-    return [float(value) for value in free], [float(value) for value in held]
+    free = [a - b / zz if b else a for a, b in zip(fixed, taken, strict=True)]
+    return [float(value) for value in free], [float(value) for value in fixed]

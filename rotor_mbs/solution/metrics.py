@@ -1,6 +1,7 @@
-"""How far a run is from a reference, and from its own energy: one set of metrics for runner, report and checks.
+"""How far a run is from a reference, and from its own energy: one set of metrics for batches, reports and checks.
 
-Knows samples only; no engine, no file, no bound (those are in `outcome`).
+Angles and energies have rules of their own here; every other quantity is measured as its declaration says. Knows
+samples only; no engine, no file, no bound (those are in `judgement`).
 """
 
 from __future__ import annotations
@@ -8,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.quantities import Array, deviation, energy_error, known_quantities
+from rotor_mbs.solution.record import Trajectory
 
 HORIZON_GROWTH = 1e5  # a scene's horizon: when an error of the initial state may have grown this many times
 
@@ -21,9 +23,10 @@ _LEFT_ZERO = 1e-9
 
 def running_growth(reference: Trajectory) -> Array:
     """(n,) the largest error growth so far, at least 1."""
-    if reference.growth is None:
+    growth = reference.get("error_growth")
+    if growth is None:
         return np.ones(len(reference.time))
-    return np.maximum(np.maximum.accumulate(reference.growth), 1.0)
+    return np.maximum(np.maximum.accumulate(growth), 1.0)
 
 
 def horizon_samples(reference: Trajectory) -> int:
@@ -41,24 +44,6 @@ def angle_error(run: Trajectory, reference: Trajectory) -> Array:
     """(common samples,) rad: largest over the coordinates. Angles are unwrapped: a lost turn is an error of 2π."""
     n = min(len(run.time), len(reference.time))
     error: Array = np.abs(run.angles[:n] - reference.angles[:n]).max(axis=1)
-    return error
-
-
-def tip_error(run: Trajectory, reference: Trajectory) -> Array | None:
-    """(common samples,) m: largest distance of a tip from its reference; None where either has no tips."""
-    if run.tip is None or reference.tip is None:
-        return None
-    n = min(len(run.tip), len(reference.tip))
-    distance: Array = np.linalg.norm(run.tip[:n] - reference.tip[:n], axis=2).max(axis=1)
-    return distance
-
-
-def energy_error(run: Trajectory) -> Array | None:
-    """(n,) J: total energy less work, less its value at the start; None where energies were not asked for."""
-    if run.kinetic_energy is None or run.potential_energy is None or run.work is None:
-        return None
-    total = run.kinetic_energy + run.potential_energy - run.work
-    error: Array = total - total[:1]  # of a run without a sample, too
     return error
 
 
@@ -82,28 +67,39 @@ def compare(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metr
     if not len(run.time):
         return metrics
     energy = energy_error(run)
-    if energy is not None and len(energy) > 1:  # the first sample is what the others are held to
+    if energy is not None and len(energy) > 1:  # the error of the first sample is zero by definition
         scale = energy_scale(scene, run)
         metrics["energy_scale_J"] = scale
         metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
         metrics["energy_gain_J"] = float(energy.max())
-    if run.constraint_error is not None:
-        metrics["constraint_error_max"] = float(run.constraint_error.max())
     if reference is not None:
-        metrics |= _against(run, reference)
+        metrics |= _angle_errors(run, reference)
+    return metrics | _of_quantities(scene, run, reference)
+
+
+def _of_quantities(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
+    """The metric of every quantity that is judged by a rule of its declaration."""
+    metrics: Metrics = {}
+    for quantity in known_quantities(scene.outputs):
+        sizes = deviation(quantity, scene, run, reference)
+        if sizes is None or quantity.judgement is None:
+            continue
+        if quantity.judgement.with_reference and reference is not None:
+            until = min(horizon_samples(reference), len(sizes))
+            sizes = sizes[: until if until > 1 else 0]  # the first sample is given, and equal in every run
+        if len(sizes):
+            metrics[quantity.judgement.metric] = float(sizes.max())
     return metrics
 
 
-def _against(run: Trajectory, reference: Trajectory) -> Metrics:
-    """Errors only where there is a second sample to tell them from: the first one is given, and right in every run."""
+def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
+    """Errors only where there is a second sample: the first one is given, and equal in every run."""
     error = angle_error(run, reference)
     until = min(horizon_samples(reference), len(error))
     metrics = {"horizon_s": horizon(reference)}
     if until > 1:
         metrics["angle_error_max"] = float(error[:until].max())
         metrics["angle_error_per_growth"] = float((error / _carried_error(reference)[: len(error)])[:until].max())
-        if (tips := tip_error(run, reference)) is not None:
-            metrics["tip_error_max"] = float(tips[:until].max())
     if len(error) > 1:
         metrics["angle_error_whole"] = float(error.max())
         if len(run.time) == len(reference.time):

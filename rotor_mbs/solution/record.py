@@ -1,48 +1,77 @@
-"""What a run leaves behind: samples and the engine's word, as plain arrays. Knows no engine and no file format."""
+"""What a model returns of a run: samples by quantity, and the engine's report. Knows no engine and no file format."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from rotor_mbs.solution.quantities import NAMES, Array
 
-Array = NDArray[np.float64]
-
-
-@dataclass(slots=True)
-class Refined:
-    """An integrator's own output points (ode45: four per step), from which a figure's extremes are read."""
-
-    time: Array  # (k,) s
-    angles: Array  # (k, 1 + blades) rad
-    rates: Array  # (k, 1 + blades) rad/s
+__all__ = ["Array", "Integration", "Item", "Trajectory"]
 
 
-@dataclass(slots=True)
 class Trajectory:
     """Samples at equally spaced times, as far as the run got (n rows; every row finite).
 
-    Angles are unwrapped. A pitch without inertia is held at its initial value. Optional fields are None where
-    the scene does not ask for them or they do not exist in the model.
+    Angles are unwrapped. A pitch without inertia stays at its initial value. Further quantities are in `quantities` by
+    name; the built-in ones are attributes, too, None where the scene does not ask for them or the model lacks them.
+
+    Attributes
+    ----------
+    time : (n,) s
+    angles, rates : (n, 1 + blades) rad, rad/s: rotor, then the pitch of each blade
+    quantities : the other arrays by name; dimensions and units are declared in `solution.quantities`
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> run = Trajectory(np.zeros(1), np.zeros((1, 4)), np.zeros((1, 4)), work=np.zeros(1))
+    >>> run.work, run.tip
+    (array([0.]), None)
     """
 
-    time: Array  # (n,) s
-    angles: Array  # (n, 1 + blades) rad
-    rates: Array  # (n, 1 + blades) rad/s
-    tip: Array | None = None  # (n, blades, 3) m, base frame
-    kinetic_energy: Array | None = None  # (n,) J
-    potential_energy: Array | None = None  # (n,) J, gravity and springs
-    work: Array | None = None  # (n,) J, of the torque, less what the dampers took
-    constraint_error: Array | None = None  # (n,) m, largest position gap in any joint of a redundant chain
-    refined: Refined | None = None
-    uncertainty: Array | None = None  # (n,) rad, of a reference's angles
-    growth: Array | None = None  # (n,) how many times an error of the initial state has grown, of a reference
+    time: Array
+    angles: Array
+    rates: Array
+    quantities: dict[str, Array]
+
+    def __init__(self, time: Array, angles: Array, rates: Array, **quantities: Array | None) -> None:
+        self.time, self.angles, self.rates = time, angles, rates
+        self.quantities = {name: values for name, values in quantities.items() if values is not None}
+
+    def get(self, name: str) -> Array | None:
+        """An array by its quantity's name, time among them; None where the run does not have it."""
+        found: Array | None = self.__dict__.get(name) if name in _FIELDS else self.quantities.get(name)
+        return found
+
+    def replace(self, **changes: Array | None) -> Trajectory:
+        """A copy with other arrays; None removes one. The arrays themselves are shared."""
+        arrays: dict[str, Any] = {"time": self.time, "angles": self.angles, "rates": self.rates, **self.quantities}
+        return Trajectory(**{**arrays, **changes})
+
+    def __getattr__(self, name: str) -> Any:
+        # Not mypy's `Array | None`: an array that the scene asks for is there.
+        if name in NAMES:
+            return self.quantities.get(name)
+        raise AttributeError(f"a trajectory has no attribute {name!r}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in _FIELDS or name == "quantities":
+            object.__setattr__(self, name, value)
+        elif name not in NAMES:
+            raise AttributeError(f"a trajectory has no attribute {name!r}")
+        elif value is None:
+            self.quantities.pop(name, None)
+        else:
+            self.quantities[name] = value
+
+
+_FIELDS = ("time", "angles", "rates")
 
 
 @dataclass(slots=True)
 class Integration:
-    """One integration as the engine tells it. A word, not a verdict: see `outcome`.
+    """One integration as the engine reports it: a claim, which `judgement` checks against the samples.
 
     out_of_time: it was ended by its time limit; what it reached is kept.
     """
@@ -62,17 +91,3 @@ class Item:
     kind: str
     name: str
     detail: str = ""
-
-
-@dataclass(slots=True)
-class Solution:
-    """A method applied to a scene: samples, the engine's word, settings and times (s)."""
-
-    method: str
-    trajectory: Trajectory
-    integration: Integration
-    settings: dict[str, object]
-    setup_time_s: float
-    run_times_s: list[float]
-    output_time_s: float
-    metrics: dict[str, float | int | str] = field(default_factory=dict)

@@ -13,15 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.solution.status import RUN_STATUSES
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.layout import Quantity
+from rotor_mbs.store.layout import Column
 from rotor_mbs.store.read import open_results
 
 GROUP = "bench"
 GROWTH = "growth"
 
 # The statuses of a run, and one for a rung that no run was made of. Order gives the integer codes.
-STATUSES = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "left_out")
+STATUSES = (*RUN_STATUSES, "left_out")
 
 _SECONDS = {
     "run_time_s": "median run time of the integration alone",
@@ -33,16 +34,16 @@ _SECONDS = {
     "output_time_s": "reading out and computing the samples",
 }
 _QUANTITIES = {
-    "angle_error_max": Quantity(("setting",), "rad", "largest angle error up to the horizon"),
-    "angle_error_end": Quantity(("setting",), "rad", "angle error at the last sample"),
-    "tip_error_max": Quantity(("setting",), "m", "largest distance of a tip from the reference up to the horizon"),
-    "energy_drift_max": Quantity(("setting",), "1", "largest energy error over the run, of the energy scale"),
-    **{name: Quantity(("setting",), "s", text) for name, text in _SECONDS.items()},
-    "simulated_s": Quantity(("setting",), "s", "duration of the scene"),
-    "repeats": Quantity(("setting",), "1", "timed runs"),
-    "steps": Quantity(("setting",), "1", "steps of one run"),
-    "status": Quantity(("setting",), "1", "how the run ended, from its state"),
-    "false_success": Quantity(("setting",), "1", "1 where the engine reported success and the state says otherwise"),
+    "angle_error_max": Column(("setting",), "rad", "largest angle error up to the horizon"),
+    "angle_error_end": Column(("setting",), "rad", "angle error at the last sample"),
+    "tip_error_max": Column(("setting",), "m", "largest distance of a tip from the reference up to the horizon"),
+    "energy_drift_max": Column(("setting",), "1", "largest energy error over the run, of the energy scale"),
+    **{name: Column(("setting",), "s", text) for name, text in _SECONDS.items()},
+    "simulated_s": Column(("setting",), "s", "duration of the scene"),
+    "repeats": Column(("setting",), "1", "timed runs"),
+    "steps": Column(("setting",), "1", "steps of one run"),
+    "status": Column(("setting",), "1", "how the run ended, from its state"),
+    "false_success": Column(("setting",), "1", "1 where the engine reported success and the state says otherwise"),
 }
 _WHOLE = ("repeats", "steps", "status", "false_success")
 _UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
@@ -80,7 +81,7 @@ def write_curves(path: Path, curves: Sequence[Curve]) -> None:
 
 def _put(group: Any, curve: Curve) -> None:
     kind = str(curve.attributes["setting_kind"])
-    scale = Quantity(("setting",), _UNITS[kind], kind)
+    scale = Column(("setting",), _UNITS[kind], kind)
     hdf5.put_attributes(hdf5.put(group, "setting", curve.arrays["setting"], scale), {"kind": kind})
     for name, quantity in _QUANTITIES.items():
         if name in curve.arrays:

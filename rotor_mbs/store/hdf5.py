@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.solution.quantities import Quantity
 from rotor_mbs.store.chunk_index import ChunkIndex
-from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Quantity
+from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Column
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
@@ -102,7 +103,7 @@ def new_group(parent: Any, name: str) -> Any:
     return parent
 
 
-def put(group: Any, name: str, values: NDArray[Any], quantity: Quantity, *, compress: bool = False) -> Any:
+def put(group: Any, name: str, values: NDArray[Any], quantity: Column | Quantity, *, compress: bool = False) -> Any:
     """A dataset with unit and long name; its dimensions' scales must be there already. A scale is its own dimension."""
     options = {"compression": "gzip", "shuffle": True} if compress and values.ndim and values.size > 64 else {}
     dataset = group.create_dataset(name, data=values, **options)
@@ -165,7 +166,7 @@ def is_group(item: Any) -> bool:
     return isinstance(item, h5py.Group)
 
 
-def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Quantity) -> Any:
+def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity) -> Any:
     """A dataset whose numbers get their places in the file now, and are put there by others (see `places`).
 
     Chunked by its first dimension where it has others. Scales as in `put`.

@@ -13,22 +13,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.solution.status import RUN_STATUSES
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.layout import Quantity
+from rotor_mbs.store.layout import Column
 from rotor_mbs.store.read import open_results
 
 GROUP = "stability"
 # Codes of a rung's status, in this order; the last: no run was made of it.
-STATUSES = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "left_out")
+STATUSES = (*RUN_STATUSES, "left_out")
 
-_ROW = Quantity(("row",), "1", "number of the row")
+_ROW = Column(("row",), "1", "number of the row")
 _QUANTITIES = {
-    "step": Quantity(("row",), "s", "fixed step"),
-    "status": Quantity(("row",), "1", "how the run ended, from its state"),
-    "angle_error_max": Quantity(("row",), "rad", "largest angle error up to the horizon"),
-    "energy_drift_max": Quantity(("row",), "1", "largest energy error over the run, of the energy scale"),
-    "time": Quantity(("row",), "s", "time"),
-    "energy_drift_rms": Quantity(("row",), "1", "energy error over perturbed starts, root mean square, of its scale"),
+    "step": Column(("row",), "s", "fixed step"),
+    "status": Column(("row",), "1", "how the run ended, from its state"),
+    "angle_error_max": Column(("row",), "rad", "largest angle error up to the horizon"),
+    "energy_drift_max": Column(("row",), "1", "largest energy error over the run, of the energy scale"),
+    "time": Column(("row",), "s", "time"),
+    "energy_drift_rms": Column(("row",), "1", "energy error over perturbed starts, root mean square, of its scale"),
 }
 
 

@@ -81,11 +81,11 @@ def _put_datasets(file: Any, plan: Plan, count: int) -> dict[str, Any]:
         scale = hdf5.put(file, name, values, quantity)
         if name == "coordinate":
             hdf5.put_attributes(scale, {"labels": plan.scene.coordinate_labels})
-    quantities = {**sweep_layout.METRICS, **sweep_layout.trajectories(plan.outputs)}
+    columns = {**sweep_layout.METRICS, **sweep_layout.trajectories(plan.outputs)}
     datasets = {}
-    for name, quantity in quantities.items():
+    for name, column in columns.items():
         kind = plan.row[name]
-        datasets[name] = hdf5.put_empty(file, name, (count, *kind.shape), kind.base, quantity)
+        datasets[name] = hdf5.put_empty(file, name, (count, *kind.shape), kind.base, column)
     _put_flags(datasets["status"], sweep_layout.SWEEP_STATUSES)
     return datasets
 

@@ -14,60 +14,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import STATUSES
-from rotor_mbs.store.layout import QUANTITIES, SCALES, Quantity
+from rotor_mbs.solution import quantities
+from rotor_mbs.solution.quantities import SCALES, Quantity
+from rotor_mbs.solution.status import RUN_STATUSES
+from rotor_mbs.store.layout import Column
 from rotor_mbs.store.sweep_rows import MESSAGE, Rows
 
-SWEEP_STATUSES = (*STATUSES, "worker_died")
+SWEEP_STATUSES = (*RUN_STATUSES, "worker_died")
 MESSAGE_BYTES = 200
 
 METRICS = {
-    "status": Quantity(("run",), "1", "how the run ended"),
-    "steps": Quantity(("run",), "1", "integration steps, -1 where not known"),
-    "rhs_evaluations": Quantity(("run",), "1", "evaluations of the right-hand side, -1 where not known"),
-    "time_reached": Quantity(("run",), "s", "time of the last finite sample"),
-    "energy_drift_max": Quantity(("run",), "1", "largest energy error of the run, of its energy scale"),
-    "rotor_angle_max": Quantity(("run",), "rad", "largest rotor angle, either way"),
-    "rotor_rate_max": Quantity(("run",), "rad/s", "largest rotor rate, either way"),
-    "pitch_max": Quantity(("run",), "rad", "largest pitch angle of any blade, either way"),
+    "status": Column(("run",), "1", "how the run ended"),
+    "steps": Column(("run",), "1", "integration steps, -1 where not known"),
+    "rhs_evaluations": Column(("run",), "1", "evaluations of the right-hand side, -1 where not known"),
+    "time_reached": Column(("run",), "s", "time of the last finite sample"),
+    "energy_drift_max": Column(("run",), "1", "largest energy error of the run, of its energy scale"),
+    "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, either way"),
+    "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate, either way"),
+    "pitch_max": Column(("run",), "rad", "largest pitch angle of any blade, either way"),
 }
 METRICS_AND_MESSAGE = (*METRICS, MESSAGE)
 _INTEGERS = {"status": "i1", "steps": "<i8", "rhs_evaluations": "<i8"}
 
 COLUMNS = {
-    "run": Quantity(("run",), "1", "run number, from 0"),
-    "parameter": Quantity(("parameter",), "1", "number of the parameter; its key in the labels"),
-    "parameters": Quantity(("run", "parameter"), "1", "the varied numbers; keys and units in the attributes"),
-    "variant": Quantity(("run",), "1", "row of the design, the same for every method"),
-    "method": Quantity(("run",), "1", "by which method"),
-    "split": Quantity(("run",), "1", "for training or for validation"),
-}
-
-_OF_OUTPUT = {
-    "angles": ("angles",),
-    "rates": ("rates",),
-    "tip": ("tip",),
-    "energy": ("kinetic_energy", "potential_energy", "work", "energy_error"),
+    "run": Column(("run",), "1", "run number, from 0"),
+    "parameter": Column(("parameter",), "1", "number of the parameter; its key in the labels"),
+    "parameters": Column(("run", "parameter"), "1", "the varied numbers; keys and units in the attributes"),
+    "variant": Column(("run",), "1", "row of the design, the same for every method"),
+    "method": Column(("run",), "1", "by which method"),
+    "split": Column(("run",), "1", "for training or for validation"),
 }
 
 
-def trajectories(outputs: Sequence[str]) -> dict[str, Quantity]:
+def trajectories(outputs: Sequence[str]) -> dict[str, Column]:
     """The datasets that `outputs` ask for, with a run in front of their dimensions."""
-    names = [name for output in outputs for name in _OF_OUTPUT[output]]
-    return {name: QUANTITIES[name]._replace(dimensions=("run", *QUANTITIES[name].dimensions)) for name in names}
+    asked = [one for one in quantities.quantities(outputs) if one.output and one.required]
+    return {one.name: Column(("run", *one.dimensions), one.units, one.long_name) for one in asked}
 
 
 def scales(scene: Scene, outputs: Sequence[str]) -> dict[str, tuple[np.ndarray, Quantity]]:
     """The scales that the trajectories need, with their values."""
-    blades = len(scene.blades)
-    values = {
-        "time": np.linspace(0.0, scene.duration, scene.samples),
-        "coordinate": np.arange(1 + blades),
-        "blade": np.arange(1, 1 + blades),
-        "axis": np.arange(3),
-    }
-    used = {name for quantity in trajectories(outputs).values() for name in quantity.dimensions}
-    return {name: (value, SCALES[name]) for name, value in values.items() if name in used}
+    used = {name for column in trajectories(outputs).values() for name in column.dimensions}
+    return {name: (value, SCALES[name]) for name, value in quantities.scale_values(scene).items() if name in used}
 
 
 def row_type(scene: Scene, outputs: Sequence[str], precision: str) -> np.dtype[np.void]:

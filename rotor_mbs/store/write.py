@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import energy_error
-from rotor_mbs.solution.record import Solution, Trajectory
-from rotor_mbs.store import hdf5, layout
+from rotor_mbs.solution.quantities import SCALES, Quantity, arrays, quantities, scale_values
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store import hdf5
 
 
-def write_run(path: Path, scene: Scene, scene_hash: str, run: Solution, attributes: Mapping[str, object]) -> None:
+def write_run(path: Path, scene_hash: str, run: Solution, attributes: Mapping[str, object]) -> None:
     """One run of one scene as a results file of its own, atomically.
 
-    attributes: what is known of the run beyond its record (status, metrics, hash). Raises StoreError.
+    attributes: what else is known of the run (status, metrics, hash). Raises StoreError.
     """
     with hdf5.new_file(path) as file:
+        scene = run.scene
         _put_scene(file, scene, scene_hash)
         group = hdf5.new_group(file, f"{scene.name}/{run.method}")
-        put_datasets(group, _with_scales(scene, datasets(scene, run.trajectory)), list(scene.coordinate_labels))
+        put_datasets(group, _datasets(run), quantities(scene.outputs), list(scene.coordinate_labels))
         hdf5.put_attributes(group, {**_facts(run), **attributes})
 
 
@@ -45,27 +46,11 @@ def _facts(run: Solution) -> dict[str, object]:
     return facts
 
 
-def datasets(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
-    """What of a trajectory the scene asks to have stored, by dataset name."""
-    found: dict[str, Any] = {"time": trajectory.time}
-    asked = {"angles": trajectory.angles, "rates": trajectory.rates, "tip": trajectory.tip}
-    found |= {name: values for name, values in asked.items() if scene.wants(name)}
-    found |= {
-        "kinetic_energy": trajectory.kinetic_energy,
-        "potential_energy": trajectory.potential_energy,
-        "work": trajectory.work,
-        "energy_error": energy_error(trajectory),
-        "constraint_error": trajectory.constraint_error,
-        "angle_uncertainty": trajectory.uncertainty,
-        "error_growth": trajectory.growth,
-    }
-    if trajectory.refined is not None:
-        found["refined_time"] = trajectory.refined.time
-        if scene.wants("angles"):
-            found["refined_angles"] = trajectory.refined.angles
-        if scene.wants("rates"):
-            found["refined_rates"] = trajectory.refined.rates
-    return {name: values for name, values in found.items() if values is not None}
+def _datasets(run: Solution) -> dict[str, Any]:
+    """What of a run its scene asks to have stored, and the scales, by dataset name."""
+    trajectory = run.trajectory
+    scales = {**scale_values(run.scene), "time": trajectory.time, "refined_time": trajectory.get("refined_time")}
+    return {**scales, **arrays(run.scene, trajectory)}
 
 
 def _put_scene(file: Any, scene: Scene, scene_hash: str) -> None:
@@ -80,22 +65,16 @@ def _put_scene(file: Any, scene: Scene, scene_hash: str) -> None:
     hdf5.put_attributes(group, facts)
 
 
-def _with_scales(scene: Scene, arrays: Mapping[str, Any]) -> dict[str, Any]:
-    blades = len(scene.blades)
-    ranges = {"coordinate": np.arange(1 + blades), "blade": np.arange(1, 1 + blades), "axis": np.arange(3)}
-    return {**ranges, **arrays}
-
-
-def put_datasets(group: Any, arrays: Mapping[str, Any], labels: list[str]) -> None:
-    """The scales that the data use, then the data."""
-    data = {name: values for name, values in arrays.items() if name in layout.QUANTITIES}
-    used = {dimension for name in data for dimension in layout.QUANTITIES[name].dimensions} | {"time"}
-    for name, quantity in layout.SCALES.items():
-        if name in used and name in arrays:
-            dataset = hdf5.put(group, name, arrays[name], quantity)
+def put_datasets(group: Any, named: Mapping[str, Any], known: Sequence[Quantity], labels: Sequence[str]) -> None:
+    """The scales that the data use, then the data: those arrays of `named` that `known` describes."""
+    data = [quantity for quantity in known if quantity.name in named]
+    used = {"time"}.union(*(quantity.dimensions for quantity in data))
+    for name, scale in SCALES.items():
+        if name in used:
+            dataset = hdf5.put(group, name, named[name], scale)
             if name == "coordinate":
                 hdf5.put_attributes(dataset, {"labels": labels})
-    for name, values in data.items():
-        hdf5.put(group, name, values, layout.QUANTITIES[name], compress=name.startswith("refined_"))
-    if "angles" in data:
+    for quantity in data:
+        hdf5.put(group, quantity.name, named[quantity.name], quantity, compress=not quantity.is_over_time)
+    if "angles" in group:
         hdf5.put_attributes(group, {"NX_class": "NXdata", "signal": "angles", "axes": ["time", "coordinate"]})

@@ -81,9 +81,9 @@ def measure(plan: Plan) -> list[Curve]:
 
 def _uncertainty(reference: Trajectory) -> float:
     """rad: the reference's own, over the samples that errors are taken at."""
-    if reference.uncertainty is None:
+    if reference.angle_uncertainty is None:
         return 0.0
-    return float(reference.uncertainty[: max(horizon_samples(reference), 1)].max())
+    return float(reference.angle_uncertainty[: max(horizon_samples(reference), 1)].max())
 
 
 def bench_hash(scene: Scene, ladder: Ladder, repeats: int, budget_s: float) -> str:

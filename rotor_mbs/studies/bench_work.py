@@ -17,7 +17,8 @@ from rotor_mbs.methods.catalogue import find_method, load_engine
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import Metrics
-from rotor_mbs.solution.record import Array, Integration, Solution, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.studies.work import Task, load_reference
 
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
@@ -80,8 +81,7 @@ def thinned(scene: Scene) -> tuple[Scene, int]:
 
 def thinned_reference(reference: Trajectory, k: int) -> Trajectory:
     """Every k-th sample of everything that a comparison uses."""
-    names = ("tip", "kinetic_energy", "potential_energy", "work", "uncertainty", "growth")
-    arrays = {name: values[::k] for name in names if (values := getattr(reference, name)) is not None}
+    arrays = {name: values[::k] for name, values in reference.quantities.items()}
     return Trajectory(reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays)
 
 
@@ -136,7 +136,7 @@ class TimingProcess:
         output = self._clock() - start
         integration = self._last[point]
         scene, reference = self._scene_of(point)
-        run = Solution(point.method, trajectory, integration, dict(point.settings), 0.0, [0.0], output)
+        run = Solution(scene, point.method, trajectory, integration, dict(point.settings), output_time_s=output)
         with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
             verdict = judge(scene, run, reference)
         status, message = _status(verdict.status, verdict.message, verdict.metrics)

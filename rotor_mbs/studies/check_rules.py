@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.judgement import judge, rotor_inertia_shares
 from rotor_mbs.solution.metrics import compare
-from rotor_mbs.solution.record import Array, Integration, Solution, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
 
 # The engine's word, as the arguments of `Integration`: success, message, time reached, steps, evaluations, out of time.
 _DONE, _FAILED = (True,), (False, "gave up")
@@ -53,7 +54,7 @@ class Case:
 
     def faults(self) -> str:
         """What the judgement says against what is known; "" where it is right."""
-        run = Solution(self.method, self.trajectory, Integration(*self.engine), {}, 0.0, [0.0], 0.0)
+        run = Solution(_SCENE, self.method, self.trajectory, Integration(*self.engine))
         with np.errstate(all="ignore"):
             found = judge(_SCENE, run, self.reference)
         if found.status != self.status:
@@ -71,7 +72,7 @@ def cases(bounds: Bounds, methods: tuple[str, ...]) -> list[Case]:
 
 def metrics_off() -> Iterator[tuple[str, float]]:
     """(metric, relative error) of what is stored beside a status, for a run off by known amounts."""
-    exact = replace(_moving(), growth=_growth(2e5))  # the horizon is sample 3
+    exact = _moving().replace(error_growth=_growth(2e5))  # the horizon is sample 3
     exact.tip = np.zeros((11, 3, 3))
     wrong = _with_error(_with_error(_moving(), 0.1, 2), 0.3, 10)
     wrong.tip = np.zeros((11, 3, 3))
@@ -88,9 +89,9 @@ def metrics_off() -> Iterator[tuple[str, float]]:
     for name, value in known.items():
         yield name, abs(whole.get(name, math.nan) / value - 1.0)
     errors = {"angle_error_max", "angle_error_per_growth", "tip_error_max"}
-    at_once = replace(exact, growth=np.where(np.arange(11) < 1, 1.0, 2e5))  # nothing but the start before its horizon
+    at_once = exact.replace(error_growth=np.where(np.arange(11) < 1, 1.0, 2e5))  # the start alone is before its horizon
     for name, run, reference, expected in (
-        ("stopped early", replace(_cut(wrong, 2), tip=wrong.tip[:2]), exact, errors | {"angle_error_whole"}),
+        ("stopped early", _cut(wrong, 2).replace(tip=wrong.tip[:2]), exact, errors | {"angle_error_whole"}),
         ("gone on past its reference", wrong, _cut(exact, 5), errors - {"tip_error_max"} | {"angle_error_whole"}),
         ("stopped at the start", _cut(wrong, 1), exact, set()),
         ("past the horizon at once", wrong, at_once, {"angle_error_whole", "angle_error_end"}),
@@ -138,13 +139,13 @@ def _with_drift(trajectory: Trajectory, share: float) -> Trajectory:
     assert trajectory.kinetic_energy is not None
     energy = trajectory.kinetic_energy.copy()
     energy[5] += share * _ENERGY_J
-    return replace(trajectory, kinetic_energy=energy)
+    return trajectory.replace(kinetic_energy=energy)
 
 
 def _with_error(trajectory: Trajectory, error: float, row: int = 5) -> Trajectory:
     angles = trajectory.angles.copy()
     angles[row, 0] += error
-    return replace(trajectory, angles=angles)
+    return trajectory.replace(angles=angles)
 
 
 def _at_the_bounds(method: str, bounds: Bounds) -> Iterator[Case]:
@@ -157,18 +158,18 @@ def _at_the_bounds(method: str, bounds: Bounds) -> Iterator[Case]:
         yield Case(f"angle error of {side:g} bounds", method, status, wrong, reference=exact, is_false_success=asked)
         if method.startswith("exudyn_chain"):
             gap = np.full(11, side * bounds.of("gap", method).value * math.hypot(0.1, 10.0))
-            opened = replace(exact, constraint_error=gap)
+            opened = exact.replace(constraint_error=gap)
             yield Case(f"gap of {side:g} bounds", method, status, opened, is_false_success=asked)
     if not method.startswith("exudyn_chain"):
         gap = np.full(11, 1e-15)
-        yield Case("a gap without a joint", method, "inaccurate", replace(exact, constraint_error=gap))
+        yield Case("a gap without a joint", method, "inaccurate", exact.replace(constraint_error=gap))
 
 
 def _broken_off() -> Iterator[Case]:
     exact, method = _moving(), "lagrange/taylor"
     nothing = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))  # with no sample there are no energies
     yield Case("complete, the engine content", method, "ok", exact)
-    silent = replace(exact, kinetic_energy=None, potential_energy=None, work=None)
+    silent = exact.replace(kinetic_energy=None, potential_energy=None, work=None)
     yield Case("complete, energies not asked for", method, "ok", silent)
     yield Case("complete, the engine not content", method, "solver_failed", exact, _FAILED)
     short = _cut(exact, 10)
@@ -246,16 +247,16 @@ def _carried(bounds: Bounds) -> Iterator[Case]:
     method = "lagrange/taylor"
     allowed = bounds.of("agreement", method).value
     for growth, angle, factor in ((100.0, 0.0, 100.0), (1.0, 7.0, 7.0), (0.01, 0.0, 1.0)):
-        exact = replace(_moving(), growth=_growth(growth))
+        exact = _moving().replace(error_growth=_growth(growth))
         exact.angles[:, 1] = angle
         for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "inaccurate")):
             name = f"error of {side:g} bounds at growth {growth:g}, angle {angle:g}"
             yield Case(name, method, status, _with_error(exact, side * allowed * factor), reference=exact)
     for growth, status in ((0.9e5, "inaccurate"), (1.1e5, "ok")):
-        exact = replace(_moving(), growth=_growth(growth))
+        exact = _moving().replace(error_growth=_growth(growth))
         yield Case(f"error at growth {growth:g}", method, status, _with_error(exact, 0.1, 8), reference=exact)
-    early = replace(_moving(), growth=_growth(1.0))
-    early.growth[2] = 200.0  # type: ignore[index]
+    early = _moving().replace(error_growth=_growth(1.0))
+    early.error_growth[2] = 200.0
     wrong = _with_error(early, 100.0 * allowed, 8)
     yield Case("error after a growth that has gone back", method, "ok", wrong, reference=early)
 

@@ -144,12 +144,12 @@ def _reference(probe: Probe) -> list[Measured]:
     frozen = _frozen(probe.scene)
     found = solve(REFERENCE, find_method(REFERENCE), scene, {}).trajectory
     look = "the closed form, its coefficients, or a touched file under reference/"
-    if len(found.time) != scene.samples or found.uncertainty is None or found.growth is None:
+    if len(found.time) != scene.samples or found.angle_uncertainty is None or found.error_growth is None:
         return [Measured("reference", probe.scene, REFERENCE, "recomputed", math.nan, "rad", look)]
     off = np.abs(found.angles - frozen.angles).max(axis=1)
-    beyond = float(np.maximum(off - 10.0 * found.uncertainty, 0.0).max())
-    if found.uncertainty.max() > 1e-12:
-        worst = found.uncertainty.max()
+    beyond = float(np.maximum(off - 10.0 * found.angle_uncertainty, 0.0).max())
+    if found.angle_uncertainty.max() > 1e-12:
+        worst = found.angle_uncertainty.max()
         look += f"; a stand-in in double precision, uncertain to {worst:.0e} rad, which is allowed for"
     growth = np.abs(np.log(running_growth(found) / running_growth(frozen)))
     until = horizon_samples(frozen)
@@ -226,7 +226,7 @@ def _frozen(name: str) -> Trajectory:
             if stored is not None:
                 parts = ("time", "angles", "rates", "error_growth")
                 time_, angles, rates, growth = (stored.array(part) for part in parts)
-                return Trajectory(time_, angles, rates, growth=growth)
+                return Trajectory(time_, angles, rates, error_growth=growth)
     raise StoreError(f"{reference_folder()}: no frozen reference of {name}; `rotor-mbs reference` makes one")
 
 

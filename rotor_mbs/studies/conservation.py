@@ -12,7 +12,8 @@ from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import energy_error, energy_scale
+from rotor_mbs.solution.metrics import energy_scale
+from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.store.stability import Record
 

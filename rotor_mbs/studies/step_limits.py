@@ -13,7 +13,7 @@ from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import Verdict, judge
+from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.stability import STATUSES, Record
@@ -66,7 +66,7 @@ def _ladder(task: StepTask) -> Record:
         known = stored is not None and len(stored.array("time")) > 0
         reference = reference_trajectory(task.scene, stored) if stored is not None and known else None
     interval = task.scene.duration / (task.scene.samples - 1)
-    rows: list[tuple[float, Verdict]] = []
+    rows: list[tuple[float, Judgement]] = []
     expected, step = 0.0, interval
     while expected <= _LONGEST_RUN_S and task.scene.duration <= _MOST_STEPS * step:
         verdict, seconds = _judged(task, {"step": step}, reference)
@@ -105,13 +105,13 @@ def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | No
     return float(steps[last + 1] * (target / errors[last + 1]) ** (1.0 / slope))
 
 
-def _judged(task: StepTask, settings: Mapping[str, object], reference: Trajectory | None) -> tuple[Verdict, float]:
+def _judged(task: StepTask, settings: Mapping[str, object], reference: Trajectory | None) -> tuple[Judgement, float]:
     """The verdict and the run time in s; a run over twice the longest one ends itself."""
     try:
         with time_limit(2.0 * _LONGEST_RUN_S):
             run = solve(task.method, find_method(task.method), task.scene, settings)
     except OutOfTimeError as exc:
-        return Verdict("timed_out", str(exc), False, {}), 2.0 * _LONGEST_RUN_S
+        return Judgement("timed_out", str(exc), False, {}), 2.0 * _LONGEST_RUN_S
     return judge(task.scene, run, reference), run.run_times_s[0]
 
 

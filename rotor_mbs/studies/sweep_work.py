@@ -19,8 +19,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.variants import VariantFaultError, Variants
 from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_errors, largest
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.metrics import energy_error
-from rotor_mbs.solution.record import Array, Integration, Solution, Trajectory
+from rotor_mbs.solution.record import Array, Integration
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.sweep_layout import MESSAGE_BYTES, METRICS_AND_MESSAGE, SWEEP_STATUSES, empty_rows
 from rotor_mbs.store.sweep_rows import MESSAGE, Places, Receipt, Rows
 
@@ -120,10 +120,8 @@ def _put_run(rows: Rows, i: int, scene: Scene, run: Solution | str) -> None:
     _put_verdict(rows, i, scene, run)
     trajectory = run.trajectory
     n = len(trajectory.time)
-    energy = energy_error(trajectory)
-    for name in rows:
-        values = energy if name == "energy_error" else getattr(trajectory, name, None)
-        if values is not None:
+    for name, values in run.quantities.items():
+        if name in rows:
             rows[name][i, :n] = values
     _put_extremes(rows, slice(i, i + 1), trajectory.angles[None], trajectory.rates[None])
     _put_words(rows, i, run.integration, float(trajectory.time[-1]) if n else 0.0)
@@ -171,9 +169,7 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for i, word in enumerate(block.words):
         _put_words(rows, i, word, word.time_reached)
     for i in np.flatnonzero(~ok).tolist():
-        _put_verdict(rows, i, scenes[i], _as_run(chunk, block.trajectory(i), block.words[i], settings))
+        _put_verdict(
+            rows, i, scenes[i], Solution(scenes[i], chunk.method, block.trajectory(i), block.words[i], settings)
+        )
     return rows
-
-
-def _as_run(chunk: Chunk, trajectory: Trajectory, word: Integration, settings: Mapping[str, object]) -> Solution:
-    return Solution(chunk.method, trajectory, word, dict(settings), 0.0, [0.0], 0.0)

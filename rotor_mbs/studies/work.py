@@ -13,7 +13,8 @@ from rotor_mbs.methods.catalogue import REFERENCE, find_method
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.record import Integration, Solution, Trajectory
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import StoredRun, open_results
 from rotor_mbs.store.write import write_run
 
@@ -75,7 +76,7 @@ def perform(task: Task) -> Summary:
         "run_hash": task.run_hash,
         **verdict.metrics,
     }
-    write_run(task.piece, task.scene, task.scene_hash, run, attributes)
+    write_run(task.piece, task.scene_hash, run, attributes)
     return Summary(verdict.status, verdict.message, float(np.median(run.run_times_s)))
 
 
@@ -83,9 +84,9 @@ def record_failure(task: Task, status: str, message: str) -> Summary:
     """Stores a run that left no samples: its process was ended, or died."""
     columns = 1 + len(task.scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
-    run = Solution(task.method, trajectory, Integration(False, message), dict(task.settings), 0.0, [0.0], 0.0)
+    run = Solution(task.scene, task.method, trajectory, Integration(False, message), dict(task.settings))
     attributes = {"status": status, "message": message, "false_success": False, "run_hash": task.run_hash}
-    write_run(task.piece, task.scene, task.scene_hash, run, attributes)
+    write_run(task.piece, task.scene_hash, run, attributes)
     return Summary(status, message, 0.0)
 
 
@@ -110,8 +111,8 @@ def reference_trajectory(scene: Scene, stored: StoredRun) -> Trajectory:
     if "work" in stored:
         states.append(stored.array("work")[:, None])
     result = samples.trajectory(scene, stored.array("time"), np.hstack(states), tuple(moving))
-    result.uncertainty = stored.array("angle_uncertainty")
-    result.growth = stored.array("error_growth") if "error_growth" in stored else None
+    result.angle_uncertainty = stored.array("angle_uncertainty")
+    result.error_growth = stored.array("error_growth") if "error_growth" in stored else None
     return result
 
 
@@ -125,6 +126,7 @@ def _thawed(task: Task, frozen: Path) -> tuple[Solution, dict[str, object]]:
         trajectory = reference_trajectory(task.scene, stored)
         complete = len(trajectory.time) == task.scene.samples
         run = Solution(
+            task.scene,
             REFERENCE,
             trajectory,
             Integration(

@@ -16,7 +16,8 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples, running_growth
-from rotor_mbs.solution.record import Solution, Trajectory
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.solution import Solution
 
 BEST = ("lagrange/taylor", "exudyn_tree/rk67")
 BOUND = {"lagrange/taylor": 1e-10, "exudyn_tree/rk67": 1e-9}  # rad, up to the horizon, on every scene
@@ -38,7 +39,7 @@ def cut(name: str, growth: float) -> tuple[Scene, Trajectory]:
     """The scene, and its reference, as far as an error has grown less than `growth`-fold."""
     whole, scene = reference(name), paper(name)
     rows = max(int((running_growth(whole) < growth).sum()), 2)
-    parts = {part: getattr(whole, part)[:rows] for part in ("time", "angles", "rates", "tip", "growth")}
+    parts = {part: getattr(whole, part)[:rows] for part in ("time", "angles", "rates", "tip", "error_growth")}
     return replace(scene, duration=float(whole.time[rows - 1]), samples=rows), Trajectory(**parts)
 
 

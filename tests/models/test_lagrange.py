@@ -18,7 +18,8 @@ from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.metrics import energy_error, energy_scale
+from rotor_mbs.solution.metrics import energy_scale
+from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.record import Trajectory
 
 heyoka = pytest.importorskip("heyoka")
@@ -208,7 +209,7 @@ def test_blades_may_change_places() -> None:
 def test_error_growth_is_that_of_neighbouring_runs() -> None:
     """The largest singular value bounds what any perturbation does, and some direction comes near it."""
     scene = paper("fig11", duration=3.0, samples=31)
-    growth = run(scene, "reference").growth
+    growth = run(scene, "reference").error_growth
     assert growth is not None
     base = run(scene)
     largest = np.zeros(31)
@@ -231,12 +232,12 @@ def test_the_stand_in_reference_says_what_it_is_worth() -> None:
     stand_in = StandInReference(scene)
     stand_in.integrate()
     found, true = stand_in.observe(), run(scene, "reference")
-    assert found.uncertainty is not None
-    assert found.growth is not None
-    assert true.growth is not None
+    assert found.angle_uncertainty is not None
+    assert found.error_growth is not None
+    assert true.error_growth is not None
     error = np.abs(found.angles - true.angles).max(axis=1)
-    assert error.max() <= 10 * found.uncertainty.max()
-    first = [int(np.argmax(np.maximum.accumulate(g) >= 1e5)) for g in (found.growth, true.growth)]
+    assert error.max() <= 10 * found.angle_uncertainty.max()
+    first = [int(np.argmax(np.maximum.accumulate(g) >= 1e5)) for g in (found.error_growth, true.error_growth)]
     assert abs(first[0] - first[1]) <= 2  # the same horizon to two samples
 
 

@@ -56,8 +56,8 @@ def run(given, method="printed/ode45", **settings):
 
 def rotor(result):
     """Angle and rate of the rotor at ode45's own output points, from which a figure's extremes are read."""
-    refined = result.trajectory.refined
-    return refined.angles[:, 0], refined.rates[:, 0]
+    trajectory = result.trajectory
+    return trajectory.refined_angles[:, 0], trajectory.refined_rates[:, 0]
 
 
 def drift(trajectory):
@@ -74,7 +74,7 @@ def test_figure_11_crest():
     assert result.integration.success
     angle, _ = rotor(result)
     assert round(angle.max(), 4) == 2.7315
-    assert result.trajectory.refined.time[angle.argmax()] == pytest.approx(7.26, abs=0.01)
+    assert result.trajectory.refined_time[angle.argmax()] == pytest.approx(7.26, abs=0.01)
 
 
 def test_figure_5_numbers():
@@ -228,7 +228,7 @@ def test_a_singularity_ends_the_run_with_what_was_reached():
     assert "Failure at t=" in result.integration.message
     assert 11.0 < result.integration.time_reached < 14.0
     assert result.trajectory.time[-1] <= result.integration.time_reached
-    assert abs(result.trajectory.refined.angles[-1, 1]) == pytest.approx(PI / 2, abs=1e-3)
+    assert abs(result.trajectory.refined_angles[-1, 1]) == pytest.approx(PI / 2, abs=1e-3)
     for part in (result.trajectory.angles, result.trajectory.rates, result.trajectory.tip):
         assert np.all(np.isfinite(part))
         assert len(part) == len(result.trajectory.time)

@@ -15,7 +15,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_errors
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.record import Solution
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.sweep_layout import SWEEP_STATUSES, row_type
 from rotor_mbs.studies.sweep_work import Chunk, perform, rows_of
 
@@ -214,7 +214,7 @@ def test_every_row_has_the_status_that_the_run_alone_would_have() -> None:
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
     well = clearly_ok(scenes, "lagrange/taylor", block.words, block.samples, drifts)
     for i, scene in enumerate(scenes):
-        run = Solution("lagrange/taylor", block.trajectory(i), block.words[i], {}, 0.0, [0.0], 0.0)
+        run = Solution(scene, "lagrange/taylor", block.trajectory(i), block.words[i])
         verdict = judge(scene, run, None)
         assert well[i] == (verdict.status == "ok")
         assert drifts[i] == pytest.approx(verdict.metrics["energy_drift_max"], rel=1e-12)

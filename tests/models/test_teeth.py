@@ -17,7 +17,7 @@ from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import Verdict, judge
+from rotor_mbs.solution.judgement import Judgement, judge
 
 FAULTS = {
     "Coriolis term dropped": ("2.0 * (spin * rate) + ", ""),
@@ -30,11 +30,11 @@ FAULTS = {
 }
 
 
-def judged(scene: Scene, name: str = "fig09", method: str = "lagrange/dop853") -> Verdict:
+def judged(scene: Scene, name: str = "fig09", method: str = "lagrange/dop853") -> Judgement:
     """A short piece of a scene of the paper, where a double still has all its digits, against the frozen reference."""
     exact = reference(f"paper/{name}")
     rows = 151
-    parts = {part: getattr(exact, part)[:rows] for part in ("time", "angles", "rates", "tip", "growth")}
+    parts = {part: getattr(exact, part)[:rows] for part in ("time", "angles", "rates", "tip", "error_growth")}
     short = replace(scene, duration=float(exact.time[rows - 1]), samples=rows)
     return judge(short, solve(method, find_method(method), short, {}), type(exact)(**parts))
 

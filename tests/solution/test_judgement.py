@@ -23,8 +23,9 @@ from rotor_mbs.models.exudyn.timetable import RotorTorque
 from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution import judgement
-from rotor_mbs.solution.judgement import Verdict, energy_conditioning, is_held, judge
-from rotor_mbs.solution.record import Integration, Solution, Trajectory
+from rotor_mbs.solution.judgement import Judgement, energy_conditioning, is_held, judge
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
 
 BOUNDS = {
     "lagrange/taylor": (1e-12, 1e-11),
@@ -49,7 +50,7 @@ def made(
     time = np.linspace(0.0, 1.0, 11)
     angles = np.tile(one.initial_angles, (11, 1))
     rates = np.zeros_like(angles)
-    exact = Trajectory(time, angles, rates, growth=np.ones(11))
+    exact = Trajectory(time, angles, rates, error_growth=np.ones(11))
     potential = np.zeros(11)
     weights = sum(b.mass * one.gravity * float(np.linalg.norm(b.centre_of_mass)) for b in one.blades)
     potential[5] = energy * weights
@@ -57,8 +58,9 @@ def made(
     off[:, 0] += angle
     arm = float(np.linalg.norm(one.blades[0].centre_of_mass))
     gaps = None if gap is None else np.full(11, gap * arm)
-    trajectory = Trajectory(time, off, rates, None, np.zeros(11), potential, np.zeros(11), constraint_error=gaps)
-    return one, Solution(method, trajectory, Integration(True, "", 1.0), {}, 0.0, [0.0], 0.0), exact
+    energies = {"kinetic_energy": np.zeros(11), "potential_energy": potential, "work": np.zeros(11)}
+    trajectory = Trajectory(time, off, rates, **energies, constraint_error=gaps)
+    return one, Solution(one, method, trajectory, Integration(True, "", 1.0)), exact
 
 
 def test_every_held_method_has_its_bounds_here() -> None:
@@ -97,12 +99,12 @@ def test_an_unstable_step_is_caught() -> None:
     assert verdict.false_success
 
 
-def wrong(one: Scene, method: str, exact: Trajectory | None = None, **settings: object) -> Verdict:
+def wrong(one: Scene, method: str, exact: Trajectory | None = None, **settings: object) -> Judgement:
     """The engine reports success; the judgement must not."""
     return caught(one, solve(method, find_method(method), one, settings), exact)
 
 
-def caught(one: Scene, found: Solution, exact: Trajectory | None = None) -> Verdict:
+def caught(one: Scene, found: Solution, exact: Trajectory | None = None) -> Judgement:
     assert found.integration.success
     verdict = judge(one, found, exact)
     assert verdict.status != "ok"
@@ -165,7 +167,7 @@ def test_a_body_that_falls_free_of_its_joints() -> None:
     parts = chain.parts(one, torque, "rotation_vector")
     solver = MultibodySolver(one, parts, torque, scheme, readings.chain_trajectory, rows_between=True)
     integration = solver.integrate()
-    found = Solution("exudyn_chain/newmark_index2", solver.observe(), integration, {}, 0.0, [0.0], 0.0)
+    found = Solution(one, "exudyn_chain/newmark_index2", solver.observe(), integration)
     verdict = caught(one, found)
     assert verdict.metrics["energy_drift_max"] <= 1e-12  # it is the open joint alone that tells
     assert verdict.metrics["constraint_error_max"] == pytest.approx(0.5 * one.gravity, rel=1e-9)

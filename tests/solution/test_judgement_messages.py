@@ -13,7 +13,8 @@ from rotor_mbs.models.exudyn import tree
 from rotor_mbs.models.exudyn.timetable import RotorTorque
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.record import Integration, Solution, Trajectory
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
 
 AT_REST = paper("fig05", duration=1.0, samples=11)
 
@@ -33,7 +34,7 @@ def test_a_run_that_broke_off_is_told_with_place_and_reason(
     time = np.linspace(0.0, 1.0, 11)[:rows]
     angles = np.tile(AT_REST.initial_angles, (rows, 1))
     trajectory = Trajectory(time, angles, np.zeros_like(angles))
-    run = Solution("lagrange/dop853", trajectory, Integration(success, said), {}, 0.0, [0.0], 0.0)
+    run = Solution(AT_REST, "lagrange/dop853", trajectory, Integration(success, said))
     message = judge(AT_REST, run, None).message
     assert all(words in message for words in told), message
 

@@ -15,7 +15,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.record import Solution
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.write import write_run
@@ -29,7 +29,7 @@ def made(scene: Scene = SCENE, method: str = "lagrange/dop853") -> Solution:
 
 def stored(path: Path, scene: Scene = SCENE, method: str = "lagrange/dop853", **attributes: object) -> Solution:
     run = made(scene, method)
-    write_run(path, scene, scene_hash(scene), run, {"status": "ok", "message": "", **attributes})
+    write_run(path, scene_hash(scene), run, {"status": "ok", "message": "", **attributes})
     return run
 
 

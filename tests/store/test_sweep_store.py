@@ -21,7 +21,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.chunk_index import ChunkIndex
 from rotor_mbs.store.journal import Journal
-from rotor_mbs.store.layout import Quantity
+from rotor_mbs.store.layout import Column
 from rotor_mbs.store.lock import FolderLock
 from rotor_mbs.store.sweep_layout import Plan, empty_rows
 from rotor_mbs.store.sweep_memory import SparseFile
@@ -346,7 +346,7 @@ def test_places_read_from_the_index_are_those_that_the_library_tells(rows: int) 
     memory = SparseFile()
     file = hdf5.new_file_in(memory)
     shapes = {"wide": (rows, 7, 4), "one": (rows, 7), "another": (rows, 7), "deep": (rows, 2, 3, 3), "flat": (rows,)}
-    scale = Quantity((), "1", "")
+    scale = Column((), "1", "")
     datasets = {name: hdf5.put_empty(file, name, shape, "f8", scale) for name, shape in shapes.items()}
     file.flush()
     index = ChunkIndex(memory.extents())
@@ -364,7 +364,7 @@ def test_places_read_from_the_index_are_those_that_the_library_tells(rows: int) 
 def test_an_index_that_is_cut_or_of_another_kind_tells_nothing() -> None:
     memory = SparseFile()
     file = hdf5.new_file_in(memory)
-    dataset = hdf5.put_empty(file, "a", (300, 5), "f8", Quantity((), "1", ""))
+    dataset = hdf5.put_empty(file, "a", (300, 5), "f8", Column((), "1", ""))
     file.flush()
     first = dataset.id.get_chunk_info_by_coord((0, 0)).byte_offset
     extents = list(memory.extents())

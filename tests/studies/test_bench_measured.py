@@ -257,7 +257,11 @@ def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
 
     scene, k = thinned(paper(name))
     exact = thinned_reference(reference(f"paper/{name}"), k)
-    before = int(np.count_nonzero(np.maximum.accumulate(exact.growth) < 1e5)) if exact.growth is not None else 101
+    before = (
+        int(np.count_nonzero(np.maximum.accumulate(exact.error_growth) < 1e5))
+        if exact.error_growth is not None
+        else 101
+    )
     start = np.array([*scene.initial_angles, *scene.initial_rates])
     times = np.linspace(0.0, scene.duration, scene.samples)
     numpy_equations, numba_solve = straightforward(scene), compiled(scene)

@@ -61,7 +61,7 @@ class FakeMethod:
 
 def still(rows: int = SCENE.samples) -> Trajectory:
     times = np.linspace(0.0, 1.0, SCENE.samples)[:rows]
-    return Trajectory(times, np.zeros((rows, 4)), np.zeros((rows, 4)), growth=np.ones(rows))
+    return Trajectory(times, np.zeros((rows, 4)), np.zeros((rows, 4)), error_growth=np.ones(rows))
 
 
 def point(curve: str = "a", rung: int = 0) -> Point:

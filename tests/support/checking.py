@@ -20,7 +20,7 @@ from rotor_mbs.scenario.bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.record import Solution
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.write import write_run
@@ -65,7 +65,7 @@ def add_run(path: Path, scene: Scene, run: Solution) -> None:
         verdict = judge(scene, run, reference_trajectory(scene, stored))
     facts = {"status": verdict.status, "message": verdict.message, "false_success": verdict.false_success}
     piece = path.with_name("piece.h5")
-    write_run(piece, scene, scene_hash(scene), run, {**facts, **verdict.metrics})
+    write_run(piece, scene_hash(scene), replace(run, scene=scene), {**facts, **verdict.metrics})
     merge(path, [path, piece], {})
     piece.unlink()
 

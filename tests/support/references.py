@@ -11,7 +11,8 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Solution, Trajectory
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.work import reference_trajectory
 

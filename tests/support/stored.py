@@ -11,7 +11,8 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import compare
-from rotor_mbs.solution.record import Integration, Refined, Solution, Trajectory
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.merge import merge
 from rotor_mbs.store.write import write_run
 
@@ -40,11 +41,12 @@ class Made:
         trajectory = self._trajectory(time)
         if self.refined:
             fine = np.linspace(0.0, scene.duration, 4 * scene.samples)
-            trajectory.refined = Refined(fine, self._angles(fine), np.gradient(self._angles(fine), fine, axis=0))
+            trajectory.refined_time, trajectory.refined_angles = fine, self._angles(fine)
+            trajectory.refined_rates = np.gradient(trajectory.refined_angles, fine, axis=0)
         if self.method == "reference":
-            trajectory.uncertainty = np.full(len(time), 1e-30)
-            trajectory.growth = np.ones(len(time))
-        return Solution(self.method, trajectory, Integration(True), {}, 0.01, [0.002], 0.001)
+            trajectory.angle_uncertainty = np.full(len(time), 1e-30)
+            trajectory.error_growth = np.ones(len(time))
+        return Solution(scene, self.method, trajectory, Integration(True), {}, 0.01, [0.002], 0.001)
 
     def _trajectory(self, time: Any) -> Trajectory:
         angles = self._angles(time)
@@ -74,7 +76,7 @@ def store(path: Path, runs: Sequence[Made]) -> Path:
         metrics = compare(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
         piece = path.with_name(f"{path.stem}-{number}.piece")
         attributes = {"status": "ok", "message": "", **metrics, **made.attributes}
-        write_run(piece, made.scene, scene_hash(made.scene), run, attributes)
+        write_run(piece, scene_hash(made.scene), run, attributes)
         pieces.append(piece)
     merge(path, pieces, {"rotor_mbs": "0", "numpy": "0"})
     for piece in pieces:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Solution, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
 
 _COLUMNS = ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work")
 

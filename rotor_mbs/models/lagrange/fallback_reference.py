@@ -38,8 +38,8 @@ class StandInReference:
         rows = min(len(result.time), len(check.time))
         difference = np.full(len(result.time), np.inf)
         difference[:rows] = np.abs(result.angles[:rows] - check.angles[:rows]).max(axis=1)
-        result.uncertainty = np.maximum(difference, np.finfo(float).eps)
-        result.growth = self._growth(result)
+        result.angle_uncertainty = np.maximum(difference, np.finfo(float).eps)
+        result.error_growth = self._growth(result)
         return result
 
     def _growth(self, result: Trajectory) -> Array:

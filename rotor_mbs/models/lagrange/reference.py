@@ -40,8 +40,8 @@ class ReferenceSolver:
         time = np.linspace(0.0, self._scene.duration, self._scene.samples)
         result = samples.trajectory(self._scene, time[: self._rows], best.astype(float), moving)
         difference = np.abs((best - check)[:, : len(moving)]).astype(float)
-        result.uncertainty = difference.max(axis=1)
-        result.growth = error_growth(self._scene)[: self._rows]
+        result.angle_uncertainty = difference.max(axis=1)
+        result.error_growth = error_growth(self._scene)[: self._rows]
         return result
 
 

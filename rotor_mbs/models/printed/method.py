@@ -16,7 +16,7 @@ from rotor_mbs.models.printed.blades import PointMassRotor, point_mass_rotor
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Item, Refined, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
 
 # (torque in N m, angles and rates) -> accelerations; all of the coordinates that move.
 Accelerations = Callable[[float, Sequence[float]], Sequence[float]]
@@ -52,7 +52,9 @@ class PrintedSolver:
         time = time[time <= result.time[-1]]
         angles, rates = self._coordinates(result.at(time))
         refined_time, refined_state = result.refined()
-        trajectory = Trajectory(time, angles, rates, refined=Refined(refined_time, *self._coordinates(refined_state)))
+        fine_angles, fine_rates = self._coordinates(refined_state)
+        fine = {"refined_time": refined_time, "refined_angles": fine_angles, "refined_rates": fine_rates}
+        trajectory = Trajectory(time, angles, rates, **fine)
         if scene.wants("tip"):
             trajectory.tip = observables.tip_path(rotor, angles)
         if scene.wants("energy"):

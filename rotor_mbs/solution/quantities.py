@@ -1,0 +1,327 @@
+"""The output quantities of a run, each declared once: dimensions, units, who computes it, how it is judged and drawn.
+
+What stores, reads, compares or draws samples loops over these declarations. Further quantities come from packages that
+have an entry point in the group `rotor_mbs.quantities`. Knows scenes and samples; no engine and no file format.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.scene import Scene
+
+Array = NDArray[np.float64]
+
+ENTRY_POINTS = "rotor_mbs.quantities"
+
+
+class Samples(Protocol):
+    """What a producer may use of a run: time (n,) s, angles and rates (n, 1 + blades) rad and rad/s, and `get`."""
+
+    time: Array
+    angles: Array
+    rates: Array
+
+    def get(self, name: str) -> Array | None:
+        """An array by the quantity's name; None where the run does not have it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """How a run's array becomes one number that is stored with the run, and the largest value that passes.
+
+    The number is the largest size over all samples (with the last dimension `axis`: of the vectors).
+
+    Attributes
+    ----------
+    metric : name of the number among the run's attributes.
+    with_reference : the size is that of the difference from the reference's array, up to the horizon.
+    relative_to : from the scene to what the number is divided by before it is judged; None for 1.
+    check : name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here.
+    bound : largest value that passes where no check has one; None where the number is not judged.
+    channel, unit : what the judged number is called in a verdict, and its unit in words.
+    fault : sentence for a number that does not pass, with the field {value}.
+    look_at : where a failure would come from.
+    """
+
+    metric: str
+    with_reference: bool = True
+    relative_to: Callable[[Scene], float] | None = None
+    check: str = ""
+    bound: float | None = None
+    channel: str = ""
+    unit: str = ""
+    fault: str = ""
+    look_at: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """A panel over time: its heading, the label of its vertical axis, and whether that is logarithmic."""
+
+    title: str
+    axis: str
+    logarithmic: bool = False
+
+
+Producer = Callable[[Scene, Samples], Array | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """An array that a run may have.
+
+    Attributes
+    ----------
+    name : name of the dataset, and of the attribute of a solution.
+    dimensions : names of its axes, see `SCALES`; the first is `time` but for an integrator's own output points.
+    units, long_name : as stored.
+    output : the entry of a scene's `outputs` that asks for it; "" where it is stored whenever the model has it.
+    producer : from (scene, samples) to the array, where one formula serves all methods; None where each model
+        computes it from its own state. Returns None where the samples lack what it needs.
+    required : whether every run has it whose scene asks for it; else some methods alone have it.
+    judgement : how a run's array is judged; None where it is not, or where `metrics` has a rule of its own for it.
+    plot : how it is drawn; None where it is not drawn by itself.
+
+    Examples
+    --------
+    >>> angular_momentum = Quantity(
+    ...     "hub_angular_momentum", ("time",), "N m s", "angular momentum of the hub about the shaft",
+    ...     output="momentum", producer=lambda scene, samples: scene.hub_inertia * samples.rates[:, 0],
+    ...     judgement=Comparison("hub_angular_momentum_error_max", bound=1e-3, unit="N m s"))
+    >>> angular_momentum.is_over_time
+    True
+    """
+
+    name: str
+    dimensions: tuple[str, ...]
+    units: str
+    long_name: str
+    output: str = ""
+    producer: Producer | None = None
+    required: bool = True
+    judgement: Comparison | None = None
+    plot: Plot | None = None
+
+    @property
+    def is_over_time(self) -> bool:
+        """Whether it has a value per sample."""
+        return self.dimensions[:1] == ("time",)
+
+
+# Dimensions, and the arrays that number them.
+SCALES = {
+    scale.name: scale
+    for scale in (
+        Quantity("time", ("time",), "s", "time"),
+        Quantity("coordinate", ("coordinate",), "1", "joint coordinate: 0 rotor, i pitch of blade i"),
+        Quantity("blade", ("blade",), "1", "blade number, from 1"),
+        Quantity("axis", ("axis",), "1", "axis of the base frame: 0 x, 1 y (shaft), 2 z (up)"),
+        Quantity("refined_time", ("refined_time",), "s", "time of the integrator's own output points"),
+    )
+}
+
+
+def energy_error(samples: Samples) -> Array | None:
+    """(n,) J: total energy less work, less its value at the start; None where energies were not asked for."""
+    kinetic, potential, work = (samples.get(name) for name in ("kinetic_energy", "potential_energy", "work"))
+    if kinetic is None or potential is None or work is None:
+        return None
+    total = kinetic + potential - work
+    error: Array = total - total[:1]  # of a run without a sample, too
+    return error
+
+
+def longest_arm(scene: Scene) -> float:
+    """m: the largest distance of a blade's centre of mass from the hub's centre."""
+    return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades)
+
+
+_JOINT_GAP = Comparison(
+    "constraint_error_max",
+    with_reference=False,
+    relative_to=longest_arm,
+    check="gap",
+    bound=0.0,  # of a model without joints that can open
+    channel="joints",
+    unit="of arm",
+    fault="a joint opens by {value} of the longest arm",
+    look_at="a joint of the chain that is not constrained, or its marker",
+)
+
+BUILT_IN = (
+    Quantity("angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"),
+    Quantity("rates", ("time", "coordinate"), "rad/s", "rotor rate and pitch rates", "rates"),
+    Quantity(
+        "tip", ("time", "blade", "axis"), "m", "path of each blade's tip in the base frame", "tip",
+        judgement=Comparison("tip_error_max"),
+    ),
+    Quantity("kinetic_energy", ("time",), "J", "kinetic energy", "energy"),
+    Quantity(
+        "potential_energy", ("time",), "J", "potential energy of gravity (zero at the shaft) and springs", "energy",
+    ),
+    Quantity("work", ("time",), "J", "work of the torque less what the dampers took", "energy"),
+    Quantity(
+        "energy_error", ("time",), "J", "total energy less work, less its value at the start", "energy",
+        producer=lambda _, samples: energy_error(samples),
+    ),
+    Quantity(
+        "constraint_error", ("time",), "m", "largest position gap in a joint", required=False, judgement=_JOINT_GAP,
+        plot=Plot("Largest gap in a joint", "gap (m)", logarithmic=True),
+    ),
+    Quantity(
+        "angle_uncertainty", ("time",), "rad", "difference of two quad precision runs, largest over the angles",
+        required=False,
+    ),
+    Quantity("error_growth", ("time",), "1", "largest growth of a small error of the initial state", required=False),
+    Quantity(
+        "refined_angles", ("refined_time", "coordinate"), "rad", "angles at the integrator's own output points",
+        "angles", required=False,
+    ),
+    Quantity(
+        "refined_rates", ("refined_time", "coordinate"), "rad/s", "rates at the integrator's own output points",
+        "rates", required=False,
+    ),
+)  # fmt: skip
+
+_OUTPUTS = frozenset(quantity.output for quantity in BUILT_IN)
+# What a trajectory may hold beside time: every built-in quantity, and the scale of an integrator's own output points.
+NAMES = frozenset({*(quantity.name for quantity in BUILT_IN), "refined_time"})
+
+
+def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
+    """The built-in quantities, and those that installed packages bring for `outputs`.
+
+    Raises InputError where an output is neither built in nor brought by an installed package.
+    """
+    return BUILT_IN + tuple(one for output in outputs if output not in _OUTPUTS for one in _installed(output))
+
+
+def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
+    """The quantities that a scene's `outputs` ask for, and those that are stored whenever a model has them.
+
+    Raises InputError as `known_quantities` does.
+    """
+    asked = {"", *outputs}
+    return tuple(quantity for quantity in known_quantities(asked) if quantity.output in asked)
+
+
+def find_quantity(name: str, outputs: Iterable[str] = ()) -> Quantity | None:
+    """The quantity of that name: a built-in one, or one that an output among `outputs` asks for; else None."""
+    return next((quantity for quantity in known_quantities(outputs) if quantity.name == name), None)
+
+
+@functools.cache
+def _installed(output: str) -> tuple[Quantity, ...]:
+    """What the entry point called `output` brings."""
+    found = entry_points(group=ENTRY_POINTS, name=output)
+    if not found:
+        raise InputError(
+            f"unknown output {output!r}; allowed: {', '.join(sorted(_OUTPUTS - {''}))}, or the name of an entry point "
+            f"in the group {ENTRY_POINTS}"
+        )
+    point = next(iter(found))
+    where = f"output {output!r}, from {point.value}"
+    try:
+        loaded = point.load()
+    except Exception as exc:  # whatever the other package raises
+        raise InputError(f"{where}: cannot be loaded: {type(exc).__name__}: {exc}") from exc
+    brought = (loaded,) if isinstance(loaded, Quantity) else loaded
+    if not isinstance(brought, Sequence) or not all(isinstance(one, Quantity) for one in brought):
+        raise InputError(f"{where}: is a {type(loaded).__name__}; allowed: a Quantity or a sequence of them")
+    return tuple(_checked(one, output, where) for one in brought)
+
+
+def _checked(quantity: Quantity, output: str, where: str) -> Quantity:
+    allowed = set(SCALES) - {"time", "refined_time"}
+    faults = {
+        f"name {quantity.name!r}; allowed: an identifier that is not taken": not quantity.name.isidentifier()
+        or quantity.name in NAMES | set(SCALES),
+        f"dimensions {quantity.dimensions}; allowed: 'time', then any of {', '.join(sorted(allowed))}, once each": not (
+            quantity.is_over_time
+            and set(quantity.dimensions[1:]) <= allowed
+            and len(set(quantity.dimensions)) == len(quantity.dimensions)
+        ),
+        f"output {quantity.output!r}; allowed: {output!r}, the entry point's name": quantity.output != output,
+    }
+    problems = [f"{where}: {quantity.name}: {text}" for text, is_wrong in faults.items() if is_wrong]
+    if problems:
+        raise InputError(problems)
+    return quantity
+
+
+def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None:
+    """The run's array of a quantity: the model's own, or what the quantity's producer makes of the samples.
+
+    Returns None where the run does not have it. Raises InputError where a producer gives an array of another shape.
+    """
+    values = samples.get(quantity.name)
+    if values is not None or quantity.producer is None:
+        return values
+    values = quantity.producer(scene, samples)
+    if values is None:
+        return None
+    expected = (len(samples.time), *row_shape(quantity, scene))
+    found = np.asarray(values, dtype=np.float64)
+    if found.shape != expected:
+        raise InputError(f"quantity {quantity.name!r}: its producer gives shape {found.shape}; allowed: {expected}")
+    return found
+
+
+def arrays(scene: Scene, samples: Samples) -> dict[str, Array]:
+    """All arrays of a run that its scene asks for, by name."""
+    found = {one.name: array_of(one, scene, samples) for one in quantities(scene.outputs)}
+    return {name: values for name, values in found.items() if values is not None}
+
+
+def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
+    """The scales of a complete run: time in s, and the numbers of coordinates, blades and axes."""
+    blades = len(scene.blades)
+    return {
+        "time": np.linspace(0.0, scene.duration, scene.samples),
+        "coordinate": np.arange(1 + blades),
+        "blade": np.arange(1, 1 + blades),
+        "axis": np.arange(3),
+    }
+
+
+def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
+    """The shape of one sample of a quantity: () for a number, (1 + blades,) for angles."""
+    blades = len(scene.blades)
+    lengths = {"coordinate": 1 + blades, "blade": blades, "axis": 3}
+    return tuple(lengths[dimension] for dimension in quantity.dimensions[1:])
+
+
+def shapes(scene: Scene, outputs: Iterable[str]) -> dict[Quantity, tuple[int, ...]]:
+    """What every complete run of a scene has: each quantity that `outputs` ask for, and its shape, time first."""
+    asked = [one for one in quantities(outputs) if one.output and one.required and one.is_over_time]
+    return {quantity: (scene.samples, *row_shape(quantity, scene)) for quantity in asked}
+
+
+def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples | None) -> Array | None:
+    """(common samples,) Size of a quantity, or of its difference from the reference, largest over the other axes.
+
+    Returns None where the quantity is not judged, or where the run or the needed reference does not have it.
+    """
+    rule = quantity.judgement
+    values = array_of(quantity, scene, run) if rule else None
+    if rule is None or values is None:
+        return None
+    if rule.with_reference:
+        exact = None if reference is None else array_of(quantity, scene, reference)
+        if exact is None:
+            return None
+        n = min(len(values), len(exact))
+        values = values[:n] - exact[:n]
+    sizes = np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
+    largest: Array = sizes.max(axis=tuple(range(1, sizes.ndim)))
+    return largest

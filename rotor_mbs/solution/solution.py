@@ -1,0 +1,137 @@
+"""A run as a Python user has it: scene, method, samples, status, numbers, times. Knows no engine and no file format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.quantities import SCALES, Array, arrays, find_quantity, scale_values
+from rotor_mbs.solution.record import Integration, Trajectory
+
+# What a notebook shows below the table of a solution: functions from a solution to HTML, added by upper layers.
+NOTEBOOK_PARTS: list[Callable[[Solution], str]] = []
+
+
+@dataclass
+class Solution:
+    """A method applied to a scene.
+
+    Attributes
+    ----------
+    scene, method : what was run; the method by its name, such as "lagrange/taylor".
+    trajectory : the samples.
+    integration : what the engine reports of itself.
+    settings : of the method, all of them.
+    setup_time_s, run_times_s, output_time_s : s, building the model, each integration, computing the samples.
+    status, message : from the samples, see `judgement`; "" where the run was not judged.
+    metrics : numbers by their names in a results file, such as energy_drift_max.
+
+    Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n samples.
+    """
+
+    scene: Scene
+    method: str
+    trajectory: Trajectory
+    integration: Integration
+    settings: Mapping[str, object] = field(default_factory=dict)
+    setup_time_s: float = 0.0
+    run_times_s: list[float] = field(default_factory=lambda: [0.0])
+    output_time_s: float = 0.0
+    status: str = ""
+    message: str = ""
+    metrics: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def time(self) -> Array:
+        """(n,) s"""
+        return self.trajectory.time
+
+    @property
+    def angles(self) -> Array:
+        """(n, 1 + blades) rad: rotor, then the pitch of each blade."""
+        return self.trajectory.angles
+
+    @property
+    def rates(self) -> Array:
+        """(n, 1 + blades) rad/s: rotor, then the pitch of each blade."""
+        return self.trajectory.rates
+
+    @property
+    def quantities(self) -> dict[str, Array]:
+        """The arrays that the scene's `outputs` ask for, by name."""
+        return arrays(self.scene, self.trajectory)
+
+    def __getitem__(self, name: str) -> Array:
+        found = self.trajectory.get(name)
+        if found is not None:
+            return found
+        known = self.quantities
+        if name not in known:
+            raise KeyError(f"{name!r}; this solution has: time, {', '.join(known)}")
+        return known[name]
+
+    def __getattr__(self, name: str) -> Array:
+        if not name.startswith("_") and "trajectory" in self.__dict__:
+            try:
+                return self[name]
+            except KeyError as exc:
+                raise AttributeError(f"no attribute or quantity {exc.args[0]}") from None
+        raise AttributeError(name)
+
+    def to_xarray(self) -> Any:
+        """The samples as an xarray.Dataset, with units, long names and labels.
+
+        Select by label: `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError as exc:
+            raise InputError('xarray is not installed; allowed: pip install "rotor_mbs[xarray]"') from exc
+        labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
+        scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
+        if (refined := self.trajectory.get("refined_time")) is not None:
+            scales["refined_time"] = refined
+        variables = {}
+        for name, values in self.quantities.items():
+            quantity = find_quantity(name, self.scene.outputs)
+            assert quantity is not None  # it was found by its declaration
+            variables[name] = (quantity.dimensions, values, _described(quantity.units, quantity.long_name))
+        used = {"time"}.union(*(dimensions for dimensions, _, _ in variables.values()))
+        coordinates = {
+            name: (name, labels.get(name, scales[name]), _described(scale.units, scale.long_name))
+            for name, scale in SCALES.items()
+            if name in used
+        }
+        facts = {"scene": self.scene.name, "method": self.method, "status": self.status, "message": self.message}
+        return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
+
+    def _repr_html_(self) -> str:
+        """For a notebook: a table of status and numbers, then what upper layers add."""
+        reached = f"{self.time[-1]:g} s of {self.scene.duration:g} s" if len(self.time) else "no sample"
+        rows = {
+            "method": self.method,
+            "status": self.status or "not judged",
+            "message": self.message,
+            "reached": f"{reached}, {len(self.time)} samples",
+            "steps": "" if self.integration.steps is None else str(self.integration.steps),
+            "run time": f"{float(np.median(self.run_times_s)):.3g} s",
+            **{name: f"{value:.3g}" for name, value in self.metrics.items()},
+        }
+        cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items() if v)
+        parts = "".join(part(self) for part in NOTEBOOK_PARTS)
+        return f"<table><caption>{escape(self.scene.title)}</caption>{cells}</table>{parts}"
+
+
+def _described(units: str, long_name: str) -> dict[str, str]:
+    return {"units": units, "long_name": long_name}

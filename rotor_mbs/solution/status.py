@@ -1,0 +1,36 @@
+"""How a run ended: the one list of statuses for runs, bench points, step ladders and sweeps, and their integer codes.
+
+Arrays of statuses are stored as integers with the CF attributes `flag_values` and `flag_meanings`, and are read back by
+these attributes, so that the order of the list may differ between files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# The six that a run's state can have; then a point of which no run was made, and a run whose process died.
+RUN_STATUSES = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out")
+STATUSES = (*RUN_STATUSES, "left_out", "worker_died")
+
+
+def code_of(status: str) -> int:
+    """The integer code of a status. Raises ValueError where there is no such status."""
+    return STATUSES.index(status)
+
+
+def flags(meanings: Iterable[str] = STATUSES) -> dict[str, object]:
+    """The CF attributes of an array of codes."""
+    names = tuple(meanings)
+    return {"flag_values": np.arange(len(names), dtype=np.int64), "flag_meanings": " ".join(names)}
+
+
+def recode(codes: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[np.int64]:
+    """Stored codes as codes of STATUSES, by the attributes they were stored with; negative codes (missing) stay."""
+    meanings = str(attributes.get("flag_meanings", " ".join(STATUSES))).split()
+    table = np.array([code_of(name) for name in meanings], dtype=np.int64)
+    stored = np.asarray(codes, dtype=np.int64)
+    return np.where(stored < 0, stored, table[np.maximum(stored, 0)])
