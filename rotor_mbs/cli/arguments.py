@@ -75,6 +75,10 @@ def _add_runs(commands: _Commands) -> None:
     run = _command(commands, "run", "a batch of scenes into one results file", "runs:run")
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     run.add_argument("-m", "--method", action="append", metavar="METHOD", help="model/integrator; may be repeated")
+    run.add_argument(
+        "--set", action="append", type=_setting, metavar="NAME=VALUE",
+        help="a setting of the methods, in place of its default; may be repeated",
+    )  # fmt: skip
     run.add_argument("-o", "--output", type=_file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
     _add_batch_options(run)
 
@@ -97,7 +101,7 @@ def _add_bench(commands: _Commands) -> None:
 
 def _add_reference(commands: _Commands) -> None:
     reference = _command(
-        commands, "reference", "quad precision references, computed anew, as they are frozen", "runs:freeze"
+        commands, "reference", "quad precision references, computed anew, as they are frozen", "runs:reference"
     )
     reference.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     reference.add_argument("-o", "--output", type=_file, required=True, metavar="FILE")
@@ -193,6 +197,19 @@ def _part(text: str) -> tuple[int, int]:
     if not (number.isdecimal() and parts.isdecimal() and 1 <= int(number) <= int(parts)):
         raise argparse.ArgumentTypeError(f"{text!r} given, allowed: K/N with K from 1 to N")
     return int(number), int(parts)
+
+
+def _setting(text: str) -> tuple[str, object]:
+    """(name, value) of "name=value": a number where it is one."""
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: NAME=VALUE")
+    for kind in (int, float):
+        try:
+            return name, kind(value)
+        except ValueError:
+            continue
+    return name, value
 
 
 def _file(text: str) -> Path:

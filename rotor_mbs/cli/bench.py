@@ -16,12 +16,12 @@ from rotor_mbs.execution.environment import machine, versions
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.methods.ladders import Ladder, ladders
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.bench import read_curves, write_curves
 from rotor_mbs.store.merge import merge
-from rotor_mbs.studies.batch import Batch, execute
 from rotor_mbs.studies.bench_points import Plan, bench_hash, measure
 from rotor_mbs.studies.bench_work import able, prepared_scene
+from rotor_mbs.studies.run import run_scenes
 
 # An hour of simulated time, or 48 blades, costs what several scenes do.
 _GROWTH_BUDGETS = 3.0
@@ -51,7 +51,7 @@ def bench(arguments: argparse.Namespace) -> int:
     works = [_work(scene, chosen, there, arguments.repeats, arguments.budget) for scene in scenes]
     missing = [work for work in works if work.ladders]
     for work in missing:  # refused before the first is measured
-        prepared_scene(work.scene, scene_hash(work.scene), output)
+        prepared_scene(work.scene, output)
     try:
         _measure_all(missing, output, arguments)
         if arguments.growth:
@@ -67,11 +67,11 @@ def _references(scenes: Sequence[Scene], output: Path) -> None:
     """The references, frozen or computed, into the results file. Raises InputError, StoreError."""
     nothing: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    report = execute(Batch(scenes, nothing, output, cores, timeout_s=60.0))
-    if report.failures:
+    report = run_scenes(scenes, nothing, output, workers=cores, timeout_s=60.0)
+    if report.failures or report.not_computed:
         raise InputError(
-            f"{task.scene.name}: no usable reference ({summary.status}: {summary.message}); a bench needs one"
-            for task, summary in report.failures
+            f"{one.case.scene.name}: no usable reference ({one.result.status}: {one.result.message}); a bench needs one"
+            for one in [*report.failures, *report.not_computed]
         )
 
 

@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rotor_mbs.analysis.stability import Cell, cells, summary_lines, unreached
+from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.methods.catalogue import METHOD_NAMES
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.solution.judgement import is_held
-from rotor_mbs.studies.batch import Batch, default_methods, execute
+from rotor_mbs.studies.run import able_methods, run_scenes
 from rotor_mbs.studies.stability_records import complete_records
 
 SUITE = ("stiff", "extreme")
@@ -26,13 +27,13 @@ def stability(arguments: argparse.Namespace) -> int:
     start = time.monotonic()
     scenes = find_scenes(arguments.scenes or SUITE)
     names = [name for name in METHOD_NAMES if is_held(name)]
-    methods = {scene.name: default_methods(scene, names)[0] for scene in scenes}
+    methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
     output: Path = arguments.output
     none: dict[str, list[str]] = {name: [] for name in methods}  # references first, which two scenes have no time for
     patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in methods.items()}
     limit = arguments.timeout
     for chosen, limit_s in ((none, limit), (patient, max(limit, _PATIENT_S)), (methods, limit)):
-        execute(Batch(scenes, chosen, output, arguments.jobs, limit_s))
+        run_scenes(scenes, chosen, output, workers=arguments.jobs, timeout_s=limit_s, on_progress=ProgressLine())
     complete_records(scenes, methods, cells(output), output, arguments.jobs)
     found = cells(output)
     _tell(found)

@@ -109,12 +109,12 @@ def _curve(path: str, group: Any) -> Curve:
 
 
 def leaves(group: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """(path below `group`, group) of every group that holds a curve."""
+    """(path, group) of every group below `group` that is a curve or a stability record; `path` goes before."""
     for name, item in group.items():
         if not hdf5.is_group(item):
             continue
         below = f"{path}/{name}" if path else name
-        if "setting" in item:
+        if "setting" in item or "record" in item.attrs:
             yield below, item
         else:
             yield from leaves(item, below)

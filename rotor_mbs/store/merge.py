@@ -10,17 +10,21 @@ from typing import Any
 from rotor_mbs.errors import StoreError
 from rotor_mbs.scenario.names import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.bench import GROUP, leaves
+from rotor_mbs.store.bench import GROUP as BENCH
+from rotor_mbs.store.bench import leaves
 from rotor_mbs.store.read import open_results
+from rotor_mbs.store.stability import GROUP as STABILITY
+
+_GROUPS_OF_RECORDS = (BENCH, STABILITY)
 
 
 def merge(path: Path, sources: Sequence[Path], versions: Mapping[str, str]) -> None:
     """All runs of `sources` into `path`, atomically; `path` may itself be among the sources.
 
     A later run takes the place of an earlier one of the same scene and method. Runs of a scene whose numbers have
-    changed since (another scene_hash than in the last source that has it) belong to another machine and are left
-    out. The same holds for the curves of a bench; other groups that are not scenes come from the last source that has
-    them. Raises StoreError, also where a source is not a batch's.
+    changed since (another scene_hash than in the last source that has it) belong to another rotor and are left out.
+    The same holds for bench curves and stability records; other groups that are not scenes come from the last source
+    that has them. Raises StoreError, also where a source is not a batch's.
     """
     for source in sources:
         refuse_other_kinds(source)
@@ -34,7 +38,7 @@ def merge(path: Path, sources: Sequence[Path], versions: Mapping[str, str]) -> N
         for name, source in others.items():
             with open_results(source) as results:
                 hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
-        for source, names in _by_source(_plan_bench(sources)).items():
+        for source, names in _by_source(_plan_records(sources)).items():
             with open_results(source) as results:
                 for name in names:
                     hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
@@ -56,7 +60,9 @@ def _plan(sources: Iterable[Path]) -> tuple[dict[str, dict[str, Path]], dict[str
     others: dict[str, Path] = {}
     for source in sources:
         with open_results(source) as results:
-            others |= {name: source for name in RESERVED_GROUPS if name in results.root and name != GROUP}
+            others |= {
+                name: source for name in RESERVED_GROUPS if name in results.root and name not in _GROUPS_OF_RECORDS
+            }
             for scene in results.scenes.values():
                 number = scene.attributes["scene_hash"]
                 known, runs = latest.get(scene.name, (number, {}))
@@ -65,17 +71,18 @@ def _plan(sources: Iterable[Path]) -> tuple[dict[str, dict[str, Path]], dict[str
     return {name: runs for name, (_, runs) in latest.items()}, others
 
 
-def _plan_bench(sources: Iterable[Path]) -> dict[str, Path]:
-    """Path of every curve in the file -> the source to take it from."""
+def _plan_records(sources: Iterable[Path]) -> dict[str, Path]:
+    """Path of every curve and stability record in the files -> the source to take it from."""
     latest: dict[str, tuple[str, dict[str, Path]]] = {}
     for source in sources:
         with open_results(source) as results:
-            for name, curve in leaves(results.root[GROUP]) if GROUP in results.root else ():
-                scene = name.rsplit("/", 2)[0]
-                number = str(curve.attrs.get("scene_hash", ""))
-                known, curves = latest.get(scene, (number, {}))
-                latest[scene] = (number, {**(curves if known == number else {}), f"{GROUP}/{name}": source})
-    return {name: source for _, curves in latest.values() for name, source in curves.items()}
+            for group in _GROUPS_OF_RECORDS:
+                for name, record in leaves(results.root[group], group) if group in results.root else ():
+                    scene = name.rsplit("/", 2)[0]
+                    number = str(record.attrs.get("scene_hash", ""))
+                    known, records = latest.get(scene, (number, {}))
+                    latest[scene] = (number, {**(records if known == number else {}), name: source})
+    return {name: source for _, records in latest.values() for name, source in records.items()}
 
 
 def _by_source(runs: Mapping[str, Path]) -> dict[Path, list[str]]:

@@ -53,11 +53,11 @@ def measure(plan: Plan) -> list[Curve]:
     """Times, judges and collects every point of the plan."""
     load_before = os.getloadavg()[0]
     number = scene_hash(plan.scene)
-    short, reference = prepared_scene(plan.scene, number, plan.results)
+    short, reference = prepared_scene(plan.scene, plan.results)
     interval = short.duration / (short.samples - 1)
     points = [_points(ladder, interval) for ladder in plan.ladders]
     methods = tuple(dict.fromkeys(ladder.method for ladder in plan.ladders))
-    make = MakeTimingProcess(plan.scene, number, plan.results, methods)
+    make = MakeTimingProcess(plan.scene, plan.results, methods)
     found = Findings()
     with Servant(make, last_core()) as servant:
         timings = time_points(servant, points, plan.repeats, plan.budget_s, found)

@@ -19,7 +19,7 @@ from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import Metrics
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.studies.work import Task, load_reference
+from rotor_mbs.studies.frozen import load_reference
 
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
 # a bench would time the reading of samples.
@@ -163,13 +163,12 @@ class MakeTimingProcess:
     """Makes a TimingProcess where it is to run, with its engines loaded, so that no run is charged for that."""
 
     scene: Scene
-    scene_hash: str
     results: Path
     methods: tuple[str, ...]
 
     def __call__(self) -> TimingProcess:
         only_time(self.methods)
-        found = prepared_scene(self.scene, self.scene_hash, self.results)
+        found = prepared_scene(self.scene, self.results)
         return TimingProcess(lambda _: found)
 
 
@@ -180,10 +179,9 @@ def only_time(methods: Iterable[str]) -> None:
     gc.disable()
 
 
-def prepared_scene(scene: Scene, scene_hash: str, results: Path) -> tuple[Scene, Trajectory]:
+def prepared_scene(scene: Scene, results: Path) -> tuple[Scene, Trajectory]:
     """The scene as it is benched, and its reference from the results file. Raises InputError where there is none."""
-    task = Task(scene, scene_hash, "", "", Path(), reference=results)
-    reference = load_reference(task)
+    reference = load_reference(results, scene)
     if reference is None or len(reference.time) < scene.samples:
         raise InputError(f"{scene.name}: no usable reference (it does not reach the end); a bench needs one")
     short, k = thinned(scene)

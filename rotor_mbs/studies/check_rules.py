@@ -24,7 +24,7 @@ _OUT_OF_TIME = (False, "ended", 0.5, None, None, True)
 _GRAVITY, _STIFFNESS, _SPRUNG = 0.5, 2e4, 0.5
 _LONG = Blade(1000.0, (0.1, 0.0, 10.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 _SHORT = Blade(1000.0, (0.1, 0.0, 5.0), (0.0,) * 6, (0.1, 0.0, 20.0))
-_SCENE = Scene(
+SCENE = Scene(
     "rules", "three point masses in uniform rotation", (), _GRAVITY, 1.0, 11, ("angles", "rates", "energy"),
     (_SHORT, _LONG, _LONG), 0.0, (0.0, _SPRUNG, 0.0, 0.0), (0.5, 0.0, 0.0, 0.0),
     bearing_stiffness=(_STIFFNESS, 0.0, 0.0),
@@ -41,7 +41,7 @@ _JUST = 3e-4  # how far on either side of a bound, relatively: far above round-o
 
 
 @dataclass(frozen=True)
-class Case:
+class KnownRun:
     """A run of which it is known what it is."""
 
     name: str
@@ -54,9 +54,9 @@ class Case:
 
     def faults(self) -> str:
         """What the judgement says against what is known; "" where it is right."""
-        run = Solution(_SCENE, self.method, self.trajectory, Integration(*self.engine))
+        run = Solution(SCENE, self.method, self.trajectory, Integration(*self.engine))
         with np.errstate(all="ignore"):
-            found = judge(_SCENE, run, self.reference)
+            found = judge(SCENE, run, self.reference)
         if found.status != self.status:
             return f"a run that is {self.status} is called {found.status}"
         if self.is_false_success not in (None, found.false_success):
@@ -64,9 +64,9 @@ class Case:
         return ""
 
 
-def cases(bounds: Bounds, methods: tuple[str, ...]) -> list[Case]:
+def known_runs(bounds: Bounds, methods: tuple[str, ...]) -> list[KnownRun]:
     """`bounds`: what the statuses are to be true to; `methods`: those that are held to them."""
-    found = [case for method in methods for case in _at_the_bounds(method, bounds)]
+    found = [run for method in methods for run in _at_the_bounds(method, bounds)]
     return [*found, *_broken_off(), *_singular(), *_conditioned(bounds), *_carried(bounds), *_gross(), *_not_held()]
 
 
@@ -78,7 +78,7 @@ def metrics_off() -> Iterator[tuple[str, float]]:
     wrong.tip = np.zeros((11, 3, 3))
     wrong.tip[1, 2] = (3.0, 0.0, 4.0)
     wrong.tip[8, 1] = (30.0, 0.0, 40.0)
-    whole = compare(_SCENE, wrong, exact)
+    whole = compare(SCENE, wrong, exact)
     known = {
         "horizon_s": 0.3,
         "angle_error_max": 0.1,
@@ -96,7 +96,7 @@ def metrics_off() -> Iterator[tuple[str, float]]:
         ("stopped at the start", _cut(wrong, 1), exact, set()),
         ("past the horizon at once", wrong, at_once, {"angle_error_whole", "angle_error_end"}),
     ):
-        found = compare(_SCENE, run, reference).keys() & (errors | {"angle_error_whole", "angle_error_end"})
+        found = compare(SCENE, run, reference).keys() & (errors | {"angle_error_whole", "angle_error_end"})
         yield f"metrics of a run {name}", float(len(found ^ expected))
 
 
@@ -148,76 +148,80 @@ def _with_error(trajectory: Trajectory, error: float, row: int = 5) -> Trajector
     return trajectory.replace(angles=angles)
 
 
-def _at_the_bounds(method: str, bounds: Bounds) -> Iterator[Case]:
+def _at_the_bounds(method: str, bounds: Bounds) -> Iterator[KnownRun]:
     exact = _moving()
     energy, angle = bounds.of("energy", method).value, bounds.of("agreement", method).value
     for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "inaccurate"), (math.nan, "inaccurate")):
         asked = None if math.isnan(side) else False
         drifting, wrong = _with_drift(exact, side * energy), _with_error(exact, side * angle)
-        yield Case(f"energy drift of {side:g} bounds", method, status, drifting, is_false_success=asked)
-        yield Case(f"angle error of {side:g} bounds", method, status, wrong, reference=exact, is_false_success=asked)
+        yield KnownRun(f"energy drift of {side:g} bounds", method, status, drifting, is_false_success=asked)
+        yield KnownRun(
+            f"angle error of {side:g} bounds", method, status, wrong, reference=exact, is_false_success=asked
+        )
         if method.startswith("exudyn_chain"):
             gap = np.full(11, side * bounds.of("gap", method).value * math.hypot(0.1, 10.0))
             opened = exact.replace(constraint_error=gap)
-            yield Case(f"gap of {side:g} bounds", method, status, opened, is_false_success=asked)
+            yield KnownRun(f"gap of {side:g} bounds", method, status, opened, is_false_success=asked)
     if not method.startswith("exudyn_chain"):
         gap = np.full(11, 1e-15)
-        yield Case("a gap without a joint", method, "inaccurate", exact.replace(constraint_error=gap))
+        yield KnownRun("a gap without a joint", method, "inaccurate", exact.replace(constraint_error=gap))
 
 
-def _broken_off() -> Iterator[Case]:
+def _broken_off() -> Iterator[KnownRun]:
     exact, method = _moving(), "lagrange/taylor"
     nothing = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))  # with no sample there are no energies
-    yield Case("complete, the engine content", method, "ok", exact)
+    yield KnownRun("complete, the engine content", method, "ok", exact)
     silent = exact.replace(kinetic_energy=None, potential_energy=None, work=None)
-    yield Case("complete, energies not asked for", method, "ok", silent)
-    yield Case("complete, the engine not content", method, "solver_failed", exact, _FAILED)
+    yield KnownRun("complete, energies not asked for", method, "ok", silent)
+    yield KnownRun("complete, the engine not content", method, "solver_failed", exact, _FAILED)
     short = _cut(exact, 10)
-    yield Case("one sample short of the end, a claim of success", method, "diverged", short, is_false_success=True)
-    yield Case("one sample short of the end, a failure", method, "solver_failed", _cut(exact, 10), _FAILED)
-    yield Case("short of the end, out of time", method, "timed_out", _cut(exact, 5), _OUT_OF_TIME)
-    yield Case("no sample, a claim of success", method, "diverged", nothing, is_false_success=True)
-    yield Case("no sample, a failure", method, "solver_failed", nothing, _FAILED)
+    yield KnownRun("one sample short of the end, a claim of success", method, "diverged", short, is_false_success=True)
+    yield KnownRun("one sample short of the end, a failure", method, "solver_failed", _cut(exact, 10), _FAILED)
+    yield KnownRun("short of the end, out of time", method, "timed_out", _cut(exact, 5), _OUT_OF_TIME)
+    yield KnownRun("no sample, a claim of success", method, "diverged", nothing, is_false_success=True)
+    yield KnownRun("no sample, a failure", method, "solver_failed", nothing, _FAILED)
 
 
-def _singular() -> Iterator[Case]:
+def _singular() -> Iterator[KnownRun]:
     """Every pitch at ±π/2 leaves the rotor cos²θ of its inertia."""
     method, exact = "lagrange/taylor", _moving()
     near, far = (_moving(math.acos(math.sqrt(share))) for share in (0.8e-3, 1.2e-3))
-    yield Case("broken off near the singularity", method, "singular", _cut(near, 5), _FAILED)
-    yield Case("broken off away from the singularity", method, "solver_failed", _cut(far, 5), _FAILED)
+    yield KnownRun("broken off near the singularity", method, "singular", _cut(near, 5), _FAILED)
+    yield KnownRun("broken off away from the singularity", method, "solver_failed", _cut(far, 5), _FAILED)
     rim = math.acos(math.sqrt(1e-3))  # the pitch at which "near" begins; a sample's interval is 0.1 s
     for beyond, status in ((0.001, "singular"), (-0.001, "solver_failed")):
         on_the_way = _cut(_moving(rim - 0.1 + beyond), 5)
         on_the_way.rates[-1, 1:] = 1.0
-        yield Case(f"broken off {0.1 - beyond:g} s before it", method, status, on_the_way, _FAILED)
-    yield Case("from a singular start to the end", method, "singular", _moving(0.5 * math.pi), is_false_success=True)
+        yield KnownRun(f"broken off {0.1 - beyond:g} s before it", method, status, on_the_way, _FAILED)
+    yield KnownRun(
+        "from a singular start to the end", method, "singular", _moving(0.5 * math.pi), is_false_success=True
+    )
     # Four and five doubles below π/2: shares of 9.0e-31 and 1.4e-30.
     four, five = (0.5 * math.pi - math.ulp(1.0) * count for count in (4, 5))
-    yield Case("from the last singular start to the end", method, "singular", _moving(four), is_false_success=True)
-    yield Case("from the first regular start to the end", method, "ok", _moving(five))
+    yield KnownRun("from the last singular start to the end", method, "singular", _moving(four), is_false_success=True)
+    yield KnownRun("from the first regular start to the end", method, "ok", _moving(five))
     ended = _cut(near, 5)
-    yield Case("past the end of the motion", method, "singular", exact, reference=ended, is_false_success=True)
-    yield Case("past the end of a reference that merely stops", method, "ok", far, reference=_cut(far, 5))
+    yield KnownRun("past the end of the motion", method, "singular", exact, reference=ended, is_false_success=True)
+    yield KnownRun("past the end of a reference that merely stops", method, "ok", far, reference=_cut(far, 5))
 
 
-def _conditioned(bounds: Bounds) -> Iterator[Case]:
+def _conditioned(bounds: Bounds) -> Iterator[KnownRun]:
     """Near ±π/2 the energy magnifies round-off, 1e-14 of it, by √(1e-3/share): at a sample and between two."""
     method = "lagrange/taylor"
     allowed = bounds.of("energy", method).value
     near = _moving(math.acos(math.sqrt(1e-13)))  # 1e5-fold: 1e-9 more than without
     for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "inaccurate")):
         drift = allowed + side * (1e5 - 1.0) * 1e-14
-        yield Case(f"drift of {side:g} of what a small share allows", method, status, _with_drift(near, drift))
+        yield KnownRun(f"drift of {side:g} of what a small share allows", method, status, _with_drift(near, drift))
     apart = _with_drift(_one_by_one(), 2.0 * allowed)
-    yield Case("drift, one after the other through π/2", method, "inaccurate", apart)
+    yield KnownRun("drift, one after the other through π/2", method, "inaccurate", apart)
     for sign in (1.0, -1.0):
         through = _through(sign * 0.5, 1.5)
-        yield Case("drift, between samples through ±π/2", method, "ok", _with_drift(through, 1e3 * allowed))
+        yield KnownRun("drift, between samples through ±π/2", method, "ok", _with_drift(through, 1e3 * allowed))
         beside = _through(sign * 0.5, 0.1, others=0.5)
-        yield Case("drift, one of three through ±π/2", method, "inaccurate", _with_drift(beside, 2.0 * allowed))
+        yield KnownRun("drift, one of three through ±π/2", method, "inaccurate", _with_drift(beside, 2.0 * allowed))
         leap = _through(sign * 0.5, 1.65)
-        yield Case("drift, in leaps over ±π/2", method, "inaccurate", _with_drift(leap, 2.0 * allowed))
+        yield KnownRun("drift, in leaps over ±π/2", method, "inaccurate", _with_drift(leap, 2.0 * allowed))
 
 
 def _one_by_one() -> Trajectory:
@@ -242,7 +246,7 @@ def _through(quarter: float, step: float, others: float | None = None) -> Trajec
     return trajectory
 
 
-def _carried(bounds: Bounds) -> Iterator[Case]:
+def _carried(bounds: Bounds) -> Iterator[KnownRun]:
     """A scene's own error growth, and the size of its angles, are not the method's fault; past the horizon none is."""
     method = "lagrange/taylor"
     allowed = bounds.of("agreement", method).value
@@ -251,14 +255,14 @@ def _carried(bounds: Bounds) -> Iterator[Case]:
         exact.angles[:, 1] = angle
         for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "inaccurate")):
             name = f"error of {side:g} bounds at growth {growth:g}, angle {angle:g}"
-            yield Case(name, method, status, _with_error(exact, side * allowed * factor), reference=exact)
+            yield KnownRun(name, method, status, _with_error(exact, side * allowed * factor), reference=exact)
     for growth, status in ((0.9e5, "inaccurate"), (1.1e5, "ok")):
         exact = _moving().replace(error_growth=_growth(growth))
-        yield Case(f"error at growth {growth:g}", method, status, _with_error(exact, 0.1, 8), reference=exact)
+        yield KnownRun(f"error at growth {growth:g}", method, status, _with_error(exact, 0.1, 8), reference=exact)
     early = _moving().replace(error_growth=_growth(1.0))
     early.error_growth[2] = 200.0
     wrong = _with_error(early, 100.0 * allowed, 8)
-    yield Case("error after a growth that has gone back", method, "ok", wrong, reference=early)
+    yield KnownRun("error after a growth that has gone back", method, "ok", wrong, reference=early)
 
 
 def _growth(value: float) -> Array:
@@ -266,18 +270,20 @@ def _growth(value: float) -> Array:
     return np.where(np.arange(11) < 4, 1.0, value)
 
 
-def _gross() -> Iterator[Case]:
+def _gross() -> Iterator[KnownRun]:
     """A hundredth of the scale or of the angle parts a coarse run from one that is another motion."""
     exact, method = _moving(), "lagrange/taylor"
     for side, lie in ((1.0 - _JUST, False), (1.0 + _JUST, True)):
         drifting, wrong = _with_drift(exact, side * 1e-2), _with_error(exact, side * 1e-2)
-        yield Case(f"a drift of {side:g} %", method, "inaccurate", drifting, is_false_success=lie)
-        yield Case(f"an error of {side:g} %", method, "inaccurate", wrong, reference=exact, is_false_success=lie)
+        yield KnownRun(f"a drift of {side:g} %", method, "inaccurate", drifting, is_false_success=lie)
+        yield KnownRun(f"an error of {side:g} %", method, "inaccurate", wrong, reference=exact, is_false_success=lie)
 
 
-def _not_held() -> Iterator[Case]:
+def _not_held() -> Iterator[KnownRun]:
     """The printed equations are not held to energy and reference, only to getting there."""
     exact = _moving()
-    yield Case("printed, far off", "printed/ode45", "ok", _with_drift(_with_error(exact, 1.0), 1.0), reference=exact)
-    yield Case("printed, broken off", "printed/ode45", "solver_failed", _cut(exact, 5), _FAILED)
-    yield Case("printed, past the motion's end", "printed/ode45", "ok", exact, reference=_cut(_moving(1.5707), 5))
+    yield KnownRun(
+        "printed, far off", "printed/ode45", "ok", _with_drift(_with_error(exact, 1.0), 1.0), reference=exact
+    )
+    yield KnownRun("printed, broken off", "printed/ode45", "solver_failed", _cut(exact, 5), _FAILED)
+    yield KnownRun("printed, past the motion's end", "printed/ode45", "ok", exact, reference=_cut(_moving(1.5707), 5))

@@ -16,7 +16,6 @@ from pathlib import Path
 from rotor_mbs.analysis.stability import Cell
 from rotor_mbs.execution.environment import fingerprint, machine, versions
 from rotor_mbs.execution.pool import run_tasks
-from rotor_mbs.execution.progress import Progress
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.store.merge import merge
@@ -57,11 +56,8 @@ def complete_records(
         for key, task in pieces.items()
         if key not in there and not (folder / f"{key}.h5").exists()
     ]
-    progress = Progress(len(missing))
-    for finished in run_tasks(perform, missing, jobs, _TASK_LIMIT_S):
-        what = f"{finished.task.scene.name} {finished.task.method} {finished.task.kind}"
-        progress.tell(f"{what} {finished.failure} {finished.message}".strip(), keep=bool(finished.failure))
-    progress.close()
+    for _ in run_tasks(perform, missing, jobs, _TASK_LIMIT_S):
+        pass
     made = [record for key in pieces for record in _piece_records(folder / f"{key}.h5")]
     if made or len(kept) < len(stored):
         write_records(folder / "all.h5", sorted([*kept, *made], key=lambda record: (record.kind, record.name)))

@@ -15,9 +15,8 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.store.read import open_results
 from rotor_mbs.store.stability import STATUSES, Record
-from rotor_mbs.studies.work import reference_trajectory
+from rotor_mbs.studies.frozen import load_reference
 
 FIXED_STEP = (
     "exudyn_tree/rk44",
@@ -61,10 +60,7 @@ def has_limit(scene: Scene, method: str) -> bool:
 
 
 def _ladder(task: StepTask) -> Record:
-    with open_results(task.results) as results:
-        stored = results.scenes[task.scene.name].reference
-        known = stored is not None and len(stored.array("time")) > 0
-        reference = reference_trajectory(task.scene, stored) if stored is not None and known else None
+    reference = load_reference(task.results, task.scene)
     interval = task.scene.duration / (task.scene.samples - 1)
     rows: list[tuple[float, Judgement]] = []
     expected, step = 0.0, interval

@@ -9,7 +9,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,14 +21,15 @@ from support.checking import (
     add_run,
     failed,
     faulty_run,
-    in_this_process,
     judged,
     results_file,
     shipped,
 )
 
 from rotor_mbs.analysis.verdicts import Verdict
-from rotor_mbs.cli import check, main
+from rotor_mbs.cli import main
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Outcome, Result
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report import verdict_formats
@@ -36,8 +37,8 @@ from rotor_mbs.scenario import resources
 from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.store.digests import write_digests
-from rotor_mbs.studies import check_runs
-from rotor_mbs.studies.check_runs import PROBES, Measured, Probe, measure
+from rotor_mbs.studies import check, check_probes
+from rotor_mbs.studies.check_probes import Measured, measure, probe, probes
 
 ROOT = Path(__file__).parents[2]
 SCENES = ("check/general", "check/held")
@@ -83,12 +84,12 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize(
-    "probe",
-    [probe for probe in PROBES if probe.kind in ("printed", "rules") or probe.method == "exudyn_tree/rk67"],
-    ids=lambda probe: f"{probe.kind}-{probe.method}",
+    "case",
+    [case for case in probes() if case.study in ("printed", "rules") or case.method == "exudyn_tree/rk67"],
+    ids=lambda case: f"{case.study}-{case.method}",
 )
-def test_measurements_pass(probe: Probe) -> None:
-    assert [v for v in _verdicts(probe) if not v.passed] == []
+def test_measurements_pass(case: Case) -> None:
+    assert [v for v in _verdicts(case) if not v.passed] == []
 
 
 @pytest.mark.slow
@@ -103,7 +104,7 @@ def test_the_default_set_passes_within_a_minute_of_two_cores(tmp_path: Path) -> 
     assert seconds < 2 * 60.0
     rows = json.loads((tmp_path / "check.json").read_text())
     assert all(row["passed"] for row in rows)
-    reached = {check.load_bounds().of(row["check"], row["method"]) for row in rows if row["check"] != "bound"}
+    reached = {load_bounds().of(row["check"], row["method"]) for row in rows if row["check"] != "bound"}
     unreached = [b for b in load_bounds().entries if b not in reached and b.check != "speed"]
     assert unreached == []  # a bound that no verdict reads is none
 
@@ -116,8 +117,8 @@ def _run_check(*arguments: str, path: str = str(ROOT)) -> subprocess.CompletedPr
     )  # fmt: skip
 
 
-def _verdicts(probe: Probe) -> list[Verdict]:
-    return [check._verdict(one, load_bounds()) for one in measure(probe)]
+def _verdicts(case: Case) -> list[Verdict]:
+    return [check.judge_measured(one, load_bounds()) for one in measure(case)]
 
 
 # Faults in the models
@@ -167,7 +168,7 @@ def test_a_phase_off_by_a_millionth_breaks_the_symmetry(monkeypatch: pytest.Monk
         return right(turn + parameters.Fraction(1e-6 / math.tau) if 0 < turn % 1 < 0.4 else turn)
 
     monkeypatch.setattr(parameters, "_cosine_of_turn", wrong)
-    worst = max(one.value for one in measure(Probe("symmetry", "paper/fig11", METHOD)))
+    worst = max(one.value for one in measure(probe("symmetry", "paper/fig11", METHOD)))
     assert worst > load_bounds().of("symmetry", METHOD).fault
 
 
@@ -184,21 +185,21 @@ def test_a_wrong_offset_is_told_by_the_recomputed_reference(monkeypatch: pytest.
         monkeypatch.setattr(parameters, "_inertia_about_hub", wrong(share))
         for cached in (parameters._coefficients, parameters._rotor_inertia):
             cached.cache_clear()
-        found = {one.check: one.value for one in measure(Probe("reference", scene, REFERENCE))}
+        found = {one.check: one.value for one in measure(probe("reference", scene, REFERENCE))}
         assert found[name] > load_bounds().of(name, REFERENCE).fault
     for cached in (parameters._coefficients, parameters._rotor_inertia):
         cached.cache_clear()
 
 
 def test_a_lost_order_is_as_far_off_as_its_bound_says() -> None:
-    measured = measure(Probe("order", "paper/fig11", "exudyn_tree/rk44", 2.0))[0]
+    (measured,) = measure(probe("order", "paper/fig11", "exudyn_tree/rk44", 2.0))
     assert measured.value > load_bounds().of("order", measured.method).fault
 
 
 def test_twice_the_work_and_more_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(check_runs, "SPEED_RATIOS", {"exudyn_tree/rk67": 1e-3})
-    monkeypatch.setattr(check_runs, "_SPEED_RUNS", 1)
-    (verdict,) = _verdicts(Probe("speed", "paper/fig08", "exudyn_tree/rk67"))
+    monkeypatch.setattr(check_probes, "SPEED_RATIOS", {"exudyn_tree/rk67": 1e-3})
+    monkeypatch.setattr(check_probes, "_SPEED_RUNS", 1)
+    (verdict,) = _verdicts(probe("speed", "paper/fig08", "exudyn_tree/rk67"))
     assert not verdict.passed
     assert "calibration runs, 0.001 on file" in verdict.look_at
 
@@ -313,7 +314,7 @@ def test_a_touched_reference_in_the_file_fails(copy: Path, capsys: pytest.Captur
 
 
 @pytest.fixture
-def own_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def own_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The shipped references in a folder of their own, to be touched."""
     folder = tmp_path / "reference"
     shutil.copytree(reference_folder(), folder, ignore=shutil.ignore_patterns("*.parts"))
@@ -321,8 +322,7 @@ def own_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
         write_digests(path)
     right = resources._folder
     monkeypatch.setattr(resources, "_folder", lambda name: folder if name == "reference" else right(name))
-    yield folder
-    check_runs._frozen.cache_clear()
+    return folder
 
 
 def test_a_frozen_reference_touched_in_its_last_bit_fails(own_references: Path) -> None:
@@ -350,8 +350,7 @@ def test_a_touched_frozen_reference_fails_when_recomputed(own_references: Path) 
     with h5py.File(own_references / "check.h5", "r+") as file:
         file["check/general/reference/angles"][100, 1] += 1e-9
     write_digests(own_references / "check.h5")  # the digests touched with it
-    check_runs._frozen.cache_clear()
-    assert [v.channel for v in failed(_verdicts(Probe("reference", "check/general", REFERENCE)))] == [
+    assert [v.channel for v in failed(_verdicts(probe("reference", "check/general", REFERENCE)))] == [
         "recomputed angles"
     ]
 
@@ -601,14 +600,13 @@ def test_json_on_standard_output_is_alone_there(good: Path, capsys: pytest.Captu
 # Without heyoka, and from the command line to the end
 
 
-def test_a_measurement_that_is_lost_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(check, "measure", lambda _: [Measured("tip", "s", METHOD, "c", math.nan, "", "")])
-    with in_this_process():
-        (verdict,) = check._probe([Probe("order", "s", METHOD)], load_bounds(), 1)
+def test_a_measurement_that_is_lost_fails() -> None:
+    lost = Outcome(probe("order", "paper/fig11", METHOD), Result("worker_died", "its process died"))
+    (measured,) = check.measured(lost)
+    verdict = check.judge_measured(measured, load_bounds())
     assert not verdict.passed
-    lost = check._verdict(check._lost(Probe("order", "s", METHOD), "its process died"), load_bounds())
-    assert not lost.passed
-    assert lost.look_at == "its process died"
+    assert verdict.look_at == "its process died"
+    assert not check.judge_measured(Measured("tip", "s", METHOD, "c", math.nan, "", ""), load_bounds()).passed
 
 
 @pytest.mark.slow
@@ -628,7 +626,7 @@ def test_a_changed_closed_form_fails_from_the_command_line(tmp_path: Path) -> No
     )  # fmt: skip
     assert done.returncode == 1, done.stderr
     lines = done.stdout.splitlines()
-    method = "lagrange/taylor" if check._is_available("lagrange/taylor") else METHOD
+    method = "lagrange/taylor" if check.is_available("lagrange/taylor") else METHOD
     named([line for line in lines if line.startswith("FAIL")], f"agreement: paper/fig11 {method} angles")
     named([line for line in lines if line.startswith("FAIL")], "printed: random states", "accelerations of 3, mended")
     assert not any("FAIL agreement" in line and "exudyn" in line for line in lines)

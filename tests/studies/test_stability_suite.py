@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import signal
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,17 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.checking import in_this_process
 
 from rotor_mbs.analysis.stability import OUTCOMES, advice, cells, in_words, reached_by, unreached
 from rotor_mbs.cli import main
-from rotor_mbs.execution.pool import Finished, run_tasks
+from rotor_mbs.execution.pool import Finished
 from rotor_mbs.report.pages.stability import write_stability_report
 from rotor_mbs.report.pages.stability_texts import NOT_COMPARED
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.stability import Record, read_records, write_records
 from rotor_mbs.studies import stability_records
-from rotor_mbs.studies.batch import Batch, execute
+from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stability_records import complete_records
 
 SCENES = ("stiff/bearing-1e8-damping-100", "extreme/light-1e-8", "extreme/rate-1e200")
@@ -79,8 +75,7 @@ def test_a_run_held_by_its_energy_alone_says_so(tmp_path: Path) -> None:
     pytest.importorskip("heyoka")
     path = tmp_path / "needle.h5"
     (one,) = find_scenes(["extreme/needle-fig05-1e-15"])
-    with in_this_process():
-        execute(Batch([replace(one, samples=2)], {one.name: ["lagrange/taylor"]}, path, 1, 60.0))
+    run_scenes([replace(one, samples=2)], {one.name: ["lagrange/taylor"]}, path, workers=0, timeout_s=60.0)
     (cell,) = cells(path)
     assert (cell.status, cell.outcome) == ("ok", "energy_alone")
     assert cell.message == "held by its energy alone: the horizon is before the second sample"
@@ -112,8 +107,7 @@ def test_an_interrupted_suite_goes_on_with_its_records(tmp_path: Path, monkeypat
     path = tmp_path / "s.h5"
     scenes, methods = find_scenes(["extreme/zero-gravity"]), ["lagrange/ode45", "exudyn_tree/rk67", "exudyn_tree/rk44"]
     by_scene = {"extreme/zero-gravity": methods}
-    with in_this_process():
-        execute(Batch(scenes, by_scene, path, 1, 60.0))
+    run_scenes(scenes, by_scene, path, workers=0, timeout_s=60.0)
     made: list[str] = []
     ends_after = 1
 
@@ -135,20 +129,3 @@ def test_an_interrupted_suite_goes_on_with_its_records(tmp_path: Path, monkeypat
     complete_records(scenes, by_scene, [], path, 1)
     assert made == methods
     assert [file.name for file in tmp_path.iterdir()] == ["s.h5"]
-
-
-def _work(task: int) -> int:
-    if task == 1:
-        os.kill(os.getpid(), signal.SIGKILL)
-    if task == 2:
-        time.sleep(60.0)
-    return task
-
-
-def test_a_killed_worker_and_a_hung_one_cost_their_own_run_alone() -> None:
-    start = time.monotonic()
-    ended = {finished.task: finished for finished in run_tasks(_work, [0, 1, 2, 3, 4], 2, 2.0)}
-    assert time.monotonic() - start < 30.0
-    assert {task for task, finished in ended.items() if finished.value == task} == {0, 3, 4}
-    assert ended[1].failure == "worker_died"
-    assert ended[2].failure == "timed_out"

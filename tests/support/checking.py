@@ -6,13 +6,10 @@ import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from unittest import mock
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.verdicts import Verdict
-from rotor_mbs.cli import check
-from rotor_mbs.execution.pool import Finished
 from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn import chain
@@ -22,25 +19,10 @@ from rotor_mbs.scenario.scene import Blade, Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.merge import merge
-from rotor_mbs.store.read import open_results
 from rotor_mbs.store.write import write_run
-from rotor_mbs.studies import batch
-from rotor_mbs.studies.batch import Batch, execute
-
-
-def _one_by_one(work: Callable[[Any], Any], tasks: Sequence[Any], _workers: int, _timeout_s: float) -> Iterator[Any]:
-    """In place of the pool: here, where a fault can be put in."""
-    for task in tasks:
-        yield Finished(task, work(task))
-
-
-@contextlib.contextmanager
-def in_this_process() -> Iterator[None]:
-    with (
-        mock.patch.object(batch, "run_tasks", _one_by_one),
-        mock.patch.object(check, "run_tasks", _one_by_one),
-    ):
-        yield
+from rotor_mbs.studies import check
+from rotor_mbs.studies.frozen import load_reference
+from rotor_mbs.studies.run import run_scenes
 
 
 def shipped(name: str) -> Scene:
@@ -50,19 +32,13 @@ def shipped(name: str) -> Scene:
 def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], timeout_s: float = 60.0) -> Path:
     """A batch as `run` makes it."""
     found = find_scenes(scenes)
-    with in_this_process():
-        execute(Batch(found, {scene.name: methods for scene in found}, path, 1, timeout_s))
+    run_scenes(found, {scene.name: methods for scene in found}, path, workers=0, timeout_s=timeout_s)
     return path
 
 
 def add_run(path: Path, scene: Scene, run: Solution) -> None:
     """A run into a file that has its scene's reference, judged as a batch judges it."""
-    from rotor_mbs.studies.work import reference_trajectory
-
-    with open_results(path) as results:
-        stored = results.scenes[scene.name].reference
-        assert stored is not None
-        verdict = judge(scene, run, reference_trajectory(scene, stored))
+    verdict = judge(scene, run, load_reference(path, scene))
     facts = {"status": verdict.status, "message": verdict.message, "false_success": verdict.false_success}
     piece = path.with_name("piece.h5")
     write_run(piece, scene_hash(scene), replace(run, scene=scene), {**facts, **verdict.metrics})

@@ -375,14 +375,14 @@ STATUS_WORDS = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "ti
 
 def _verdicts_of(group: str) -> Iterator[list[Any]]:
     """What `check` says, the cheap parts first. Imported here: after the mutant's text was put in place."""
-    from rotor_mbs.cli import check
     from rotor_mbs.scenario.bounds import load_bounds
-    from rotor_mbs.studies import check_runs
+    from rotor_mbs.studies import check, check_probes
 
     if group in ("lagrange", "printed", "rules"):
-        probe = next(probe for probe in check_runs.PROBES if probe.kind == ("rules" if group == "rules" else "printed"))
-        for one in check_runs.measurements(probe):
-            yield [check._verdict(one, load_bounds())]
+        kind = "rules" if group == "rules" else "printed"
+        probe = next(probe for probe in check_probes.probes() if probe.study == kind)
+        for one in check_probes.measure(probe):
+            yield [check.judge_measured(one, load_bounds())]
     batches = {
         "lagrange": [(("check/held",), "lagrange/dop853"), (("check/general",), "lagrange/dop853")],
         "printed": [(("check/point-masses", "paper/fig04b"), "printed/ode45"),

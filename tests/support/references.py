@@ -14,7 +14,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import open_results
-from rotor_mbs.studies.work import reference_trajectory
+from rotor_mbs.studies.frozen import reference_trajectory
 
 TAYLOR = "lagrange/taylor"
 

@@ -1,0 +1,200 @@
+"""The one way to compute cases: skip what is stored, compute the rest in parallel, store each when it ends.
+
+Every finished case is a file `<output>.parts/<key>.h5`, written by its worker process. The parts are merged into the
+output at the end of the call, or by the next call where this one was interrupted.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias
+
+from rotor_mbs.errors import InputError, RotorError, StoreError
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.pool import Finished, run_tasks
+
+# Statuses of a case of which there is no record: the same call tries it again.
+NOT_COMPUTED = ("worker_died", "error", "no_reference")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case on its way to a worker process.
+
+    part            the file that its record goes to
+    reference       the file that has the record of `case.reference`; None where there is none
+    time_limit_s    after which it ends itself
+    """
+
+    case: Case
+    part: Path
+    reference: Path | None = None
+    time_limit_s: float = float("inf")
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a worker process reports of a job: status, one line of message ("" where all is well), run time in s."""
+
+    status: str
+    message: str = ""
+    seconds: float = 0.0
+    value: Any = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A case that this call computed, or tried to."""
+
+    case: Case
+    result: Result
+
+    @property
+    def is_computed(self) -> bool:
+        """False where its process died or could not start: nothing is known of the case and nothing stored."""
+        return self.result.status not in NOT_COMPUTED
+
+
+class Store(Protocol):
+    """Where records are kept: a file found by its path, in which each record has a key."""
+
+    @property
+    def path(self) -> Path: ...
+
+    def stored_keys(self) -> AbstractSet[str]:
+        """Keys of all records in the file; none where there is no file. Raises StoreError."""
+
+    def merge(self, parts: Sequence[Path]) -> None:
+        """The records of `parts` into the file, atomically; later ones take the place of earlier ones."""
+
+
+Perform: TypeAlias = Callable[[Job], Result]
+OnProgress: TypeAlias = Callable[[int, int, Outcome], None]
+Run: TypeAlias = Callable[[Perform, Sequence[Job], int, float], Iterable[Finished[Job, Result]]]
+
+
+def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
+    """Where nobody wants to know."""
+
+
+def execute(
+    cases: Iterable[Case],
+    perform: Perform,
+    store: Store,
+    workers: int,
+    timeout_s: float,
+    on_progress: OnProgress = ignore_progress,
+    *,
+    on_time_out: Callable[[Job, str], Result] | None = None,
+    run: Run | None = None,
+) -> list[Outcome]:
+    """The outcomes of the cases that `store` did not have; those that others are compared with come first.
+
+    perform       computes a job and writes its part, in a worker process
+    workers       parallel processes; 0: one after the other in this process
+    timeout_s     of one case; its process is ended where the case has not ended itself a while after that
+    on_progress   called with (cases done, of how many, outcome) after each
+    on_time_out   writes the part of a job whose process was ended, in this process
+    run           in place of the process pool
+
+    Raises InputError where another process is writing the output, StoreError, and what `perform` raises of RotorError.
+    """
+    with _parts_folder(store.path) as parts:
+        stored = store.stored_keys()
+        missing = [case for case in cases if case.key not in stored and not _part(parts, case.key).exists()]
+        made: list[Outcome] = []
+        for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
+            jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored), timeout_s) for case in wave]
+            for outcome in _outcomes(jobs, perform, workers, on_time_out, run or run_tasks):
+                made.append(outcome)
+                on_progress(len(made), len(missing), outcome)
+        found = sorted(parts.glob("*.h5"), key=lambda path: (path.stem in {case.key for case in missing}, path.name))
+        if found or not store.path.exists():
+            store.merge(found)
+    return made
+
+
+def compute(
+    cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float, run: Run | None = None
+) -> Iterator[Outcome]:
+    """Outcomes of cases of which nothing is stored, as they come."""
+    jobs = [Job(case, Path(), None, timeout_s) for case in cases]
+    return _outcomes(jobs, perform, workers, None, run or run_tasks)
+
+
+def _outcomes(
+    jobs: Sequence[Job],
+    perform: Perform,
+    workers: int,
+    on_time_out: Callable[[Job, str], Result] | None,
+    run: Run,
+) -> Iterator[Outcome]:
+    ready = []
+    for job in jobs:
+        if job.reference is None or job.reference.exists():
+            ready.append(job)
+        else:
+            yield Outcome(job.case, Result("no_reference", "its reference was not computed"))
+    if not ready:
+        return
+    # What ends itself at its time limit needs a moment to write what it has.
+    limit = 1.2 * ready[0].time_limit_s + 10.0
+    for finished in run(perform, ready, workers, limit) if workers else _in_this_process(perform, ready):
+        yield Outcome(finished.task.case, _result(finished, on_time_out))
+
+
+def _in_this_process(perform: Perform, jobs: Iterable[Job]) -> Iterator[Finished[Job, Result]]:
+    for job in jobs:
+        yield Finished(job, perform(job))
+
+
+def _result(finished: Finished[Job, Result], on_time_out: Callable[[Job, str], Result] | None) -> Result:
+    if finished.value is not None:
+        return finished.value
+    if isinstance(finished.error, RotorError):
+        raise finished.error
+    if finished.failure == "timed_out" and on_time_out is not None:
+        return on_time_out(finished.task, finished.message)
+    return Result(finished.failure, finished.message)
+
+
+def _part(parts: Path, key: str) -> Path:
+    return parts / f"{key}.h5"
+
+
+def _place(case: Case, parts: Path, store: Store, stored: AbstractSet[str]) -> Path | None:
+    """The file with the record of the case's reference."""
+    if not case.reference:
+        return None
+    return store.path if case.reference in stored else _part(parts, case.reference)
+
+
+@contextmanager
+def _parts_folder(output: Path) -> Iterator[Path]:
+    """The folder of the parts, locked against other processes; it stays where the block is left with parts in it."""
+    from filelock import FileLock, Timeout
+
+    parts = output.with_name(f"{output.name}.parts")
+    try:
+        parts.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(parts / "lock", timeout=0)
+        lock.acquire()
+    except Timeout:
+        raise InputError(
+            f"{output}: another process is writing it now; allowed: wait for its end, or another output file"
+        ) from None
+    except OSError as exc:
+        raise StoreError(f"{output.parent}: cannot be written: {exc.strerror}") from exc
+    try:
+        yield parts
+        for part in parts.glob("*.h5"):
+            part.unlink()
+    finally:
+        if not any(parts.glob("*.h5")):
+            shutil.rmtree(parts)
+        lock.release()

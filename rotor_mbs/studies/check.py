@@ -1,0 +1,166 @@
+"""The accuracy check: verdicts on a results file, or on a default set that is computed for the purpose."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from rotor_mbs.analysis.verdicts import Verdict, verdicts
+from rotor_mbs.errors import StoreError
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import OnProgress, Outcome, compute, ignore_progress
+from rotor_mbs.methods.catalogue import METHOD_NAMES, REFERENCE, available_defaults
+from rotor_mbs.scenario.bounds import Bounds
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import is_held
+from rotor_mbs.store.digests import touched
+from rotor_mbs.store.read import open_results
+from rotor_mbs.studies.check_probes import Measured, perform_probe, probes, speed_probes
+from rotor_mbs.studies.frozen import shipped_files
+from rotor_mbs.studies.run import run_scenes
+
+# The chain takes as long as all else together: four scenes of the paper tell what it has to tell.
+_CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
+_TIMEOUT_S = 60.0
+_OF_EVERY_RUN = "status"  # a check that each run has one verdict of
+
+
+@dataclass(frozen=True)
+class DefaultSet:
+    """What is computed where no file is given: methods by scene name, and measurements beside them."""
+
+    scenes: Sequence[Scene]
+    methods: Mapping[str, Sequence[str]]
+    probes: Sequence[Case]
+
+
+def default_set() -> DefaultSet:
+    """Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method."""
+    paper, own = find_scenes(["paper"]), find_scenes(["check"])
+    corrected = [name for name in METHOD_NAMES if is_held(name) and is_available(name)]
+    methods = {
+        scene.name: [name for name in available_defaults() if name != _CHAIN or scene.name in _CHAIN_SCENES]
+        for scene in paper
+    }
+    methods |= {scene.name: corrected for scene in own}
+    return DefaultSet([*paper, *own], methods, probes())
+
+
+def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Verdict]:
+    """Verdicts on what is stored, and on whether every scene has a run of each required method.
+
+    Raises StoreError, InputError.
+    """
+    found = judge_file(path, bounds)
+    return [*found, *_judge_presence(found, required)]
+
+
+def check_default_set(
+    chosen: DefaultSet, bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress
+) -> list[Verdict]:
+    """Computes the set and judges it, and the frozen references and bounds that it is judged by."""
+    found = [*judge_bounds(bounds), *judge_frozen(bounds)]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "check.h5"
+        report = run_scenes(
+            chosen.scenes, chosen.methods, path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress
+        )
+        found += [_missing(one.case.scene.name, one.case.method, one.result.message) for one in report.not_computed]
+        found += judge_file(path, bounds)
+    return found + judge_probes(chosen.probes, bounds, workers)
+
+
+def check_speed(bounds: Bounds) -> list[Verdict]:
+    """Run times against those on file, in one process after the other."""
+    return judge_probes(speed_probes(), bounds, 1)
+
+
+def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
+    """Verdicts on what is there. Raises StoreError, InputError."""
+    with ExitStack() as stack:
+        results = stack.enter_context(open_results(path))
+        shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
+        return verdicts(results, shipped, bounds)
+
+
+def _judge_presence(found: Sequence[Verdict], required: Sequence[str]) -> list[Verdict]:
+    there = {(verdict.scene, verdict.method) for verdict in found}
+    scenes = dict.fromkeys(verdict.scene for verdict in found if verdict.check == _OF_EVERY_RUN)
+    return [
+        _missing(scene, method, "not in the file", is_missing=(scene, method) not in there)
+        for scene in scenes
+        for method in required
+    ]
+
+
+def _missing(scene: str, method: str, look: str, *, is_missing: bool = True) -> Verdict:
+    return Verdict("required", scene, method, "run", float(is_missing), 0.0, "missing", look)
+
+
+def judged_runs(found: Iterable[Verdict]) -> dict[str, int]:
+    """How many runs of each method were judged, so that a run that is not there is missed by whoever reads."""
+    counts: dict[str, int] = {}
+    for one in found:
+        if one.check == _OF_EVERY_RUN and one.method != REFERENCE:
+            counts[one.method] = counts.get(one.method, 0) + 1
+    return counts
+
+
+def judge_bounds(bounds: Bounds) -> list[Verdict]:
+    """Every shipped bound below what a known fault gives: else it would let that fault pass."""
+    return [
+        Verdict("bound", "bounds", one.method, one.check, one.value, one.fault, "as its check", one.known_fault)
+        for one in bounds.entries
+        if math.isfinite(one.fault)
+    ]
+
+
+def judge_frozen(bounds: Bounds) -> list[Verdict]:
+    """Every shipped reference against its digests, one verdict a scene."""
+    bound = bounds.of("frozen", REFERENCE).value
+    found = []
+    for path in shipped_files():
+        with open_results(path) as results:
+            try:
+                scenes = touched(results)
+            except StoreError as exc:
+                found.append(Verdict("frozen", path.stem, REFERENCE, "all", math.nan, bound, "arrays", str(exc)))
+                continue
+        for scene, names in scenes.items():
+            look = f"{path.name}: {', '.join(names)} not as frozen" if names else "as frozen"
+            channel = ", ".join(names) or "all"
+            found.append(Verdict("frozen", scene, REFERENCE, channel, float(len(names)), bound, "arrays", look))
+    return found
+
+
+def is_available(method: str) -> bool:
+    """Whether the engine of `method` is installed."""
+    return method != "lagrange/taylor" or importlib.util.find_spec("heyoka") is not None
+
+
+def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Verdict]:
+    """Verdicts on measurements, in the order of `cases`; a measurement that was lost fails."""
+    available = [case for case in cases if is_available(case.method)]
+    outcomes = {outcome.case: outcome for outcome in compute(available, perform_probe, workers, _TIMEOUT_S)}
+    return [judge_measured(one, bounds) for case in available for one in measured(outcomes[case])]
+
+
+def measured(outcome: Outcome) -> list[Measured]:
+    """What a probe found; where it was lost, one measurement that is not a number."""
+    if outcome.result.value is not None:
+        found: list[Measured] = outcome.result.value
+        return found
+    case = outcome.case
+    return [Measured(case.study, case.scene.name, case.method, "all", math.nan, "", outcome.result.message)]
+
+
+def judge_measured(one: Measured, bounds: Bounds) -> Verdict:
+    """A measured number against its bound."""
+    bound = bounds.of(one.check, one.method).value
+    return Verdict(one.check, one.scene, one.method, one.channel, one.value, bound, one.unit, one.look_at)

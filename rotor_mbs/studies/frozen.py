@@ -1,0 +1,102 @@
+"""References read from results files: those shipped with the package, and those computed beside the runs of a study."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store.read import StoredRun, open_results
+
+
+def shipped_files() -> list[Path]:
+    """The files of frozen references."""
+    return sorted(reference_folder().glob("*.h5"))
+
+
+def frozen_file(scene_hash: str) -> Path | None:
+    """The shipped file with the reference of the scene of that hash; None where there is none."""
+    return _files_by_hash(tuple(shipped_files())).get(scene_hash)
+
+
+@functools.cache
+def _files_by_hash(files: tuple[Path, ...]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for path in files:
+        with open_results(path) as results:
+            found |= {str(scene.attributes["scene_hash"]): path for scene in results.scenes.values()}
+    return found
+
+
+@functools.cache
+def digest(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def load_reference(path: Path, scene: Scene) -> Trajectory | None:
+    """The reference of `scene` in a results file; None where there is none, or where it is empty."""
+    with open_results(path) as results:
+        stored = results.scenes[scene.name].reference if scene.name in results.scenes else None
+        if stored is None or not len(stored.array("time")):
+            return None
+        return reference_trajectory(scene, stored)
+
+
+def load_frozen(name: str) -> Trajectory:
+    """Angles, rates and error growth of the shipped reference of a shipped scene. Raises StoreError without one."""
+    for path in shipped_files():
+        with open_results(path) as results:
+            stored = results.scenes[name].reference if name in results.scenes else None
+            if stored is not None:
+                time, angles, rates, growth = map(stored.array, ("time", "angles", "rates", "error_growth"))
+                return Trajectory(time, angles, rates, error_growth=growth)
+    raise StoreError(f"{reference_folder()}: no frozen reference of {name}; `rotor-mbs reference` makes one")
+
+
+def reference_trajectory(scene: Scene, stored: StoredRun) -> Trajectory:
+    """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form."""
+    from rotor_mbs.models.lagrange import samples
+
+    angles, rates = stored.array("angles"), stored.array("rates")
+    moving = [0] + [1 + i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
+    states = [angles[:, moving], rates[:, moving]]
+    if "work" in stored:
+        states.append(stored.array("work")[:, None])
+    result = samples.trajectory(scene, stored.array("time"), np.hstack(states), tuple(moving))
+    result.angle_uncertainty = stored.array("angle_uncertainty")
+    result.error_growth = stored.array("error_growth") if "error_growth" in stored else None
+    return result
+
+
+def frozen_solution(scene: Scene, scene_hash: str) -> tuple[Solution, dict[str, Any]]:
+    """The shipped reference of a scene, with the settings and times of when it was computed; and who computed it."""
+    path = frozen_file(scene_hash)
+    if path is None:
+        raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}")
+    with open_results(path) as results:
+        stored = next(s for s in results.scenes.values() if s.attributes["scene_hash"] == scene_hash).reference
+        assert stored is not None  # a file of references has one for each scene
+        facts = stored.attributes
+        trajectory = reference_trajectory(scene, stored)
+        is_complete = len(trajectory.time) == scene.samples
+        engine = Integration(
+            is_complete,
+            "" if is_complete else "the frozen reference ends here",
+            facts["time_reached"],
+            facts["steps"],
+            out_of_time=facts["status"] == "timed_out",
+        )
+        times = (facts["setup_time_s"], [facts["run_time_s"]], facts["output_time_s"])
+        return Solution(scene, REFERENCE, trajectory, engine, stored.settings, *times), {
+            "frozen_with": facts["frozen_with"]
+        }

@@ -1,0 +1,39 @@
+"""The main job: every scene of the paper by the default methods and with each erratum alone; the errata checked."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+from rotor_mbs.execution.environment import numerics_fingerprint
+from rotor_mbs.execution.execute import OnProgress, ignore_progress
+from rotor_mbs.methods.catalogue import ERRATA_METHODS, available_defaults
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.store.errata import errata_fingerprint, write_errata
+from rotor_mbs.store.read import open_results
+from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.studies.run import RunReport, able_methods, run_scenes
+
+
+def reproduce(output: Path, *, workers: int, timeout_s: float, on_progress: OnProgress = ignore_progress) -> RunReport:
+    """Into the results file `output`; what it has already is kept. Raises InputError, StoreError."""
+    scenes = find_scenes(["paper"])
+    names = (*available_defaults(), *ERRATA_METHODS)
+    methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
+    report = run_scenes(scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress)
+    _complete_errata(output)
+    return report
+
+
+def _complete_errata(output: Path) -> None:
+    """The check of every printed entry, unless the file has that of the same code already."""
+    from rotor_mbs.models.printed.errata import check_errata
+
+    with open_results(output) as results:
+        if errata_fingerprint(results) == numerics_fingerprint():
+            return
+    checks = [asdict(check) | {"explained_by": ", ".join(check.explained_by)} for check in check_errata()]
+    part = output.with_name(f"{output.name}.errata.h5")
+    write_errata(part, checks, numerics_fingerprint())
+    ResultsFile(output).merge([part])
+    part.unlink()

@@ -1,0 +1,219 @@
+"""Runs of scenes: solved, judged against the reference of their scene, and stored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rotor_mbs.errors import InputError, MethodRefusal, RotorError
+from rotor_mbs.execution.case import RUN, Case
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
+from rotor_mbs.execution.pool import one_line
+from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.catalogue import REFERENCE, available_defaults, find_method
+from rotor_mbs.methods.selection import choose
+from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import is_held, judge
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store.read import open_results
+from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.store.write import write_run
+from rotor_mbs.studies.frozen import digest, frozen_file, frozen_solution, load_reference
+
+# Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
+_REPEATS = 5
+_REPEAT_BUDGET_S = 0.05
+_SLOW_MODELS = ("exudyn_chain", "printed", "exudyn_tree")
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """What became of a list of cases: those that this call computed, and how many were stored already."""
+
+    made: list[Outcome]
+    kept: int
+
+    @property
+    def failures(self) -> list[Outcome]:
+        """Runs that should have succeeded and did not. How far the printed equations get is data, not a failure."""
+        return [one for one in self._with_record() if is_held(one.case.method)]
+
+    @property
+    def broken_off(self) -> list[Outcome]:
+        """Runs of the printed equations that did not reach the end."""
+        return [one for one in self._with_record() if not is_held(one.case.method)]
+
+    @property
+    def not_computed(self) -> list[Outcome]:
+        """Runs whose process died or could not start; nothing is stored, the same call tries them again."""
+        return [one for one in self.made if not one.is_computed]
+
+    def _with_record(self) -> list[Outcome]:
+        return [one for one in self.made if one.is_computed and one.result.status != "ok"]
+
+
+def run_scenes(
+    scenes: Sequence[Scene],
+    methods: Mapping[str, Sequence[str]],
+    output: Path,
+    *,
+    workers: int,
+    timeout_s: float,
+    settings: Mapping[str, object] | None = None,
+    use_frozen: bool = True,
+    on_progress: OnProgress = ignore_progress,
+) -> RunReport:
+    """Every scene's reference and runs into the results file `output`; what it has already is kept.
+
+    methods      by scene name
+    workers      parallel processes; 0: all in this process
+    timeout_s    a run over this ends itself, and is stored with the status timed_out
+    settings     of every method, in place of its defaults
+    use_frozen   whether a shipped reference may stand for a computed one
+
+    Raises InputError, StoreError, KeyboardInterrupt; the same call then goes on where it stopped.
+    """
+    cases: list[Case] = []
+    for scene in scenes:
+        reference = reference_case(scene, use_frozen=use_frozen)
+        cases += [reference, *run_cases(scene, methods[scene.name], reference, settings or {})]
+    refuse_losses(output, cases)
+    cases.sort(key=_slowest_first)
+    made = execute(
+        cases, perform_run, ResultsFile(output), workers, timeout_s, on_progress, on_time_out=_store_time_out
+    )
+    return RunReport(made, len(cases) - len(made))
+
+
+def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
+    """The reference of a scene: the shipped one, where there is one and it may be used, or one to be computed."""
+    case = Case(scene, REFERENCE)
+    path = frozen_file(case.scene_hash) if use_frozen else None
+    return case if path is None else Case(scene, REFERENCE, options={"frozen": digest(path)})
+
+
+def run_cases(scene: Scene, methods: Iterable[str], reference: Case, settings: Mapping[str, object]) -> list[Case]:
+    """A run of the scene by each method. Raises InputError for a setting that a method does not have."""
+    for name in methods:
+        _refuse_unknown_settings(name, settings)
+    return [Case(scene, name, settings, reference=reference.key) for name in methods]
+
+
+def _refuse_unknown_settings(method: str, settings: Mapping[str, object]) -> None:
+    known = find_method(method).DEFAULTS
+    unknown = [name for name in settings if name not in known]
+    if unknown:
+        raise InputError([f"{method} has no setting {name!r}; allowed: {', '.join(known)}" for name in unknown])
+
+
+def perform_run(job: Job) -> Result:
+    """Solves, judges and stores one run, in a worker process. Raises StoreError where it cannot be written."""
+    case = job.case
+    if case.method == REFERENCE and "frozen" in case.options:
+        run, attributes = frozen_solution(case.scene, case.scene_hash)
+    else:
+        method, attributes = find_method(case.method), {}
+        try:
+            run = solve(case.method, method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
+        except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
+            return store_failure(job, "timed_out", str(exc))
+        except RotorError as exc:
+            return store_failure(job, "solver_failed", str(exc))
+        except Exception as exc:
+            return store_failure(job, "solver_failed", one_line(exc))
+    if case.method == REFERENCE:
+        reference: Trajectory | None = run.trajectory
+    else:
+        reference = load_reference(job.reference, case.scene) if job.reference is not None else None
+    verdict = judge(case.scene, run, reference)
+    attributes |= {
+        "status": verdict.status,
+        "message": verdict.message,
+        "false_success": verdict.false_success,
+        "run_hash": case.key,
+        **verdict.metrics,
+    }
+    write_run(job.part, case.scene_hash, run, attributes)
+    return Result(verdict.status, verdict.message, float(np.median(run.run_times_s)))
+
+
+def store_failure(job: Job, status: str, message: str) -> Result:
+    """Stores a run that left no samples."""
+    case = job.case
+    columns = 1 + len(case.scene.blades)
+    trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
+    run = Solution(case.scene, case.method, trajectory, Integration(False, message), dict(case.settings))
+    attributes = {"status": status, "message": message, "false_success": False, "run_hash": case.key}
+    write_run(job.part, case.scene_hash, run, attributes)
+    return Result(status, message)
+
+
+def _store_time_out(job: Job, message: str) -> Result:
+    return store_failure(job, "timed_out", message)
+
+
+def _slowest_first(case: Case) -> int:
+    """So that no long run starts last and keeps one process busy while the others wait."""
+    model = case.method.split("/")[0]
+    return _SLOW_MODELS.index(model) if model in _SLOW_MODELS else len(_SLOW_MODELS)
+
+
+def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Those of `names` that can represent the scene, and a line for each that cannot."""
+    able, refused = [], []
+    for name in names:
+        try:
+            find_method(name).items(scene)
+            able.append(name)
+        except MethodRefusal as exc:
+            refused.append(f"{scene.name}: {name} left out: {exc}")
+    return able, refused
+
+
+def asked_methods(scenes: Sequence[Scene], names: Sequence[str]) -> dict[str, list[str]]:
+    """`names` for every scene. Raises InputError where one cannot represent a scene."""
+    found = {scene.name: able_methods(scene, names) for scene in scenes}
+    refused = [line for _, lines in found.values() for line in lines]
+    if refused:
+        raise InputError(refused)
+    return {name: able for name, (able, _) in found.items()}
+
+
+def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], list[str]]:
+    """The methods that the rule selects for each scene, none where it refuses; and the reasons, a line each."""
+    methods: dict[str, list[str]] = {}
+    reasons: list[str] = []
+    for scene in scenes:
+        try:
+            choice = choose(scene, available_defaults())
+        except MethodRefusal as exc:
+            methods[scene.name] = []
+            reasons.append(str(exc))
+            continue
+        methods[scene.name], left_out = able_methods(scene, choice.methods)
+        reasons += [f"{scene.name}: {choice.reason}: {', '.join(methods[scene.name])}", *left_out]
+    return methods, reasons
+
+
+def refuse_losses(output: Path, cases: Sequence[Case]) -> None:
+    """Raises InputError where runs stored for a scene with other numbers would be dropped and not made anew."""
+    if not output.exists():
+        return
+    wanted = {(case.scene.name, case.method) for case in cases if case.study == RUN}
+    numbers = {case.scene.name: case.scene_hash for case in cases}
+    with open_results(output) as results:
+        lost = [
+            f"{output}: {scene.name}: has {run.method} of a scene of that name with other numbers, which this call "
+            "would drop; allowed: another output file, or a call that has this method too"
+            for scene in results.scenes.values()
+            if numbers.get(scene.name, scene.attributes["scene_hash"]) != scene.attributes["scene_hash"]
+            for run in scene.runs.values()
+            if (scene.name, run.method) not in wanted
+        ]
+    if lost:
+        raise InputError(lost)
