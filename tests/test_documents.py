@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rotor_mbs.cli.arguments import parse
-from rotor_mbs.scenario.load import load_scene
+from rotor_mbs.scenario.scene_file import load_scene
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from rotor_mbs.analysis import methods
-from rotor_mbs.analysis.published import Asked, Condition, Published, published
+from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
 from rotor_mbs.analysis.statistics import measure
 from rotor_mbs.store.read import StoredRun, StoredScene
 
@@ -63,7 +63,7 @@ class _Runs:
     def of(self, scene: str) -> StoredRun | None:
         return self.choose(self.scenes[scene]) if scene in self.scenes else None
 
-    def value(self, asked: Asked) -> float | None:
+    def value(self, asked: TrajectoryNumber) -> float | None:
         run = self.of(asked.scene)
         return None if run is None else measure(run, asked)
 

@@ -1,20 +1,20 @@
-"""What the paper says, read from the files under `reference/`: numbers, claims, errata. Compares nothing."""
+"""What the paper says, read from the files under `reference/`: numbers, claims, errata. Must not compare anything."""
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal, NamedTuple, TypeVar
 
-from rotor_mbs.errors import RotorError
+from pydantic import BeforeValidator, Field, model_validator
+
 from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.toml_file import read_toml, shown_path
+from rotor_mbs.scenario.validation import Number, Table, Text, invalid, validate_file
+
+T = TypeVar("T", bound=Table)
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A number to be read off a trajectory: scene, "angle" or "rate", coordinate (0 rotor), statistic."""
+class TrajectoryNumber(NamedTuple):
+    """A number read off a trajectory: scene, "angle" or "rate", coordinate (0 rotor, i pitch of blade i), statistic."""
 
     scene: str
     quantity: str
@@ -22,34 +22,57 @@ class Asked:
     statistic: str
 
 
-@dataclass(frozen=True)
-class Condition:
-    """`of` stands in `relation` ("<", ">", "opposite" in sign) to another number or to a bound."""
+def _trajectory_number(value: object) -> object:
+    match value:
+        case [str() as scene, "angle" | "rate" as quantity, int() as coordinate, str() as statistic]:
+            return TrajectoryNumber(scene, str(quantity), coordinate, statistic)
+        case TrajectoryNumber() | None:
+            return value
+    raise invalid("{shown} is not a number of a trajectory", '[scene, "angle" or "rate", coordinate, statistic]')
 
-    of: Asked
-    relation: str
-    than: Asked | None = None
-    bound: float | None = None
+
+ReadOff = Annotated[TrajectoryNumber, BeforeValidator(_trajectory_number)]
+Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 
 
-@dataclass(frozen=True)
-class Published:
+class Condition(Table):
+    """`of` stands in `relation` to another number, or to a bound; "opposite" means of opposite sign."""
+
+    of: ReadOff
+    relation: Literal["<", ">", "opposite"] = Field(description='"<", ">" or "opposite"')
+    than: ReadOff | None = None
+    bound: Number | None = None
+
+    @model_validator(mode="after")
+    def _has_one_limit(self) -> Condition:
+        if (self.than is None) == (self.bound is None) or (self.relation == "opposite" and self.than is None):
+            raise invalid(f"a relation {self.relation} with than {self.than}, bound {self.bound}", "than or bound")
+        return self
+
+
+class Published(Table):
     """A number or claim of the paper. A number has of, value, decimals; a claim has statement, tests.
 
-    matched: of a number that is grown rounding error: the run's length and the order of adding the weights were chosen
-    so that it comes out.
+    matched: of a number that is amplified rounding error: the run's length and the order of adding the weights were
+    chosen so that it is reproduced.
     """
 
-    id: str
-    figure: str
-    kind: str
-    quote: str
-    statement: str = ""
-    of: Asked | None = None
-    value: float = 0.0
-    decimals: int = 0
-    matched: bool = False
-    tests: tuple[Condition, ...] = ()
+    id: Text = Field(description="a name")
+    figure: Text = Field(description="the figure's number")
+    kind: Literal["number", "claim"] = Field(description='"number" or "claim"')
+    quote: Text = Field(description="the paper's words")
+    statement: str = Field("", description="the claim as one sentence")
+    of: ReadOff | None = None
+    value: Number = Field(0.0, description="the printed number")
+    decimals: int = Field(0, ge=0, description="how many decimals are printed")
+    matched: bool = Field(False, description="true or false")
+    tests: Annotated[tuple[Condition, ...], Field(strict=False)] = Field((), description="a list of conditions")
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Published:
+        if self.is_number != (self.of is not None) or self.is_number == bool(self.statement and self.tests):
+            raise invalid(f"{self.id} is no complete {self.kind}", "of, value, decimals; or statement, tests")
+        return self
 
     @property
     def is_number(self) -> bool:
@@ -58,61 +81,49 @@ class Published:
     @property
     def scenes(self) -> frozenset[str]:
         """Every scene that it speaks of."""
-        asked = [self.of, *(side for test in self.tests for side in (test.of, test.than))]
-        return frozenset(one.scene for one in asked if one is not None)
+        numbers = [self.of, *(side for test in self.tests for side in (test.of, test.than))]
+        return frozenset(one.scene for one in numbers if one is not None)
 
 
-@dataclass(frozen=True)
-class Erratum:
-    """A fault in the printed equations; fields as in reference/errata.toml."""
+class Erratum(Table):
+    """An error in the printed equations; fields as in reference/errata.toml."""
 
-    id: str
-    entry: str
-    pages: str
-    printed: str
-    right: str
-    reason: str
-    evidence: tuple[str, ...]
-    stands_in: tuple[str, ...]
-    reaches: tuple[str, ...]
+    id: Text = Field(description="a name")
+    entry: Text = Field(description="the matrix entry")
+    pages: Text = Field(description="pages of the paper")
+    printed: Text = Field(description="the entry as printed")
+    right: Text = Field(description="the corrected entry")
+    reason: Text = Field(description="a sentence")
+    evidence: Texts = Field(description="a list of sentences")
+    stands_in: Texts = Field(description="a list of equation numbers")
+    reaches: Texts = Field(description="a list of equation numbers")
+
+
+class _PublishedFile(Table):
+    conditions: dict[str, Text] = Field({}, description="a table of texts")
+    published: list[Published] = Field(description="[[published]] tables")
+
+
+class _ErrataFile(Table):
+    erratum: list[Erratum] = Field(description="[[erratum]] tables")
 
 
 def published() -> tuple[Published, ...]:
-    """All numbers and claims, in the order of the file. Raises RotorError where it is missing or damaged."""
-    return tuple(_published(item) for item in _read("published.toml")["published"])
+    """All numbers and claims, in the order of the file. Raises InputError with every error of the file."""
+    return tuple(_read("published.toml", _PublishedFile).published)
 
 
 def conditions() -> dict[str, str]:
     """What had to be found out to reproduce the numbers: by subject (gravity, duration) or scene (fig05)."""
-    return {str(key): str(text) for key, text in _read("published.toml").get("conditions", {}).items()}
+    return dict(_read("published.toml", _PublishedFile).conditions)
 
 
 def errata() -> tuple[Erratum, ...]:
-    """The errata, in the order of the file. Raises RotorError where it is missing or damaged."""
-    return tuple(_erratum(item) for item in _read("errata.toml")["erratum"])
+    """The errata, in the order of the file. Raises InputError with every error of the file."""
+    return tuple(_read("errata.toml", _ErrataFile).erratum)
 
 
-def _read(name: str) -> dict[str, Any]:
-    path = Path(reference_folder()) / name
-    try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
-    except (OSError, tomllib.TOMLDecodeError) as exc:
-        raise RotorError(f"{path}: cannot be read ({exc}); install rotor_mbs again") from exc
-
-
-def _erratum(item: Mapping[str, Any]) -> Erratum:
-    several: dict[str, Any] = {name: tuple(item[name]) for name in ("evidence", "stands_in", "reaches")}
-    return Erratum(**{**item, **several})
-
-
-def _published(item: Mapping[str, Any]) -> Published:
-    names = ("id", "figure", "kind", "quote", "statement", "value", "decimals", "matched")
-    plain = {key: item[key] for key in names if key in item}
-    of = Asked(*item["of"]) if "of" in item else None
-    return Published(**plain, of=of, tests=tuple(_test(test) for test in item.get("tests", ())))
-
-
-def _test(item: Mapping[str, Any]) -> Condition:
-    than = Asked(*item["than"]) if "than" in item else None
-    return Condition(Asked(*item["of"]), item["relation"], than, float(item["bound"]) if "bound" in item else None)
+def _read(name: str, model: type[T]) -> T:
+    path = reference_folder() / name
+    text, tables = read_toml(path)
+    return validate_file(model, tables, text, shown_path(path))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotor_mbs.scenario.load import parse_scene
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.published import Asked
+from rotor_mbs.analysis.published import TrajectoryNumber
 from rotor_mbs.store.read import StoredRun
 
 Array = NDArray[np.float64]
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _DATASETS = {"angle": "angles", "rate": "rates"}
 
 
-def measure(run: StoredRun, asked: Asked) -> float | None:
+def measure(run: StoredRun, asked: TrajectoryNumber) -> float | None:
     """The number in rad or rad/s (reversals and growth: 1); None where the run has no such data or it is undefined."""
     series = _series(run, _DATASETS[asked.quantity], asked.coordinate)
     if series is None:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.load import parse_scene
 from rotor_mbs.scenario.names import natural_order
+from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.store.read import StoredScene
 
 # Share of a scene's energy scale. ode45's own drift at the paper's tolerances is below a thousandth of that (seen on

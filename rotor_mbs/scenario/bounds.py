@@ -1,21 +1,20 @@
-"""What results are held to: reference/accuracy.toml, and a user's own file before it. Knows no results.
+"""The bounds that results are judged by: reference/accuracy.toml, and a user's own file before it.
 
-It stands this low because a run's status and the verdicts of `check` read the same entries: one bound, one place.
+A run's status and the verdicts of `check` read the same entries. Must not know results.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.reading import read_toml
 from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 CHECKS = (
     "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "gap", "exact", "published",
@@ -41,7 +40,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Bounds:
-    """All bounds, the ones that count first in front."""
+    """Bounds in the order in which they are tried: the first entry whose check and method fit counts."""
 
     entries: Sequence[Bound]
 
@@ -57,72 +56,37 @@ class Bounds:
         fitting = (one for one in self.entries if one.check == check and fnmatchcase(method, one.method))
         return next(fitting, None)
 
+    def with_entries(self, entries: Iterable[Bound]) -> Bounds:
+        """Bounds that try `entries` first, then these.
+
+        >>> bounds = Bounds([Bound("energy", "*", 1e-6, "default")])
+        >>> bounds.with_entries([Bound("energy", "mine/*", 1e-3, "explicit")]).of("energy", "mine/euler").value
+        0.001
+        """
+        return Bounds([*entries, *self.entries])
+
 
 def shipped_file() -> Path:
-    """The bounds that count where a user's say nothing."""
+    """The file whose bounds count where a user's own file has none."""
     return reference_folder() / "accuracy.toml"
 
 
 @functools.cache
 def shipped_bounds() -> Bounds:
-    """Those of reference/accuracy.toml, read once. Raises InputError with every fault of the file."""
-    return Bounds(_read(shipped_file(), frozenset({"fault", "known_fault"})))
+    """The bounds of reference/accuracy.toml, read once. Raises InputError with every error of the file."""
+    return read_bounds(shipped_file())
 
 
 def load_bounds(own: Path | None = None) -> Bounds:
-    """The user's bounds, then the shipped ones. Raises InputError with every fault of a file."""
-    users = _read(own, frozenset()) if own else []
-    return Bounds([*users, *shipped_bounds().entries])
+    """The bounds of the file `own`, then the shipped ones. Raises InputError with every error of a file."""
+    return shipped_bounds().with_entries(read_bounds(own).entries if own else [])
 
 
-def _read(path: Path, also: frozenset[str]) -> list[Bound]:
-    """also: optional keys that are required of this file."""
-    _, tables = read_toml(path)
-    entries = tables.get("bound")
-    unknown = sorted(set(tables) - {"bound"})
-    if unknown or not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"{path}: {', '.join(unknown) or 'bound'}: allowed: [[bound]] tables and nothing else")
-    required = _REQUIRED | also
-    problems = [line for i, entry in enumerate(entries, 1) for line in _faults(f"{path}: bound {i}", entry, required)]
-    if problems:
-        raise InputError(problems)
-    return [_bound(**entry) for entry in entries]
+def read_bounds(path: Path) -> Bounds:
+    """The bounds of one TOML file of [[bound]] tables. Raises InputError with every error of the file."""
+    from rotor_mbs.scenario.schema import BoundsTable  # late, with pydantic: 0.15 s
+    from rotor_mbs.scenario.validation import validate_file
 
-
-def _bound(check: str, method: str, value: float, reason: str, fault: float = math.inf, known_fault: str = "") -> Bound:
-    return Bound(check, method, float(value), reason, float(fault), known_fault)
-
-
-def _faults(where: str, entry: dict[str, Any], required: frozenset[str]) -> list[str]:
-    faults = [f"{where}: {key}: unknown key; allowed: {', '.join(_ALLOWED)}" for key in entry if key not in _ALLOWED]
-    for key, allowed in _ALLOWED.items():
-        if key not in entry:
-            faults += [f"{where}: {key}: missing; allowed: {allowed}"] if key in required else []
-        elif not _is_of_type(key, entry[key]):
-            faults.append(f"{where}: {key}: {_short(entry[key])}; allowed: {allowed}")
-    return faults
-
-
-def _is_of_type(key: str, value: object) -> bool:
-    if key in _NUMBERS:
-        return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value <= 1e300
-    if key == "check":
-        return value in CHECKS
-    return isinstance(value, str) and bool(value.strip())
-
-
-def _short(value: object) -> str:
-    text = ascii(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-_NUMBERS = frozenset({"value", "fault"})
-_REQUIRED = frozenset({"check", "method", "value", "reason"})
-_ALLOWED = {
-    "check": f"one of {', '.join(CHECKS)}",
-    "method": "a method or a pattern with *",
-    "value": "a number from 0 to 1e300",
-    "reason": "a sentence",
-    "fault": "a number from 0 to 1e300",
-    "known_fault": "a sentence",
-}
+    text, tables = read_toml(path)
+    file = validate_file(BoundsTable, tables, text, shown_path(path))
+    return Bounds([Bound(**entry.model_dump(exclude_none=True)) for entry in file.bound])

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.load import load_scene
 from rotor_mbs.scenario.names import RESERVED_GROUPS, natural_key
-from rotor_mbs.scenario.reading import read_toml, shown_path
 from rotor_mbs.scenario.resources import scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene_file import load_scene
+from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
 _NAME = re.compile(rf"{_PIECE}(?:/{_PIECE})*")

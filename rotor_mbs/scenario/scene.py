@@ -18,13 +18,23 @@ OUTPUTS = ("angles", "rates", "tip", "energy")
 Part = Literal["label", "run", "start", "rotor"]
 
 
-def scene_key(path: str, unit: str = "1", part: Part = "rotor", *, default: Any = MISSING, added: bool = False) -> Any:
+def scene_key(
+    path: str,
+    unit: str = "1",
+    part: Part = "rotor",
+    *,
+    default: Any = MISSING,
+    per_blade: bool = False,
+    added: bool = False,
+) -> Any:
     """A field of Scene, read from the key `path` of the scene file.
 
-    part    label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
-    added   the key is younger than the stored hashes: at its default it does not enter them
+    part        label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
+    per_blade   the file may have one number for all blades
+    added       the key is younger than the stored hashes: at its default it does not enter them
     """
-    return field(default=default, metadata={"key": path, "unit": unit, "part": part, "added": added})
+    metadata = {"key": path, "unit": unit, "part": part, "per_blade": per_blade, "added": added}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +87,8 @@ class Scene:
     initial_angles: tuple[float, ...] = scene_key("initial.angles", "rad", "start")
     initial_rates: tuple[float, ...] = scene_key("initial.rates", "rad/s", "start")
     rotor_torque: tuple[tuple[float, float], ...] = scene_key("torque.rotor", "N m", default=())
-    bearing_stiffness: tuple[float, ...] = scene_key("bearing.stiffness", "N m/rad", default=())
-    bearing_damping: tuple[float, ...] = scene_key("bearing.damping", "N m s/rad", default=())
+    bearing_stiffness: tuple[float, ...] = scene_key("bearing.stiffness", "N m/rad", default=(), per_blade=True)
+    bearing_damping: tuple[float, ...] = scene_key("bearing.damping", "N m s/rad", default=(), per_blade=True)
     shaft_damping: float = scene_key("shaft.damping", "N m s/rad", default=0.0)
     text: str = scene_key("", part="label", default="")
 
@@ -107,6 +117,24 @@ class Scene:
     def rotor_key(self) -> tuple[object, ...]:
         """The rotor's parameters and loads: equal for scenes that differ in start, run or label alone."""
         return tuple(getattr(self, name) for name in _ROTOR_FIELDS)
+
+    def replace(self, **changes: Any) -> Scene:
+        """A scene with other values at some keys of the scene file, validated like a file.
+
+        A keyword is a key; one with dots or indices goes through a dict. Entries are counted from 0, so that
+        `initial.angles[1]` is the pitch of blade 1. A value is what the file may have: a number, a quoted expression, a
+        list (or tuple, or array). `text` is written anew from the numbers.
+
+        Raises InputError with a line for each error: the key, what is wrong, what is allowed, the most similar key.
+
+        >>> import rotor_mbs.scenario.catalogue
+        >>> scene = rotor_mbs.scenario.catalogue.find_scenes(["paper/fig11"])[0]
+        >>> scene.replace(gravity=9.81, **{"initial.angles[1]": "pi/5", "blade.mass": 1e4}).blades[0].mass
+        10000.0
+        """
+        from rotor_mbs.scenario.variants import replaced_scene  # late: it builds scenes, and so imports this module
+
+        return replaced_scene(self, changes)
 
     def wants(self, output: str) -> bool:
         return output in self.outputs

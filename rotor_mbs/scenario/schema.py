@@ -1,26 +1,100 @@
-"""The scene file as pydantic models: which keys there are, and what each may hold. Knows no file and no line.
+"""The scene file and the bounds file as pydantic models: which keys there are, and what each may be.
 
-A field's `description` is what a message says is allowed. Fields are validated in the order in which they stand here,
-and later ones are checked against what earlier ones settled (`Known`), so that one pass finds every fault.
-Importing this module costs 0.2 s (pydantic): only `load` does, and only when a scene is loaded.
+Fields are validated in the order in which they stand here. Later ones are checked against what earlier ones left in
+the validation's context (blades, wants_tip, bare_pitches), so that one pass finds every error. Must not know files.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeVar
+from collections.abc import Collection, Sequence
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
 from rotor_mbs.scenario import scene
-from rotor_mbs.scenario.fields import Line, Number, PerBlade, Table, Vector, blades_named, counted, fault, known
-from rotor_mbs.scenario.physics import is_rigid_body_inertia, torque_table_fault, values_per_sample
+from rotor_mbs.scenario.bounds import CHECKS
+from rotor_mbs.scenario.outputs import is_known_output, known_outputs
+from rotor_mbs.scenario.validation import Line, NotNegative, Number, PerBlade, Table, Text, Vector, invalid, nearest
 
 MAX_BLADES = 10_000
 MAX_SAMPLES = 10_000_000
 MAX_SAMPLE_BYTES = 2 << 30
+# Principal moments may break the triangle inequality by this share of their sum: numbers typed with ten digits do so
+# for a flat body, whose inequality is an equality. It is far above the round-off of the eigenvalues (1e-15).
+INERTIA_TOLERANCE = 1e-9
 _PITCH_LEFT_OUT = "0 there: a pitch without inertia is left out of the model"
 
 T = TypeVar("T")
+
+
+def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
+    """Whether some distribution of mass >= 0 has this tensor: xx yy zz xy xz yz about the centre of mass, kg m².
+
+    That is so exactly where the second moments ∫r rᵀ dm = ½ tr(J) I - J are positive semidefinite: their eigenvalues
+    are (J2 + J3 - J1)/2, so this is the triangle inequality of the principal moments, and it implies J >= 0.
+    """
+    if not any(inertia):
+        return True
+    import numpy as np  # late: a point mass, as in every scene of the paper, does without
+
+    xx, yy, zz, xy, xz, yz = inertia
+    if min(xx, yy, zz) < 0.0:
+        return False
+    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / max(abs(element) for element in inertia)
+    trace = float(np.trace(J))
+    return bool(np.linalg.eigvalsh(0.5 * trace * np.eye(3) - J)[0] >= -INERTIA_TOLERANCE * trace)
+
+
+def wrong_times(rows: Sequence[Sequence[float]]) -> str | None:
+    """What is wrong with the times (s) of rows (t, torque), or None; two rows with one time are a jump."""
+    times = [row[0] for row in rows]
+    if times[0] < 0.0:
+        return "the first time is below 0"
+    for i in range(1, len(times)):
+        if times[i] < times[i - 1]:
+            return f"the time of row {i + 1} is before that of row {i}"
+        if i > 1 and times[i] == times[i - 2]:
+            return f"rows {i - 1}, {i} and {i + 1} have one time"
+    return None
+
+
+def values_per_sample(blades: int, outputs: Collection[str]) -> int:
+    """Doubles that a run holds per sample: time, angles and rates always, tip paths and energies where asked for."""
+    energies = 4  # kinetic, potential, work, energy error
+    return 1 + 2 * (1 + blades) + 3 * blades * ("tip" in outputs) + energies * ("energy" in outputs)
+
+
+def _output(name: str) -> str:
+    if not is_known_output(name):
+        raise invalid("{shown} is not one of them" + nearest(name, list(known_outputs())))
+    return name
+
+
+def _each_once(outputs: list[str]) -> list[str]:
+    repeated = next((output for output in outputs if outputs.count(output) > 1), None)
+    if repeated:
+        raise invalid(f'"{repeated}" is given more than once')
+    return outputs
+
+
+Outputs = Annotated[list[Annotated[str, AfterValidator(_output)]], AfterValidator(_each_once)]
+OUTPUTS_ALLOWED = 'some of "angles", "rates", "tip", "energy" and the outputs of installed packages, each once'
+
+
+def counted(count: int, noun: str) -> str:
+    """ "1 blade", "3 blades"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _context(info: ValidationInfo) -> dict[str, Any]:
+    """What the keys validated so far have settled; an entry is missing where its key has an error."""
+    return info.context if info.context is not None else {}
+
+
+def _blades_named(indices: Sequence[int]) -> str:
+    if len(indices) > 5:
+        return f"{len(indices)} blades (number {indices[0] + 1} first)"
+    return f"blade{'s' * (len(indices) > 1)} {', '.join(str(i + 1) for i in indices)}"
 
 
 class BladeTable(Table):
@@ -43,14 +117,14 @@ class BladeTable(Table):
     @classmethod
     def _is_of_a_rigid_body(cls, inertia: list[float]) -> list[float]:
         if not is_rigid_body_inertia(inertia):
-            raise fault("no rigid body has this inertia")
+            raise invalid("no rigid body has this inertia")
         return inertia
 
     @field_validator("tip", mode="before")
     @classmethod
     def _is_there_where_wanted(cls, tip: object, info: ValidationInfo) -> object:
-        if tip is None and known(info).wants_tip:
-            raise fault("is missing")
+        if tip is None and _context(info).get("wants_tip"):
+            raise invalid("is missing")
         return tip
 
     def to_blade(self) -> scene.Blade:
@@ -63,13 +137,13 @@ class BladeTable(Table):
 class HubTable(Table):
     """[hub]"""
 
-    inertia: Number = Field(ge=0, description="a number of at least 0 (kg m² about the shaft)")
+    inertia: NotNegative = Field(description="a number of at least 0 (kg m² about the shaft)")
 
 
 class ShaftTable(Table):
     """[shaft]"""
 
-    damping: Number = Field(ge=0, description="a number of at least 0 (N m s/rad)")
+    damping: NotNegative = Field(description="a number of at least 0 (N m s/rad)")
 
 
 class BearingTable(Table):
@@ -81,17 +155,17 @@ class BearingTable(Table):
     @field_validator("stiffness", "damping", mode="before")
     @classmethod
     def _has_one_per_blade(cls, value: object, info: ValidationInfo) -> object:
-        blades = known(info).blades
+        blades = _context(info).get("blades")
         if isinstance(value, list) and blades is not None and len(value) != blades:
-            raise fault(f"{counted(len(value), 'number')} in a list for {counted(blades, 'blade')}")
+            raise invalid(f"{counted(len(value), 'number')} in a list for {counted(blades, 'blade')}")
         return value
 
     @field_validator("stiffness", "damping")
     @classmethod
     def _acts_on_inertia(cls, value: list[float], info: ValidationInfo) -> list[float]:
-        acted_on = [i for i in known(info).bare_pitches if value[i if len(value) > 1 else 0] != 0.0]
+        acted_on = [i for i in _context(info).get("bare_pitches", ()) if value[i if len(value) > 1 else 0] != 0.0]
         if acted_on:
-            raise fault(f"acts on {blades_named(acted_on)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
+            raise invalid(f"acts on {_blades_named(acted_on)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
         return value
 
 
@@ -100,7 +174,7 @@ def _as_rows(value: object) -> object:
 
 
 class TorqueTable(Table):
-    """[torque]: a constant is one row at t = 0, since a table is held outside its times."""
+    """[torque]: a constant is one row at t = 0, since torque is constant outside a table's times."""
 
     rotor: Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]], BeforeValidator(_as_rows)] = (
         Field(
@@ -112,9 +186,9 @@ class TorqueTable(Table):
     @field_validator("rotor")
     @classmethod
     def _goes_forward(cls, rows: list[list[float]]) -> list[list[float]]:
-        wrong = torque_table_fault(rows)
+        wrong = wrong_times(rows)
         if wrong:
-            raise fault(wrong)
+            raise invalid(wrong)
         return rows
 
 
@@ -127,18 +201,18 @@ class InitialTable(Table):
     @field_validator("angles", "rates", mode="before")
     @classmethod
     def _has_one_per_coordinate(cls, value: object, info: ValidationInfo) -> object:
-        blades = known(info).blades
+        blades = _context(info).get("blades")
         if isinstance(value, list) and blades is not None and len(value) != 1 + blades:
-            raise fault(f"{counted(len(value), 'number')} for a rotor and {counted(blades, 'blade')}")
+            raise invalid(f"{counted(len(value), 'number')} for a rotor and {counted(blades, 'blade')}")
         return value
 
     @field_validator("rates")
     @classmethod
     def _moves_what_has_inertia(cls, rates: list[float], info: ValidationInfo) -> list[float]:
         # Their number is not known to be right where `blades` is faulty, but then no pitch is known to be bare.
-        moved = [i for i in known(info).bare_pitches if rates[1 + i] != 0.0]
+        moved = [i for i in _context(info).get("bare_pitches", ()) if rates[1 + i] != 0.0]
         if moved:
-            raise fault(f"a pitch rate for {blades_named(moved)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
+            raise invalid(f"a pitch rate for {_blades_named(moved)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
         return rates
 
 
@@ -148,14 +222,9 @@ class SceneTable(Table):
     title: Line = Field(description="a text of 1 to 200 characters on one line")
     figures: list[Line] = Field([], description='texts, such as ["5", "7a"]')
     blades: int = Field(ge=1, le=MAX_BLADES, description=f"a whole number from 1 to {MAX_BLADES}")
-    gravity: Number = Field(ge=0, description="a number of at least 0 (m/s², along -z)")
+    gravity: NotNegative = Field(description="a number of at least 0 (m/s², along -z)")
     duration: Number = Field(gt=0, description="a number above 0 (s)")
-    outputs: list[Literal["angles", "rates", "tip", "energy"]] = Field(
-        ["angles", "rates", "tip", "energy"],
-        min_length=1,
-        validate_default=True,
-        description='some of "angles", "rates", "tip", "energy", each once',
-    )
+    outputs: Outputs = Field(list(scene.OUTPUTS), min_length=1, validate_default=True, description=OUTPUTS_ALLOWED)
     samples: int = Field(ge=2, le=MAX_SAMPLES, description=f"a whole number from 2 to {MAX_SAMPLES}")
     blade: list[BladeTable] = Field(description="one [blade] table for all blades, or a [[blade]] table for each")
     hub: HubTable | None = Field(None, description="a table with inertia")
@@ -166,17 +235,14 @@ class SceneTable(Table):
 
     @field_validator("blades")
     @classmethod
-    def _settle_blades(cls, blades: int, info: ValidationInfo) -> int:
-        known(info).blades = blades
+    def _note_blades(cls, blades: int, info: ValidationInfo) -> int:
+        _context(info)["blades"] = blades
         return blades
 
     @field_validator("outputs")
     @classmethod
-    def _settle_outputs(cls, outputs: list[str], info: ValidationInfo) -> list[str]:
-        repeated = next((output for output in outputs if outputs.count(output) > 1), None)
-        if repeated:
-            raise fault(f'"{repeated}" stands there more than once')
-        known(info).wants_tip = "tip" in outputs
+    def _note_outputs(cls, outputs: list[str], info: ValidationInfo) -> list[str]:
+        _context(info)["wants_tip"] = "tip" in outputs
         return outputs
 
     @field_validator("samples")
@@ -188,7 +254,7 @@ class SceneTable(Table):
         values = values_per_sample(blades, outputs)
         size = samples * values * 8
         if size > MAX_SAMPLE_BYTES:
-            raise fault(
+            raise invalid(
                 f"{samples} samples of {values} values of 8 bytes are {size / 2**30:.4g} GiB",
                 f"at most {MAX_SAMPLE_BYTES >> 30} GiB",
             )
@@ -197,22 +263,22 @@ class SceneTable(Table):
     @field_validator("blade", mode="before")
     @classmethod
     def _count_blade_tables(cls, value: object, info: ValidationInfo) -> object:
-        blades = known(info).blades
+        blades = _context(info).get("blades")
         if isinstance(value, dict):
             return [value]
         if not isinstance(value, list):
-            raise fault("{shown} is no table")
+            raise invalid("{shown} is not a table")
         if blades is not None and len(value) != blades:
-            raise fault(f"{counted(len(value), '[[blade]] table')} for {counted(blades, 'blade')}")
+            raise invalid(f"{counted(len(value), '[[blade]] table')} for {counted(blades, 'blade')}")
         return value
 
     @field_validator("blade")
     @classmethod
-    def _settle_bare_pitches(cls, tables: list[BladeTable], info: ValidationInfo) -> list[BladeTable]:
-        settled = known(info)
-        if settled.blades is not None:
-            bare = _for_each([not table.to_blade().has_pitch_inertia for table in tables], settled.blades)
-            settled.bare_pitches = tuple(i for i, is_bare in enumerate(bare) if is_bare)
+    def _note_bare_pitches(cls, tables: list[BladeTable], info: ValidationInfo) -> list[BladeTable]:
+        context = _context(info)
+        if "blades" in context:
+            bare = _for_each([not table.to_blade().has_pitch_inertia for table in tables], context["blades"])
+            context["bare_pitches"] = tuple(i for i, is_bare in enumerate(bare) if is_bare)
         return tables
 
     def to_scene(self, name: str, text: str) -> scene.Scene:
@@ -225,7 +291,7 @@ class SceneTable(Table):
             gravity=self.gravity,
             duration=self.duration,
             samples=self.samples,
-            outputs=tuple(output for output in scene.OUTPUTS if output in self.outputs),
+            outputs=_in_order(self.outputs),
             blades=_for_each([table.to_blade() for table in self.blade], self.blades),
             hub_inertia=self.hub.inertia if self.hub else 0.0,
             initial_angles=tuple(self.initial.angles),
@@ -245,3 +311,33 @@ def _for_each(values: list[T], blades: int) -> tuple[T, ...]:
 
 def _unless_zero(values: list[float], blades: int) -> tuple[float, ...]:
     return _for_each(values, blades) if any(values) else ()
+
+
+def _in_order(outputs: Collection[str]) -> tuple[str, ...]:
+    """The built-in outputs in their order, then the others, sorted."""
+    built_in = tuple(output for output in scene.OUTPUTS if output in outputs)
+    return (*built_in, *sorted(set(outputs) - set(built_in)))
+
+
+class BoundTable(Table):
+    """One [[bound]] of a bounds file."""
+
+    check: str = Field(description=f"one of {', '.join(CHECKS)}")
+    method: Text = Field(description="a method or a pattern with *")
+    value: NotNegative = Field(description="a number from 0 to 1e300")
+    reason: Text = Field(description="a sentence")
+    fault: NotNegative | None = Field(None, description="a number from 0 to 1e300")
+    known_fault: Text | None = Field(None, description="a sentence")
+
+    @field_validator("check")
+    @classmethod
+    def _is_a_check(cls, check: str) -> str:
+        if check not in CHECKS:
+            raise invalid("{shown} is not one of them" + nearest(check, list(CHECKS)))
+        return check
+
+
+class BoundsTable(Table):
+    """The whole bounds file."""
+
+    bound: list[BoundTable] = Field(description="one or more [[bound]] tables")

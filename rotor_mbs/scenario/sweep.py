@@ -1,29 +1,129 @@
-"""A sweep file, strictly: a Sweep, or every fault of the file at once. Knows no method and no results file."""
+"""A sweep file, read strictly: a Sweep, or every error of the file at once. Must not know methods or results files.
+
+Importing this module costs 0.2 s (pydantic).
+"""
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.design import Axis, Design
-from rotor_mbs.scenario.keys import KeyFaultError, parse_key, put, unit_of
-from rotor_mbs.scenario.lines import KeyPath, find_lines, line_of
-from rotor_mbs.scenario.reading import read_toml, shown_path
 from rotor_mbs.scenario.resources import scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.sweep_rows import telling_rows
+from rotor_mbs.scenario.scene_file import scene_tables
+from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
+from rotor_mbs.scenario.sweep_design import Axis, Design
+from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path
+from rotor_mbs.scenario.validation import Line, Number, Table, invalid, validate_file
+from rotor_mbs.scenario.variants import Variants, parse_key, unit_of
 
-if TYPE_CHECKING:  # pydantic behind them takes 0.2 s
-    from rotor_mbs.scenario.sweep_schema import AxisTable, SweepTable
-    from rotor_mbs.scenario.variants import Variants
-
+MAX_COUNT = 10**15  # values of a range; too many runs are reported where they are counted
 MAX_ROWS = 10_000_000
+VARIED = ("values", "linear", "log", "uniform", "normal", "sobol")
+DRAWN = ("uniform", "normal", "sobol")
 _OF_ONE_SHAPE = ("blades", "samples", "duration")
+# Keys whose rule is an interval of its own: if the ends of an axis keep it, all values between them do.
+_INTERVALS = ("initial", "gravity", "hub", "shaft", "bearing")
+_ROWS_AT_ONCE = 4096
+_MAX_ROW_ERRORS = 20
+
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class RangeTable(Table):
+    """`linear` or `log`: `count` values from `start` to `end`, both included."""
+
+    start: Number = Field(description="a number, the first value")
+    end: Number = Field(description="a number, the last value")
+    count: int = Field(ge=2, le=MAX_COUNT, description="a whole number from 2 up")
+
+
+class AxisTable(Table):
+    """One [[axis]]: a key of the scene, and where its values come from."""
+
+    key: Line = Field(description="the path of a number of the scene, such as initial.angles[1]")
+    values: list[Number] | None = Field(None, min_length=1, description="a list of numbers")
+    linear: RangeTable | None = Field(None, description="a table with start, end, count")
+    log: RangeTable | None = Field(None, description="a table with start, end, count, both ends above 0")
+    uniform: Pair | None = Field(None, description="two numbers [low, high]")
+    normal: Pair | None = Field(None, description="two numbers [mean, standard deviation], the second one above 0")
+    sobol: Pair | None = Field(None, description="two numbers [low, high]")
+
+    @field_validator("log")
+    @classmethod
+    def _is_above_zero(cls, log: RangeTable | None) -> RangeTable | None:
+        if log is not None and min(log.start, log.end) <= 0.0:
+            raise invalid("a logarithmic range reaches 0 or less")
+        return log
+
+    @field_validator("uniform", "sobol")
+    @classmethod
+    def _is_a_range(cls, pair: list[float] | None) -> list[float] | None:
+        if pair is not None and not pair[0] < pair[1]:
+            raise invalid("the first number is not below the second")
+        return pair
+
+    @field_validator("normal")
+    @classmethod
+    def _has_a_spread(cls, pair: list[float] | None) -> list[float] | None:
+        if pair is not None and not pair[1] > 0.0:
+            raise invalid("the standard deviation is not above 0")
+        return pair
+
+    @model_validator(mode="after")
+    def _varies_in_one_way(self) -> AxisTable:
+        given = [name for name in VARIED if getattr(self, name) is not None]
+        if len(given) != 1:
+            wrong = f"has {' and '.join(given)}" if given else "has no values"
+            raise invalid(wrong, f"exactly one of {', '.join(VARIED)}")
+        return self
+
+
+class SweepTable(Table):
+    """The whole file."""
+
+    title: Line = Field(description="a text of 1 to 200 characters on one line")
+    scene: Line = Field(description="a shipped scene's name (paper/fig11), or a TOML file beside this one")
+    methods: list[Line] = Field(["lagrange/taylor"], min_length=1, description="a list of methods, model/integrator")
+    settings: dict[str, Number] = Field({}, description="a table of a method's settings, such as tolerance = 1e-15")
+    change: dict[str, Number] = Field({}, description='a table of keys of the scene and numbers, "blade.mass" = 1e4')
+    samples: int | None = Field(None, ge=2, description="a whole number from 2 up")
+    outputs: Outputs | None = Field(None, description=f"{OUTPUTS_ALLOWED}, or none: metrics alone")
+    precision: Literal["float64", "float32"] = Field("float64", description='"float64" or "float32"')
+    combine: Literal["grid", "zip"] = Field("grid", description='"grid" or "zip"')
+    draws: int | None = Field(None, ge=1, le=MAX_COUNT, description="a whole number from 1 up, with random axes")
+    seed: int = Field(0, ge=0, le=2**63 - 1, description="a whole number from 0 up")
+    validation: Number | None = Field(None, gt=0, lt=1, description="a share between 0 and 1")
+    file_bytes: Number = Field(4e9, ge=1e5, description="a number of at least 1e5, the most bytes of one file")
+    picture: Literal["spread", "map"] | None = Field(None, description='"spread" or "map"')
+    axis: list[AxisTable] = Field(min_length=1, description="one or more [[axis]] tables")
+
+    @field_validator("axis")
+    @classmethod
+    def _names_each_key_once(cls, axes: list[AxisTable]) -> list[AxisTable]:
+        keys = [axis.key for axis in axes]
+        repeated = next((key for key in keys if keys.count(key) > 1), None)
+        if repeated:
+            raise invalid(f"{repeated} is varied by more than one axis", "one [[axis]] for a key")
+        return axes
+
+    @field_validator("axis")
+    @classmethod
+    def _draws_where_random(cls, axes: list[AxisTable], info: ValidationInfo) -> list[AxisTable]:
+        drawn = [axis.key for axis in axes if any(getattr(axis, name) is not None for name in DRAWN)]
+        draws = info.data.get("draws")
+        if drawn and draws is None and "draws" in info.data:
+            raise invalid(f"{drawn[0]} is random, and draws is missing", "draws = N at the top of the file")
+        if draws is not None and not drawn:
+            raise invalid("draws is there, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}")
+        return axes
 
 
 @dataclass(frozen=True)
@@ -31,7 +131,6 @@ class Sweep:
     """A base scene and how it is varied.
 
     base        the scene with the sweep's own changes, before any axis
-    tables      the same, as TOML tables: what the axes' values are put into
     units       of every axis' key
     outputs     what is stored of each run's samples; () for metrics alone
     validation  share of the rows marked for validation, 0 for no mark
@@ -41,7 +140,6 @@ class Sweep:
     name: str
     title: str
     base: Scene
-    tables: Mapping[str, Any]
     design: Design
     units: tuple[str, ...]
     methods: tuple[str, ...]
@@ -58,68 +156,49 @@ class Sweep:
     def keys(self) -> tuple[str, ...]:
         return tuple(axis.key for axis in self.design.axes)
 
-    def fault(self, key: KeyPath, words: str) -> str:
-        """A line about what the file says at `key`, for an InputError: for faults that the scenes cannot show."""
-        return f"{self.path}:{line_of(find_lines(self.text), key)}: {words}"
+    def problem(self, key: KeyPath, message: str) -> str:
+        """A line about what the file says at `key`, for an InputError: for errors that only a caller can find."""
+        return f"{self.path}:{line_of(find_lines(self.text), key)}: {message}"
 
     def variants(self) -> Variants:
         """From rows to scenes. They always ask for the energy: every run's balance is checked."""
-        from rotor_mbs.scenario.variants import Variants
-
         wanted = [*self.outputs, *({"energy"} - set(self.outputs))]
-        return Variants(self.name, {**self.tables, "outputs": wanted}, self.keys)
+        return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
 def load_sweep(path: Path) -> Sweep:
     """The sweep in the TOML file `path`; a name such as sweeps/fig11-spread means a shipped one.
 
-    Raises InputError with all faults of the file, a line each.
+    Raises InputError with all errors of the file, a line each.
     """
-    from pydantic import ValidationError
-
-    from rotor_mbs.scenario.faults import faults_of
-    from rotor_mbs.scenario.sweep_schema import SweepTable
-
-    path = _shipped_or(path)
-    text, tables = read_toml(path)
-    lines = find_lines(text)
-    try:
-        table = SweepTable.model_validate(tables)
-    except ValidationError as error:
-        found = sorted((line_of(lines, fault.path), fault.text) for fault in faults_of(error, tables, SweepTable))
-        raise InputError([f"{shown_path(path)}:{line}: {words}" for line, words in found]) from error
-    return _Reader(path, text, lines, table).sweep()
-
-
-def _shipped_or(path: Path) -> Path:
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
-    is_name = not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file()
-    return shipped if is_name else path
+    if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
+        path = shipped
+    text, tables = read_toml(path)
+    return _Reader(path, text, validate_file(SweepTable, tables, text, shown_path(path))).sweep()
 
 
 class _Reader:
-    """What the schema cannot see: the base scene, the keys of the axes in it, and how many rows there are."""
+    """What the file's model cannot check: the base scene, the keys of the axes in it, and how many rows there are."""
 
-    def __init__(self, path: Path, text: str, lines: Mapping[KeyPath, int], table: SweepTable) -> None:
-        self._path, self._text, self._lines, self._table = path, text, lines, table
+    def __init__(self, path: Path, text: str, table: SweepTable) -> None:
+        self._path, self._text, self._table = path, text, table
+        self._lines = find_lines(text)
 
     def sweep(self) -> Sweep:
         table = self._table
-        base = self._base()
-        tables = self._changed(tomllib.loads(base.text))
+        base = self._changed(self._base())
+        self._check_keys()
         design = self._design()
-        self._check_keys(design)
-        outputs = base.outputs if table.outputs is None else tuple(table.outputs)
         sweep = Sweep(
             name=self._path.stem,
             title=table.title,
             base=base,
-            tables=tables,
             design=design,
             units=tuple(unit_of(parse_key(axis.key)) for axis in design.axes),
             methods=tuple(dict.fromkeys(table.methods)),
             settings=dict(table.settings),
-            outputs=outputs,
+            outputs=base.outputs if table.outputs is None else tuple(table.outputs),
             precision=table.precision,
             validation=table.validation or 0.0,
             file_bytes=int(table.file_bytes),
@@ -127,100 +206,114 @@ class _Reader:
             text=self._text,
             path=shown_path(self._path),
         )
-        return self._with_checked_rows(sweep)
+        self._check_rows(sweep)
+        return sweep
 
-    def _fault(self, key: KeyPath, words: str) -> InputError:
-        return InputError(f"{shown_path(self._path)}:{line_of(self._lines, key)}: {words}")
+    def _problem(self, key: KeyPath, message: str) -> str:
+        return f"{shown_path(self._path)}:{line_of(self._lines, key)}: {message}"
 
     def _base(self) -> Scene:
         asked = self._table.scene
-        beside = self._path.parent / asked
         is_shipped = (scenarios_folder() / f"{asked}.toml").is_file()
         try:
-            found = find_scenes([asked if is_shipped or not asked.endswith(".toml") else str(beside)])
+            is_file = asked.endswith(".toml") and not is_shipped
+            found = find_scenes([str(self._path.parent / asked) if is_file else asked])
         except InputError as error:
-            raise self._fault(("scene",), f"scene: {error}") from error
+            raise InputError(self._problem(("scene",), f"scene: {error}")) from error
         if len(found) != 1:
-            raise self._fault(("scene",), f"scene: {asked} is {len(found)} scenes; allowed: one scene's name or file")
+            wrong = f"scene: {asked} is {len(found)} scenes; allowed: one scene's name or file"
+            raise InputError(self._problem(("scene",), wrong))
         return found[0]
 
-    def _changed(self, tables: dict[str, Any]) -> dict[str, Any]:
-        for key, value in self._table.change.items():
-            try:
-                put(tables, parse_key(key), value)
-            except KeyFaultError as fault:
-                raise self._fault(("change", key), f"change: {key}: {fault}") from fault
+    def _changed(self, base: Scene) -> Scene:
+        changes: dict[str, object] = dict(self._table.change)
         if self._table.samples is not None:
-            tables["samples"] = self._table.samples
+            changes["samples"] = self._table.samples
         if self._table.outputs:
-            tables["outputs"] = list(self._table.outputs)
-        return tables
+            changes["outputs"] = self._table.outputs
+        try:
+            return base.replace(**changes) if changes else base
+        except InputError as error:
+            key = "change" if self._table.change else "samples"
+            raise InputError([self._problem((key,), f"{key}: {problem}") for problem in error.problems]) from error
 
     def _design(self) -> Design:
         axes = tuple(_axis(axis, self._table.draws or 0) for axis in self._table.axis)
         if self._table.combine == "zip" and len({axis.count for axis in axes}) > 1:
             counts = ", ".join(f"{axis.key} has {axis.count}" for axis in axes)
-            raise self._fault(("combine",), f"combine: {counts}; allowed with zip: as many values in every axis")
+            wrong = f"combine: {counts}; allowed with zip: as many values in every axis"
+            raise InputError(self._problem(("combine",), wrong))
         design = Design(axes, self._table.combine, self._table.seed)
         if design.count > MAX_ROWS:
-            raise self._fault(("axis",), f"axis: {design.count:,} runs; allowed: at most {MAX_ROWS:,}")
+            raise InputError(self._problem(("axis",), f"axis: {design.count:,} runs; allowed: at most {MAX_ROWS:,}"))
         return design
 
-    def _check_keys(self, design: Design) -> None:
+    def _check_keys(self) -> None:
         problems = []
-        for i, axis in enumerate(design.axes):
-            words = self._wrong_with_key(axis.key)
-            if words:
-                line = line_of(self._lines, ("axis", i, "key"))
-                problems.append(f"{shown_path(self._path)}:{line}: axis.key: {axis.key}: {words}")
+        for i, axis in enumerate(self._table.axis):
+            wrong = _wrong_key(axis.key)
+            if wrong:
+                problems.append(self._problem(("axis", i, "key"), f"axis.key: {axis.key}: {wrong}"))
         if problems:
             raise InputError(problems)
 
-    def _wrong_with_key(self, key: str) -> str:
-        try:
-            path = parse_key(key)
-        except KeyFaultError as fault:
-            return str(fault)
-        if path[0] in _OF_ONE_SHAPE:
-            return (
-                f"all runs of a dataset share one {path[0]}; allowed: a sweep for each, or a key that keeps the shape"
-            )
-        return ""
-
-    def _with_checked_rows(self, sweep: Sweep) -> Sweep:
-        """The sweep with its base read anew after the changes; every axis' ends, or every row, held to the schema."""
-        from rotor_mbs.scenario.variants import VariantFaultError, Variants
-
-        try:
-            base = Variants(sweep.base.name, sweep.tables, ()).scene(())
-        except VariantFaultError as fault:
-            key: KeyPath = ("change",) if self._table.change else ("samples",)
-            raise self._fault(key, f"scene after the changes: {fault}") from fault
-        sweep = replace(sweep, base=replace(base, text=sweep.base.text, title=sweep.base.title))
+    def _check_rows(self, sweep: Sweep) -> None:
+        """Validates the scenes of the ends of every axis, or of every row where that is needed."""
         problems: dict[str, None] = {}
-        for i, values, row in telling_rows(sweep):
+        for i, variants, row in _rows_to_check(sweep):
             try:
-                values.scene(row)
-            except VariantFaultError as fault:
-                line = line_of(self._lines, ("axis", i, "key"))
-                pairs = zip(values.keys, row, strict=True)
-                shown = ", ".join(key if fault.is_of_key else f"{key} = {value:g}" for key, value in pairs)
-                for words in fault.faults:
-                    problems.setdefault(f"{shown_path(self._path)}:{line}: {shown}: {words}")
-                if len(problems) >= 20:
+                variants.scene(row)
+            except TableError as error:
+                pairs = zip(variants.keys, row, strict=True)
+                shown = ", ".join(key if error.is_of_keys else f"{key} = {value:g}" for key, value in pairs)
+                for problem in error.problems:
+                    problems.setdefault(self._problem(("axis", i, "key"), f"{shown}: {problem.message}"))
+                if len(problems) >= _MAX_ROW_ERRORS:
                     break
         if problems:
             raise InputError(list(problems))
-        return sweep
 
 
 def _axis(table: AxisTable, draws: int) -> Axis:
-    if table.values is not None:
-        return Axis(table.key, "values", tuple(table.values), len(table.values))
-    for kind, span in (("linear", table.linear), ("log", table.log)):
-        if span is not None:
-            return Axis(table.key, kind, (span.start, span.end), span.count)
-    for kind, pair in (("uniform", table.uniform), ("normal", table.normal), ("sobol", table.sobol)):
-        if pair is not None:
-            return Axis(table.key, kind, (pair[0], pair[1]), draws)
-    raise AssertionError("the schema lets no axis without values through")
+    kind = next(name for name in VARIED if getattr(table, name) is not None)
+    given = getattr(table, kind)
+    if isinstance(given, RangeTable):
+        return Axis(table.key, kind, (given.start, given.end), given.count)
+    return Axis(table.key, kind, tuple(given), draws if kind in DRAWN else len(given))
+
+
+def _wrong_key(key: str) -> str:
+    try:
+        path = parse_key(key)
+    except TableError as error:
+        return str(error)
+    if path[0] in _OF_ONE_SHAPE:
+        return f"all runs of a dataset share one {path[0]}; allowed: a sweep for each, or a key that keeps the shape"
+    return ""
+
+
+def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, ...]]]:
+    """(axis, variants, a row for them): the ends of each axis, and all rows where numbers depend on one another.
+
+    That is enough to find every error: inertias and torque tables alone are validated as a whole.
+    """
+    tables = {**scene_tables(sweep.base), "outputs": list(sweep.outputs) or ["angles"]}
+    for i, axis in enumerate(sweep.design.axes):
+        alone = Variants(sweep.name, tables, [axis.key])
+        values = sweep.design.values[i]
+        for value in dict.fromkeys((float(values.min()), float(values.max()))):
+            yield i, alone, (value,)
+    dependent = [i for i, key in enumerate(sweep.keys) if not _is_interval(key)]
+    if dependent:
+        together = sweep.variants()
+        for first in range(0, sweep.design.count, _ROWS_AT_ONCE):
+            rows = sweep.design.rows(first, min(first + _ROWS_AT_ONCE, sweep.design.count))
+            chosen = np.unique(rows[:, dependent], axis=0, return_index=True)[1]
+            for row in rows[np.sort(chosen)]:
+                yield dependent[0], together, tuple(row.tolist())
+
+
+def _is_interval(key: str) -> bool:
+    path = parse_key(key)
+    is_constant_torque = path == ("torque", "rotor")
+    return path[0] in _INTERVALS or path[-1] == "mass" or "tip" in path or is_constant_torque

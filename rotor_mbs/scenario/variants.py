@@ -1,109 +1,179 @@
-"""From a row of a sweep's parameters to the scene they make of its base, validated by the scene file's own schema.
+"""Scenes that differ from a base in the numbers at some keys, validated by the scene file's own schema.
 
-Knows nothing of how the rows come about.
+A key is written as a path, `initial.angles[1]`. Entries are counted from 0, as the coordinates of a results file are:
+`initial.angles[1]` is the pitch of blade 1. Must not know how a sweep's rows come about.
 """
 
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import isfinite
 from typing import Any
 
-from rotor_mbs.scenario.keys import KeyFaultError, parse_key, put
-from rotor_mbs.scenario.lines import KeyPath
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
+from rotor_mbs.scenario.scene_file import scene_tables, scene_toml, validated_scene
+from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError
 
-# Machines kept ready: more than a chunk of runs, or an axis of a usual map, has.
-_MAX_MACHINES = 512
+FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (entries counted from 0)"
+_PART = r"[A-Za-z_][A-Za-z0-9_]{0,59}(?:\[[0-9]{1,6}\])*"
+_KEY = re.compile(rf"{_PART}(?:\.{_PART})*")
+_UNITS: dict[str, str] = {one.metadata["key"]: one.metadata["unit"] for one in fields(Scene)} | {
+    f"blade.{one.name}": one.metadata["unit"] for one in fields(Blade)
+}
+_PER_BLADE = frozenset(one.metadata["key"] for one in fields(Scene) if one.metadata["per_blade"])
+_START = {one.metadata["key"]: one.name for one in scene_fields("start")}
+
+# Rotors that are kept validated: more than a chunk of runs, or an axis of a usual map, has.
+_MAX_ROTORS = 512
 
 
-class VariantFaultError(ValueError):
-    """Parameters that make no scene: one line per fault, without the file.
+def parse_key(text: str) -> KeyPath:
+    """("initial", "angles", 1) of "initial.angles[1]". Raises TableError."""
+    if not _KEY.fullmatch(text):
+        raise _wrong((), f"{text[:60]!a} is not the path of a key; allowed: {FORM}")
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[A-Za-z_]\w*|[0-9]+", text))
 
-    is_of_key   whether it is a key that is wrong, whatever its value
+
+def unit_of(path: KeyPath) -> str:
+    """The unit of the number at `path`, "1" where it has none."""
+    if path[:2] == ("torque", "rotor") and len(path) == 4 and path[3] == 0:  # the time of a row
+        return "s"
+    return _UNITS.get(_names(path), "1")
+
+
+def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
+    """Sets the value at `path` in the tables of a scene; tables that are missing are made, keys are not checked.
+
+    One [blade] for all, or one number for every bearing, becomes one for each where the path names one of them.
+    Raises TableError where the path goes through something that has no such entry.
     """
+    here: Any = tables
+    for depth, part in enumerate(path[:-1]):
+        _check_step(here, path, depth)
+        inner = here.get(part) if isinstance(part, str) else here[part]
+        following = path[depth + 1]
+        if isinstance(following, int):
+            inner = _as_list(tables, inner, path[: depth + 1], following)
+        here[part] = {} if inner is None else inner
+        here = here[part]
+    _check_step(here, path, len(path) - 1)
+    here[path[-1]] = value
 
-    def __init__(self, faults: Sequence[str], *, is_of_key: bool = False) -> None:
-        self.faults, self.is_of_key = tuple(faults), is_of_key
-        super().__init__("; ".join(faults))
+
+def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) -> Any:
+    """What stands at `path`, as one entry per blade where the scene file allows one for all."""
+    blades = tables.get("blades", 0)
+    if path == ("blade",) and isinstance(value, dict):
+        return [copy.deepcopy(value) for _ in range(blades)]
+    if _names(path) in _PER_BLADE and not isinstance(value, list):
+        return [0.0 if value is None else value] * blades
+    # Whether a list that is missing could be there is for the schema to say.
+    return [0.0] * (last + 1) if value is None else value
+
+
+def _check_step(here: Any, path: KeyPath, depth: int) -> None:
+    """Raises TableError unless `here` is of the kind that path[depth] needs."""
+    part, shown = path[depth], _shown(path[:depth])
+    if isinstance(part, str) and isinstance(here, dict):
+        return
+    if not isinstance(here, list):
+        kind = "a table" if isinstance(here, dict) else "a single value"
+        raise _wrong(path, f"{shown} is {kind}; allowed: {FORM}")
+    if isinstance(part, str) or part >= len(here):
+        raise _wrong(path, f"{shown} has {len(here)} entries; allowed: {shown}[0] to {shown}[{len(here) - 1}]")
+
+
+def _wrong(path: KeyPath, message: str) -> TableError:
+    return TableError([KeyProblem(path, message, is_of_key=True)])
+
+
+def _names(path: KeyPath) -> str:
+    return ".".join(part for part in path if isinstance(part, str))
+
+
+def _shown(path: KeyPath) -> str:
+    """ "initial.angles[1]" of ("initial", "angles", 1)."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
+
+
+def replaced_scene(scene: Scene, changes: Mapping[str, object]) -> Scene:
+    """`scene` with other values at some keys, as `Scene.replace` describes it."""
+    tables = scene_tables(scene)
+    try:
+        for key, value in changes.items():
+            put_value(tables, parse_key(key), _plain(value))
+        changed = validated_scene(tables, scene.name)
+    except TableError as error:
+        raise InputError(f"{scene.name}: {problem.message}" for problem in error.problems) from error
+    return replace(changed, text=scene_toml(changed))
+
+
+def _plain(value: object) -> object:
+    """Tuples and NumPy values as the lists and numbers of a TOML file."""
+    if isinstance(value, tuple | list):
+        return [_plain(entry) for entry in value]
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 class Variants:
-    """The scenes of a sweep: `tables` of the base, with a value put in at each of `keys`."""
+    """The scenes of a sweep: `tables` of the base, with a number put in at each of `keys`.
+
+    Most sweeps vary the initial state of few rotors: a rotor is validated once, then initial states are put in.
+    """
 
     def __init__(self, name: str, tables: Mapping[str, Any], keys: Sequence[str]) -> None:
         self.keys = tuple(keys)
         self._name = name
         self._tables = tables
         paths = [parse_key(key) for key in keys]
-        self._initial = [(i, path) for i, path in enumerate(paths) if path[0] == "initial"]
-        self._machine_keys = [(i, path) for i, path in enumerate(paths) if path[0] != "initial"]
-        self._machines: dict[tuple[float, ...], Scene] = {}
+        self._start = [(i, path) for i, path in enumerate(paths) if _names(path) in _START]
+        self._rest = [(i, path) for i, path in enumerate(paths) if _names(path) not in _START]
+        self._rotors: dict[tuple[float, ...], Scene] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """The one machine of all runs goes along, so that who gets it needs no validation, which is slow to load."""
-        return self.__dict__ | {"_machines": {} if self._machine_keys else self._machines}
+        """A rotor common to all runs is pickled, too, so that the receiver need not validate it, which is slow."""
+        return self.__dict__ | {"_rotors": {} if self._rest else self._rotors}
 
     def prepare(self, values: Sequence[float]) -> None:
-        """Validates the machine of all runs, where there is but one; values: of any run. Raises VariantFaultError."""
-        if not self._machine_keys:
-            self._machine((), values)
+        """Validates the rotor of all runs, where there is only one. Raises TableError.
+
+        values   of any run
+        """
+        if not self._rest:
+            self._rotor((), values)
 
     def scene(self, values: Sequence[float]) -> Scene:
-        """The scene with `values`, one per key, in place. Raises VariantFaultError.
-
-        Most sweeps vary the initial state of few machines: a machine is validated once, then initial states are put in.
-        """
-        machine = self._machine(tuple(values[i] for i, _ in self._machine_keys), values)
-        if not self._initial:
-            return machine
-        state = {"angles": list(machine.initial_angles), "rates": list(machine.initial_rates)}
-        for i, (_, name, column) in self._initial:  # the keys have led to a machine: they have this form
-            state[str(name)][int(column)] = values[i]
-        scene = replace(machine, initial_angles=tuple(state["angles"]), initial_rates=tuple(state["rates"]))
+        """The scene with `values`, one per key, in place. Raises TableError."""
+        rotor = self._rotor(tuple(values[i] for i, _ in self._rest), values)
+        if not self._start:
+            return rotor
+        state: dict[str, Any] = {name: list(getattr(rotor, name)) for name in _START.values()}
+        for i, path in self._start:  # the rotor has been validated with these keys: each ends in a valid index
+            state[_START[_names(path)]][int(path[-1])] = values[i]
+        state = {name: tuple(numbers) for name, numbers in state.items()}
+        scene = replace(rotor, **state)
         return scene if _is_plain(scene) else self._validated(values)
 
-    def _machine(self, numbers: tuple[float, ...], values: Sequence[float]) -> Scene:
-        if numbers not in self._machines:
-            if len(self._machines) >= _MAX_MACHINES:
-                self._machines.clear()
-            self._machines[numbers] = self._validated(values)
-        return self._machines[numbers]
+    def _rotor(self, numbers: tuple[float, ...], values: Sequence[float]) -> Scene:
+        if numbers not in self._rotors:
+            if len(self._rotors) >= _MAX_ROTORS:
+                self._rotors.clear()
+            self._rotors[numbers] = self._validated(values)
+        return self._rotors[numbers]
 
     def _validated(self, values: Sequence[float]) -> Scene:
-        from pydantic import ValidationError  # late, with the schema: 0.15 s
-
-        from rotor_mbs.scenario.faults import faults_of
-        from rotor_mbs.scenario.fields import Known
-        from rotor_mbs.scenario.schema import SceneTable
-
-        tables = self._with(values)
-        try:
-            return SceneTable.model_validate(tables, context=Known()).to_scene(self._name, "")
-        except ValidationError as error:
-            unknown = {detail["type"] for detail in error.errors(include_url=False)} == {"extra_forbidden"}
-            texts = [fault.text for fault in faults_of(error, tables)]
-            raise VariantFaultError(texts, is_of_key=unknown) from error
-
-    def _with(self, values: Sequence[float]) -> dict[str, Any]:
         tables = copy.deepcopy(dict(self._tables))
-        _put_all(tables, [(path, values[i]) for i, path in (*self._machine_keys, *self._initial)])
-        return tables
-
-
-def _put_all(tables: dict[str, Any], entries: Sequence[tuple[KeyPath, float]]) -> None:
-    for path, value in entries:
-        try:
-            put(tables, path, value)
-        except KeyFaultError as fault:
-            raise VariantFaultError([str(fault)], is_of_key=True) from fault
+        for i, path in (*self._rest, *self._start):
+            put_value(tables, path, values[i])
+        return validated_scene(tables, self._name)
 
 
 def _is_plain(scene: Scene) -> bool:
-    """Whether the initial state is beyond doubt: finite, no rate where a pitch has no inertia. Else the schema decides,
-    and has the words."""
+    """Whether the initial state needs no validation: finite, no rate where a pitch has no inertia."""
     rates = zip(scene.initial_rates[1:], scene.blades, strict=True)
     finite = all(map(isfinite, (*scene.initial_angles, *scene.initial_rates)))
     return finite and not any(rate and not blade.has_pitch_inertia for rate, blade in rates)

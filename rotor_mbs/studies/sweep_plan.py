@@ -17,9 +17,9 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.execution.environment import machine, numerics_fingerprint, versions
 from rotor_mbs.execution.pool import TaskPool
 from rotor_mbs.methods.catalogue import check_names, find_method
-from rotor_mbs.scenario.design import validation_rows
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
+from rotor_mbs.scenario.sweep_design import validation_rows
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.store.sweep_layout import Plan
 from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, perform
@@ -158,7 +158,7 @@ def _chosen(sweep: Sweep, methods: Sequence[str]) -> tuple[str, ...]:
     try:
         return check_names(sweep.methods)
     except InputError as exc:
-        raise InputError([sweep.fault(("methods",), f"methods: {words}") for words in exc.problems]) from exc
+        raise InputError([sweep.problem(("methods",), f"methods: {words}") for words in exc.problems]) from exc
 
 
 def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> Work:
@@ -168,7 +168,7 @@ def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_
     unknown = [key for key in sweep.settings if key not in known]
     if unknown:
         words = f"is no setting of {', '.join(chosen)}; allowed: {', '.join(sorted(known)) or 'none'}"
-        raise InputError([sweep.fault(("settings", key), f"settings.{key}: {words}") for key in unknown])
+        raise InputError([sweep.problem(("settings", key), f"settings.{key}: {words}") for key in unknown])
     for method in chosen:
         # The fast path's engine refuses nothing, where it is there: this process need not load it.
         if method != ENSEMBLE_METHOD or find_spec("heyoka") is None:

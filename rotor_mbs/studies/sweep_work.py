@@ -16,7 +16,8 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.variants import VariantFaultError, Variants
+from rotor_mbs.scenario.toml_file import TableError
+from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_errors, largest
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Array, Integration
@@ -97,10 +98,10 @@ def lost(chunk: Chunk, status: str, message: str) -> Rows:
 def _scenes(chunk: Chunk) -> list[Scene]:
     try:
         return [chunk.variants.scene(values) for values in chunk.values.tolist()]
-    except VariantFaultError as fault:
+    except TableError as error:
         keys = ", ".join(chunk.variants.keys)
         last = chunk.first + len(chunk.values) - 1
-        raise InputError(f"runs {chunk.first} to {last}: {keys}: {fault}") from fault
+        raise InputError(f"runs {chunk.first} to {last}: {keys}: {error}") from error
 
 
 def _solved(chunk: Chunk, scene: Scene) -> Solution | str:

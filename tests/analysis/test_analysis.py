@@ -15,7 +15,7 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import claims, rounds_to
 from rotor_mbs.analysis.errata import effects, entries
 from rotor_mbs.analysis.escape_rate import escape_rate
-from rotor_mbs.analysis.published import Asked, Condition, Published, errata, published
+from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, errata, published
 from rotor_mbs.analysis.statistics import STATISTICS, measure
 from rotor_mbs.analysis.summary import finding
 from rotor_mbs.scenario.names import natural_order
@@ -27,16 +27,16 @@ PRINTED, REFERENCE, TAYLOR = "printed/ode45", "reference", "lagrange/taylor"
 
 
 def number(statistic: str, value: float, *, quantity: str = "angle", coordinate: int = 0) -> Published:
-    asked = Asked("paper/fig11", quantity, coordinate, statistic)
-    return Published("n", "11", "number", "«»", of=asked, value=value, decimals=4)
+    asked = TrajectoryNumber("paper/fig11", quantity, coordinate, statistic)
+    return Published(id="n", figure="11", kind="number", quote="«»", of=asked, value=value, decimals=4)
 
 
 def claim(*tests: Condition) -> Published:
-    return Published("c", "11", "claim", "«»", "A claim.", tests=tests)
+    return Published(id="c", figure="11", kind="claim", quote="«»", statement="A claim.", tests=tests)
 
 
-def of(statistic: str, coordinate: int = 0, scene: str = "paper/fig11", quantity: str = "angle") -> Asked:
-    return Asked(scene, quantity, coordinate, statistic)
+def of(statistic: str, coordinate: int = 0, scene: str = "paper/fig11", quantity: str = "angle") -> TrajectoryNumber:
+    return TrajectoryNumber(scene, quantity, coordinate, statistic)
 
 
 @pytest.mark.parametrize(
@@ -100,15 +100,15 @@ def test_a_number_that_the_printed_model_gives_and_the_right_one_does_not(tmp_pa
 
 def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
     run = Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t, lambda t: -0.2 * t))
-    less = Condition(of("range"), "<", than=of("range", 1))
-    opposite = Condition(of("net_change"), "opposite", than=of("net_change", 1))
-    undefined = Condition(of("growth", 2), ">", bound=0.0)
+    less = Condition(of=of("range"), relation="<", than=of("range", 1))
+    opposite = Condition(of=of("net_change"), relation="opposite", than=of("net_change", 1))
+    undefined = Condition(of=of("growth", 2), relation=">", bound=0.0)
     with open_results(store(tmp_path / "r.h5", [run])) as results:
         found = claims(
             results.scenes,
             [
                 claim(less),
-                claim(replace(less, relation=">")),
+                claim(less.model_copy(update={"relation": ">"})),
                 claim(opposite),
                 claim(undefined),
                 claim(less, undefined),
@@ -119,9 +119,9 @@ def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
 
 
 def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
-    holds = Condition(of("range"), ">", bound=0.5)
-    fails = Condition(of("range"), "<", bound=0.5)
-    elsewhere = Condition(of("range", scene="paper/fig12"), ">", bound=0.5)
+    holds = Condition(of=of("range"), relation=">", bound=0.5)
+    fails = Condition(of=of("range"), relation="<", bound=0.5)
+    elsewhere = Condition(of=of("range", scene="paper/fig12"), relation=">", bound=0.5)
     with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t))])) as results:
         assert claims(results.scenes, [claim(elsewhere), claim(holds, elsewhere)]) == []
         # One that fails decides, whatever the others would say.
@@ -131,7 +131,7 @@ def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
 def test_a_run_that_ended_early_is_named(tmp_path: Path) -> None:
     made = Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t), until=0.5, attributes={"status": "solver_failed"})
     with open_results(store(tmp_path / "r.h5", [made])) as results:
-        found = claims(results.scenes, [claim(Condition(of("range"), ">", bound=0.1))])
+        found = claims(results.scenes, [claim(Condition(of=of("range"), relation=">", bound=0.1))])
     assert found[0].printed.broke_off == ("paper/fig11",)
 
 

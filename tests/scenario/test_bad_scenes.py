@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.load import load_scene
-from rotor_mbs.scenario.reading import MAX_BYTES
+from rotor_mbs.scenario.scene_file import load_scene
+from rotor_mbs.scenario.toml_file import MAX_BYTES
 
 SCENE = """\
 title = "A good scene"
@@ -56,35 +56,41 @@ WRONG = {
     "title too long": ("A good scene", "x" * 201, 1, "title", "201 characters"),
     "title of two lines": ("good scene", "good\\nscene", 1, "title", "control character"),
     "title turned around": ("good scene", "good\\u202Escene", 1, "title", "control character"),
-    "title a number": ('"A good scene"', "3", 1, "title", "3 is no text"),
+    "title a number": ('"A good scene"', "3", 1, "title", "3 is not text"),
     "unknown key": ("blades = 2", "blades = 2\nbaldes = 2", 3, "baldes", "perhaps blades"),
-    "unknown table": ("[hub]", "[tower]\nheight = 80\n[hub]", 25, "tower", "is no key here"),
-    "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "is no key here"),
-    "figures a text": ("blades = 2", 'figures = "5"\nblades = 2', 2, "figures", '"5" is no list'),
-    "figure a number": ("blades = 2", 'figures = ["5", 7]\nblades = 2', 2, r"figures \(entry 2\)", "7 is no text"),
+    "unknown table": ("[hub]", "[tower]\nheight = 80\n[hub]", 25, "tower", "is not a key here"),
+    "unknown quoted key": ("[hub]", '[hub]\n"in\\nertia" = 1', 25, 'hub."in\\\\nertia"', "is not a key here"),
+    "figures a text": ("blades = 2", 'figures = "5"\nblades = 2', 2, "figures", '"5" is not a list'),
+    "figure a number": ("blades = 2", 'figures = ["5", 7]\nblades = 2', 2, r"figures \(entry 2\)", "7 is not text"),
     "blades zero": ("blades = 2", "blades = 0", 2, "blades", "0 is out of range"),
     "blades too many": ("blades = 2", "blades = 10001", 2, "blades", "out of range"),
     "blades astronomical": ("blades = 2", f"blades = 0x{'f' * 5000}", 2, "blades", "so large a number"),
-    "blades broken": ("blades = 2", "blades = 2.5", 2, "blades", "2.5 is no whole number"),
-    "blades true": ("blades = 2", "blades = true", 2, "blades", "true is no whole number"),
-    "blades quoted": ("blades = 2", 'blades = "2"', 2, "blades", '"2" is no whole number'),
+    "blades broken": ("blades = 2", "blades = 2.5", 2, "blades", "2.5 is not a whole number"),
+    "blades true": ("blades = 2", "blades = true", 2, "blades", "true is not a whole number"),
+    "blades quoted": ("blades = 2", 'blades = "2"', 2, "blades", '"2" is not a whole number'),
     "gravity negative": ("gravity = 9.8", "gravity = -9.8", 3, "gravity", "-9.8 is out of range"),
     "gravity NaN": ("gravity = 9.8", "gravity = nan", 3, "gravity", "nan is out of range"),
     "gravity missing": ("gravity = 9.8\n", "", 1, "gravity", "is missing"),
     "duration zero": ("duration = 10", "duration = 0", 4, "duration", "0 is out of range"),
     "duration infinite": ("duration = 10", "duration = inf", 4, "duration", "inf is out of range"),
-    "duration a date": ("duration = 10", "duration = 2020-01-01", 4, "duration", "a date or time is no number"),
+    "duration a date": ("duration = 10", "duration = 2020-01-01", 4, "duration", "a date or time is not a number"),
     "samples one": ("samples = 11", "samples = 1", 5, "samples", "1 is out of range"),
-    "samples broken": ("samples = 11", "samples = 11.0", 5, "samples", "11.0 is no whole number"),
+    "samples broken": ("samples = 11", "samples = 11.0", 5, "samples", "11.0 is not a whole number"),
     "samples too many": ("samples = 11", "samples = 10000001", 5, "samples", "out of range"),
     "outputs empty": ('["angles", "tip"]', "[]", 6, "outputs", "0 entries"),
-    "outputs unknown": ('["angles", "tip"]', '["angles", "tips"]', 6, r"outputs \(entry 2\)", '"tips" is none of them'),
+    "outputs unknown": (
+        '["angles", "tip"]',
+        '["angles", "tips"]',
+        6,
+        r"outputs \(entry 2\)",
+        '"tips" is not one of them, perhaps tip',
+    ),
     "outputs repeated": ('["angles", "tip"]', '["tip", "tip"]', 6, "outputs", "more than once"),
     "blade missing": (BLADE, "", 1, "blade", "is missing"),
     "mass missing": ("mass = 2\n", "", 8, r"blade\.mass", "is missing"),
     "mass zero": ("mass = 2", "mass = 0", 9, r"blade\.mass", "0 is out of range"),
     "mass negative": ("mass = 2", 'mass = "-2*pi"', 9, r"blade\.mass", '"-2\\*pi" is out of range'),
-    "mass true": ("mass = 2", "mass = true", 9, r"blade\.mass", "true is no number"),
+    "mass true": ("mass = 2", "mass = true", 9, r"blade\.mass", "true is not a number"),
     "mass beyond doubles": ("mass = 2", f"mass = 1{'0' * 400}", 9, r"blade\.mass", "so large a number is out of range"),
     "centre too short": ("[0.5, 0, 3]", "[0.5, 0]", 10, r"blade\.centre_of_mass", "2 entries"),
     "centre on lines": (
@@ -100,7 +106,7 @@ WRONG = {
     "inertia of products alone": ("[1, 1, 1, 0, 0, 0]", "[0, 0, 0, 1, 0, 0]", 11, r"blade\.inertia", "no rigid body"),
     "inertia with large products": ("[1, 1, 1, 0, 0, 0]", "[1, 1, 1, 0, 2, 0]", 11, r"blade\.inertia", "no rigid body"),
     "tip missing where wanted": ("tip = [0.5, 0, 7]\n", "", 8, r"blade\.tip", "is missing"),
-    "tip a number": ("tip = [0.5, 0, 7]", "tip = 7", 12, r"blade\.tip", "7 is no list"),
+    "tip a number": ("tip = [0.5, 0, 7]", "tip = 7", 12, r"blade\.tip", "7 is not a list"),
     "initial missing": ("[initial]\nangles = [0, 0, 0]\nrates = [0, 0, 0]\n", "", 1, "initial", "is missing"),
     "angles missing": ("angles = [0, 0, 0]\n", "", 14, r"initial\.angles", "is missing"),
     "angles too few": ("angles = [0, 0, 0]", "angles = [0, 0]", 15, r"initial\.angles", "2 numbers for a rotor and 2"),
@@ -120,7 +126,13 @@ WRONG = {
         "no finite value",
     ),
     "angle a bomb": ("angles = [0,", 'angles = ["9**9**9**9",', 15, r"initial\.angles \(entry 1\)", "no finite value"),
-    "angle a list": ("angles = [0,", "angles = [[[[0]]],", 15, r"initial\.angles \(entry 1\)", "a list is no number"),
+    "angle a list": (
+        "angles = [0,",
+        "angles = [[[[0]]],",
+        15,
+        r"initial\.angles \(entry 1\)",
+        "a list is not a number",
+    ),
     "rates too many": (
         "rates = [0, 0, 0]",
         "rates = [0, 0, 0, 0]",
@@ -165,7 +177,7 @@ WRONG = {
         "rows 1, 2 and 3",
     ),
     "hub negative": ("[hub]\ninertia = 1", "[hub]\ninertia = -1", 26, r"hub\.inertia", "-1 is out of range"),
-    "two hubs": ("[hub]\n", "[[hub]]\ninertia = 1\n[[hub]]\n", 25, "hub", "a list is no table"),
+    "two hubs": ("[hub]\n", "[[hub]]\ninertia = 1\n[[hub]]\n", 25, "hub", "a list is not a table"),
     "shaft damping missing": ("[shaft]\ndamping = 3", "[shaft]", 28, r"shaft\.damping", "is missing"),
     "one of two blade tables": ("[blade]", "[[blade]]", 8, "blade", r"1 \[\[blade\]\] table for 2 blades"),
     "second blade table": (
@@ -216,7 +228,7 @@ def test_one_fault_one_line(tmp_path: Path, old: str, new: str, line: int, key: 
 )
 def test_a_number_where_a_table_should_be(tmp_path: Path, table: str, key: str) -> None:
     (problem,) = _problems(tmp_path, f"{key} = 3\n" + SCENE.replace(table, ""))
-    assert problem.startswith(f":1: {key}: 3 is no table; allowed: ")
+    assert problem.startswith(f":1: {key}: 3 is not a table; allowed: ")
 
 
 def test_a_run_that_cannot_fit_in_memory(tmp_path: Path) -> None:
@@ -276,7 +288,7 @@ def test_all_faults_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
         (b" \n\t\n", ": is empty"),
         (b"\x7fELF\x00\x01\xff\xfe", ":1: is not UTF-8"),
         (b"title = 'x'\n# \xe9\n", ":2: is not UTF-8"),
-        (b"title = 'x'\n\n\x00", ":3: holds a NUL byte"),
+        (b"title = 'x'\n\n\x00", ":3: contains a NUL byte"),
         (b"x" * (MAX_BYTES + 1), ": is larger than 1048576 bytes"),
         (b"title = \n", ":1: not TOML: invalid value"),
         (b"title = 'x'\ntitle = 'y'\n", ":2: not TOML: cannot overwrite a value"),
@@ -302,7 +314,7 @@ def test_a_flood_of_faults_is_cut_and_counted(tmp_path: Path) -> None:
         load_scene(path, "flood")
     # 300 unknown keys and the 7 that are needed: 100 lines, and one that counts the rest.
     assert len(caught.value.problems) == 101
-    assert caught.value.problems[-1].endswith(": 207 more faults")
+    assert caught.value.problems[-1].endswith(": 207 more errors")
 
 
 @pytest.mark.parametrize(
@@ -331,7 +343,7 @@ def test_a_flood_of_faults_is_cut_and_counted(tmp_path: Path) -> None:
         ("bench.toml", "bench names a group of results"),
         ("paper.toml", "paper names a group of results"),
         ("circle.toml", "leads to no file"),
-        ("pipe.toml", "is no regular file"),
+        ("pipe.toml", "is not a regular file"),
     ],
 )
 def test_arguments_that_name_no_scene(

@@ -11,11 +11,11 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import list_scenes
-from rotor_mbs.scenario.design import Axis, Design, validation_rows
-from rotor_mbs.scenario.keys import parse_key, put, unit_of
 from rotor_mbs.scenario.resources import sweeps_folder
+from rotor_mbs.scenario.scene_file import scene_tables
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
-from rotor_mbs.scenario.variants import Variants
+from rotor_mbs.scenario.sweep_design import Axis, Design, validation_rows
+from rotor_mbs.scenario.variants import Variants, parse_key, put_value, unit_of
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
 
@@ -93,8 +93,8 @@ def test_units_of_keys(key: str, unit: str) -> None:
 
 def test_one_blade_of_all_can_be_varied() -> None:
     tables = {"blades": 3, "blade": {"mass": 1.0}}
-    put(tables, parse_key("blade[1].mass"), 2.0)
-    put(tables, parse_key("bearing.stiffness[2]"), 5.0)
+    put_value(tables, parse_key("blade[1].mass"), 2.0)
+    put_value(tables, parse_key("bearing.stiffness[2]"), 5.0)
     assert tables["blade"] == [{"mass": 1.0}, {"mass": 2.0}, {"mass": 1.0}]
     assert tables["bearing"] == {"stiffness": [0.0, 0.0, 5.0]}
 
@@ -117,9 +117,10 @@ def test_a_row_is_the_scene_with_its_numbers_in_place(tmp_path: Path) -> None:
 
 def test_initial_states_put_in_alone_make_the_same_scene_as_the_whole_file_would(tmp_path: Path) -> None:
     sweep = _load(tmp_path, '[[axis]]\nkey = "initial.angles[2]"\nvalues = [0.1, 0.2]\n')
-    variants = Variants("s", sweep.tables, sweep.keys)
+    tables = scene_tables(sweep.base)
+    variants = Variants("s", tables, sweep.keys)
     variants.scene([0.1])
-    tables = {**sweep.tables, "initial": {**sweep.tables["initial"], "angles": ["pi/6", "pi/4", 0.2, "pi/2"]}}
+    tables = {**tables, "initial": {**tables["initial"], "angles": ["pi/6", "pi/4", 0.2, "pi/2"]}}
     assert variants.scene([0.2]) == Variants("s", tables, ()).scene(())
 
 
@@ -127,21 +128,29 @@ _BAD = {
     "an unknown key": (
         '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1]',
         4,
-        "angels: is no key here, perhaps angles",
+        "angels: is not a key here, perhaps angles",
     ),
-    "an unknown key of two values, told once": (
+    "an unknown key of two values, reported once": (
         '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]',
         4,
-        r"^[^\n]*initial\.angels\[1\]: initial\.angels: is no key here[^\n]*$",
+        r"^[^\n]*initial\.angels\[1\]: initial\.angels: is not a key here[^\n]*$",
     ),
     "an index too high": ('[[axis]]\nkey = "initial.angles[4]"\nvalues = [1]', 4, r"initial.angles\[3\]"),
-    "an unknown table": ('[[axis]]\nkey = "bering.stiffness"\nvalues = [1]', 4, "bering: is no key here, perhaps bear"),
-    "no number there": ('[[axis]]\nkey = "title"\nvalues = [1]', 4, "is no text"),
-    "a table there": ('[[axis]]\nkey = "initial"\nvalues = [1]', 4, "is no number but a table"),
-    "no path": ('[[axis]]\nkey = "initial..x"\nvalues = [1]', 4, "is no path of a key; allowed"),
+    "an unknown table": (
+        '[[axis]]\nkey = "bering.stiffness"\nvalues = [1]',
+        4,
+        "bering: is not a key here, perhaps bear",
+    ),
+    "no number there": ('[[axis]]\nkey = "title"\nvalues = [1]', 4, "is not text"),
+    "a table there": ('[[axis]]\nkey = "initial"\nvalues = [1]', 4, "1.0 is not a table"),
+    "no path": ('[[axis]]\nkey = "initial..x"\nvalues = [1]', 4, "is not the path of a key; allowed"),
     "another shape": ('[[axis]]\nkey = "blades"\nvalues = [1, 2]', 4, "share one blades; allowed"),
-    "values that are no list": ('[[axis]]\nkey = "gravity"\nvalues = 3', 5, "is no list; allowed: a list of numbers"),
-    "a value that is no number": ('[[axis]]\nkey = "gravity"\nvalues = [1, true]', 5, "true is no number"),
+    "values not in a list": (
+        '[[axis]]\nkey = "gravity"\nvalues = 3',
+        5,
+        "is not a list; allowed: a list of numbers",
+    ),
+    "a value that is not a number": ('[[axis]]\nkey = "gravity"\nvalues = [1, true]', 5, "true is not a number"),
     "an empty list": ('[[axis]]\nkey = "gravity"\nvalues = []', 5, "0 entries; allowed: a list of numbers"),
     "no values": ('[[axis]]\nkey = "gravity"', 3, "has no values; allowed: exactly one of values"),
     "values twice": ('[[axis]]\nkey = "gravity"\nvalues = [1]\nuniform = [1, 2]', 3, "has values and uniform"),
@@ -171,7 +180,11 @@ _BAD = {
         3,
         "perhaps gravity",
     ),
-    "an unknown word": ('axes = 1\n[[axis]]\nkey = "gravity"\nvalues = [1]', 3, "axes: is no key here, perhaps axis"),
+    "an unknown name": (
+        'axes = 1\n[[axis]]\nkey = "gravity"\nvalues = [1]',
+        3,
+        "axes: is not a key here, perhaps axis",
+    ),
 }
 
 

@@ -485,7 +485,13 @@ def warm_up() -> None:
     """Loads the engines, and proves that without a change every verdict passes."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
     importlib.import_module("rotor_mbs.models.exudyn.adapter")
-    for name in ("scipy.integrate", "scipy.special", "h5py", "rotor_mbs.scenario.schema", "rotor_mbs.scenario.load"):
+    for name in (
+        "scipy.integrate",
+        "scipy.special",
+        "h5py",
+        "rotor_mbs.scenario.schema",
+        "rotor_mbs.scenario.scene_file",
+    ):
         importlib.import_module(name)
     for group in dict.fromkeys(target.group for target in TARGETS):
         with contextlib.redirect_stderr(io.StringIO()):

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.names import COLOURS
-from rotor_mbs.scenario.load import parse_scene
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]

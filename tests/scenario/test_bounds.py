@@ -1,0 +1,67 @@
+"""Bounds files: what is accepted, which entry counts, and that every error is reported with line, key and rule."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.bounds import Bound, load_bounds, read_bounds, shipped_bounds
+
+BAD = {
+    "an unknown key": (
+        'check = "tip"\nmethod = "*"\nvalue = 1\nreason = "x"\nunit = "m"',
+        6,
+        "bound.unit .* not a key",
+    ),
+    "a wrong type": (
+        'check = "tip"\nmethod = "*"\nvalue = [1]\nreason = "x"',
+        4,
+        r"bound.value \(bound 1\): a list is",
+    ),
+    "truth for a number": ('check = "tip"\nmethod = "*"\nvalue = true\nreason = "x"', 4, "true is not a number"),
+    "not a number": ('check = "tip"\nmethod = "*"\nvalue = nan\nreason = "x"', 4, "nan is out of range"),
+    "an infinity": ('check = "tip"\nmethod = "*"\nvalue = inf\nreason = "x"', 4, "inf is out of range"),
+    "a negative bound": ('check = "tip"\nmethod = "*"\nvalue = -1e-9\nreason = "x"', 4, "-1e-09 is out of range"),
+    "a huge whole number": (f'check = "tip"\nmethod = "*"\nvalue = 1{"0" * 400}\nreason = "x"', 4, "so large a number"),
+    "no value": ('check = "tip"\nmethod = "*"\nreason = "x"', 1, "bound.value .*is missing; allowed: a number from 0"),
+    "no reason": ('check = "tip"\nmethod = "*"\nvalue = 1\nreason = " "', 5, "reason .*is empty; allowed: a sentence"),
+    "an unknown check": ('check = "tipp"\nmethod = "*"\nvalue = 1\nreason = "x"', 2, "perhaps tip; allowed: one of"),
+}
+
+
+@pytest.mark.parametrize(("text", "line", "message"), BAD.values(), ids=BAD)
+def test_an_error_is_one_line(tmp_path: Path, text: str, line: int, message: str) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(f"[[bound]]\n{text}\n")
+    with pytest.raises(InputError, match=message) as caught:
+        read_bounds(own)
+    (problem,) = caught.value.problems
+    assert problem.startswith(f"{own}:{line}: bound.")
+
+
+@pytest.mark.parametrize("text", ["bound = 3", "[[bounds]]\n", "", "[bound\n", "\x00"])
+def test_a_file_of_another_kind_is_refused(tmp_path: Path, text: str) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_bounds(own)
+    assert all(problem.startswith(str(own)) for problem in caught.value.problems)
+
+
+def test_entries_in_front_count_first_and_the_shipped_ones_stay(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text('[[bound]]\ncheck = "energy"\nmethod = "mine/*"\nvalue = 1e-3\nreason = "explicit method"\n')
+    assert load_bounds(own).of("energy", "mine/euler") == Bound("energy", "mine/*", 1e-3, "explicit method")
+    brought = Bound("energy", "mine/euler", 1e-4, "of the method")
+    bounds = shipped_bounds().with_entries([brought])
+    assert bounds.of("energy", "mine/euler") == brought
+    assert bounds.of("energy", "lagrange/taylor") == load_bounds().of("energy", "lagrange/taylor")
+
+
+def test_every_shipped_bound_names_a_known_fault_above_it() -> None:
+    for bound in shipped_bounds().entries:
+        assert bound.known_fault
+        assert bound.value < bound.fault < math.inf

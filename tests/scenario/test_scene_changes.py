@@ -1,0 +1,136 @@
+"""Scenes changed through Scene.replace, scenes written as TOML, and outputs that installed packages add."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
+from rotor_mbs.scenario.outputs import ENTRY_POINT_GROUP, known_outputs
+from rotor_mbs.scenario.scene import OUTPUTS, Scene, scene_hash
+from rotor_mbs.scenario.scene_file import load_scene, new_scene_text, parse_scene, scene_toml
+
+# A file key, a value that differs from check/general, and the field that it reaches.
+CHANGES: dict[str, tuple[Any, str]] = {
+    "title": ("Another", "title"),
+    "figures": (["1", "2"], "figures"),
+    "gravity": (9.81000001, "gravity"),
+    "duration": ("2*pi", "duration"),
+    "samples": (12, "samples"),
+    "outputs": (["rates"], "outputs"),
+    "blade[1].mass": (1e4, "blades"),
+    "blade[0].inertia[2]": (301.0, "blades"),
+    "hub.inertia": (0.125, "hub_inertia"),
+    "initial.angles[1]": ("deg(20)", "initial_angles"),
+    "initial.rates": ((1, 2, 3, 4), "initial_rates"),
+    "torque.rotor": (5.0, "rotor_torque"),
+    "bearing.stiffness": (7.0, "bearing_stiffness"),
+    "bearing.damping[2]": (0.5, "bearing_damping"),
+    "shaft.damping": (np.float64(0.1), "shaft_damping"),
+}
+
+
+@pytest.fixture(scope="module")
+def general() -> Scene:
+    return find_scenes(["check/general"])[0]
+
+
+@pytest.mark.parametrize("name", [name for name, _ in list_scenes()])
+def test_a_written_scene_is_read_as_the_same_scene(name: str) -> None:
+    scene = find_scenes([name])[0]
+    text = scene_toml(scene)
+    again = parse_scene(text, name)
+    assert replace(again, text=scene.text) == scene
+    assert scene_hash(again) == scene_hash(scene)
+    assert scene_toml(again) == text
+
+
+def test_every_key_of_the_scene_file_can_be_changed() -> None:
+    assert {one.name for one in fields(Scene)} - {"name", "text"} == {field for _, field in CHANGES.values()}
+
+
+@pytest.mark.parametrize("key", CHANGES)
+def test_a_change_reaches_its_field_alone_and_the_text(general: Scene, key: str) -> None:
+    value, field = CHANGES[key]
+    changed = general.replace(**{key: value})
+    differing = {one.name for one in fields(Scene) if getattr(changed, one.name) != getattr(general, one.name)}
+    assert differing == {field, "text"}
+    assert parse_scene(changed.text, changed.name) == changed
+
+
+def test_several_changes_at_once_and_the_original_stays(general: Scene) -> None:
+    before = scene_hash(general)
+    changed = general.replace(gravity=1.5, **{"initial.angles[0]": 0.25, "bearing.stiffness": [1, 2, 3]})
+    assert (changed.gravity, changed.initial_angles[0], changed.bearing_stiffness) == (1.5, 0.25, (1.0, 2.0, 3.0))
+    assert scene_hash(general) == before
+
+
+def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
+    scene = find_scenes(["stiff/bearing-1e4"])[0]
+    states = {"initial.angles": [0.1, 0.2], "initial.rates": [0.0, 0.0]}
+    changed = scene.replace(blades=1, **states)
+    assert (len(changed.blades), changed.bearing_stiffness) == (1, scene.bearing_stiffness[:1])
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("gravty", 9.81, "paper/fig11: gravty: is not a key here, perhaps gravity; allowed: title, "),
+        ("blade.mas", 1.0, "blade.mas: is not a key here, perhaps mass; allowed: mass"),
+        ("initial.angles[4]", 1.0, r"initial.angles has 4 entries; allowed: initial.angles\[0\] to "),
+        ("initial.angles", 1.0, "initial.angles: 1.0 is not a list; allowed: 1 \\+ blades numbers"),
+        ("gravity", "much", "gravity: \"much\": 'much' is not a number"),
+        ("gravity", None, "gravity: .* is not a number"),
+        ("gravity.x", 1.0, "gravity is a single value; allowed: the path"),
+        ("a b", 1.0, "'a b' is not the path of a key; allowed: the path"),
+        ("blade.mass", -1, "blade.mass: -1 is out of range; allowed: a number above 0"),
+        ("outputs", ["angels"], r"outputs \(entry 1\): \"angels\" is not one of them, perhaps angles"),
+    ],
+)
+def test_an_impossible_change_is_refused_with_its_key(key: str, value: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        find_scenes(["paper/fig11"])[0].replace(**{key: value})
+
+
+def test_a_tip_that_the_file_does_not_give_is_not_made_up(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        'title = "t"\nblades = 1\ngravity = 0\nduration = 1\nsamples = 2\noutputs = ["angles"]\n'
+        "[blade]\nmass = 1\ncentre_of_mass = [1, 0, 1]\n[initial]\nangles = [0, 0]\nrates = [0, 0]\n"
+    )
+    with pytest.raises(InputError, match=r"blade\.tip: is missing"):
+        load_scene(path, "scene").replace(outputs=["tip"])
+
+
+def test_the_template_is_a_scene_with_every_key(tmp_path: Path) -> None:
+    path = tmp_path / "new.toml"
+    path.write_text(new_scene_text(), encoding="utf-8")
+    scene = load_scene(path, "new")
+    assert len(scene.blades) == 3
+    tables = tomllib.loads(new_scene_text())
+    for one in fields(Scene):
+        here = tables
+        for name in filter(None, one.metadata["key"].split(".")):
+            here = here[name]
+
+
+def test_an_installed_package_adds_an_output(general: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "more-1.0.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: more\nVersion: 1.0\n")
+    (package / "entry_points.txt").write_text(f"[{ENTRY_POINT_GROUP}]\nhub_moment = more_that_is_not_there:QUANTITY\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    known_outputs.cache_clear()
+    try:
+        assert known_outputs() == (*OUTPUTS, "hub_moment")
+        assert general.replace(outputs=["hub_moment", "angles"]).outputs == ("angles", "hub_moment")
+        with pytest.raises(InputError, match="perhaps hub_moment"):
+            general.replace(outputs=["hub_momen"])
+    finally:
+        known_outputs.cache_clear()
