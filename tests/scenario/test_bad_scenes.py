@@ -401,7 +401,7 @@ _SNIPPETS = st.sampled_from(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, len(SCENE)), st.integers(0, 12), _SNIPPETS | st.text(max_size=5)), max_size=4))
 def test_no_damage_to_a_file_gives_a_traceback(tmp_path: Path, damages: list[tuple[int, int, str]]) -> None:
     text = SCENE
@@ -418,7 +418,7 @@ def test_no_damage_to_a_file_gives_a_traceback(tmp_path: Path, damages: list[tup
     assert all(re.match(rf"{re.escape(str(path))}(:\d+)?: ", problem) for problem in problems)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100, deadline=None)
 @given(st.binary(max_size=200))
 def test_no_bytes_give_a_traceback(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "bytes.toml"
