@@ -12,7 +12,7 @@ from rotor_mbs.store.read import Results, StoredScene
 
 
 @dataclass(frozen=True)
-class Entry:
+class CheckedEntry:
     """A printed entry against its derivative. difference: largest relative; explained_by: "E1, E2" or ""."""
 
     equation: str
@@ -34,7 +34,7 @@ class Effect:
     energy_gain: float | None
 
 
-def entries(results: Results) -> list[Entry]:
+def entries(results: Results) -> list[CheckedEntry]:
     """Every checked entry in the order of the file; none where the file has no such group."""
     return [_entry(check) for check in read_errata(results)]
 
@@ -44,10 +44,10 @@ def effects(scene: StoredScene) -> dict[str, Effect]:
     return {erratum: _effect(scene.methods[run].attributes) for erratum, run in ALONE.items() if run in scene.methods}
 
 
-def _entry(attributes: Mapping[str, Any]) -> Entry:
+def _entry(attributes: Mapping[str, Any]) -> CheckedEntry:
     texts = {name: str(attributes.get(name, "")) for name in ("equation", "entry", "printed", "right", "explained_by")}
     difference = attributes.get("difference", 0.0)
-    return Entry(**texts, difference=float(difference), agrees=bool(attributes.get("agrees", 0)))
+    return CheckedEntry(**texts, difference=float(difference), agrees=bool(attributes.get("agrees", 0)))
 
 
 def _effect(attributes: Mapping[str, Any]) -> Effect:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,13 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from rotor_mbs.analysis import methods
+from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core.canvas import font_file
-from rotor_mbs.report.frames import Wires, wires
-from rotor_mbs.report.names import GREY, coordinate_look, name_of
+from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification, scene_of
+from rotor_mbs.report.plots.paths import projected
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
 Array = NDArray[Any]
@@ -65,7 +68,7 @@ def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image
     """The pictures and the seconds each is shown. Raises InputError where nothing can be drawn."""
     scene = scene_of(stored)
     runs = {
-        name_of(run.method): run
+        label_of(run.method): run
         for run in (methods.printed_run(stored), methods.right_run(stored))
         if run is not None and "angles" in run
     }
@@ -83,6 +86,43 @@ def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image
 def _finite(run: StoredRun) -> Array:
     found: Array = np.nan_to_num(run.array("angles"), posinf=0.0, neginf=0.0)
     return found
+
+
+@dataclass(frozen=True)
+class Wires:
+    """A run at equally spaced times, projected, in m.
+
+    axis, edge, root   (frames, blades, 2): the pitch axis' end, the tip, and the tip's offset at the hub
+    reach              m from the hub to the farthest tip
+    ended              the frame after the last that the run has
+    """
+
+    axis: Array
+    edge: Array
+    root: Array
+    reach: float
+    ended: int
+
+
+def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Wires:
+    """At the times `at` (s); distances from the pitch axis are drawn `magnified` times."""
+    moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
+    reach = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades)
+    near = np.searchsorted(at, time[-1], side="right")
+    return Wires(
+        _points(scene, moved, 0.0, 1.0), _points(scene, moved, magnified, 1.0), _points(scene, moved, magnified, 0.06),
+        reach, int(near),
+    )  # fmt: skip
+
+
+def _points(scene: Scene, angles: Array, across: float, along: float) -> Array:
+    """(frames, blades, 2) of each blade's tip, its offset `across` times and its length `along` times as large."""
+    blades = tuple(
+        replace(blade, tip=(across * blade.tip[0], across * blade.tip[1], along * blade.tip[2]))
+        for blade in scene.blades
+    )
+    paths = tip_paths(replace(scene, blades=blades), angles)
+    return projected(paths.reshape(-1, 3)).reshape(*paths.shape[:2], 2)
 
 
 def _picture(drawn: Mapping[str, Wires], frame: int, time: float, magnified: float) -> Image.Image:
@@ -109,12 +149,12 @@ def _rotor(pen: ImageDraw.ImageDraw, wire: Wires, frame: int, centre: tuple[floa
         return centre[0] + scale * float(point[0]), centre[1] - scale * float(point[1])
 
     for blade in range(wire.edge.shape[1]):
-        colour, _ = coordinate_look(blade + 1)
+        colour = coordinate_look(blade + 1).colour
         path = [at(point) for point in wire.edge[: frame + 1, blade]]
         if len(path) > 1:
             pen.line(path, fill=colour, width=_FINE)
     for blade in range(wire.edge.shape[1]):
-        colour, _ = coordinate_look(blade + 1)
+        colour = coordinate_look(blade + 1).colour
         axis, edge, root = (at(points[frame, blade]) for points in (wire.axis, wire.edge, wire.root))
         pen.polygon([centre, axis, edge, root], fill=_FAINT)
         pen.line([centre, axis, edge, root, centre], fill=colour, width=3 * _FINE, joint="curve")

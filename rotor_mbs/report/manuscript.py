@@ -1,7 +1,4 @@
-"""The paper's figures as files for a manuscript: printed model, right model and Exudyn in one figure, column by column.
-
-Knows stored scenes and how figures are drawn; no page.
-"""
+"""The paper's figures as files for a manuscript: the models side by side, a column each."""
 
 from __future__ import annotations
 
@@ -11,16 +8,15 @@ from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core import canvas
-from rotor_mbs.report.pages.walk import legend
-from rotor_mbs.report.paper_figures import columns, draw_motion, draw_paths, draw_torques
-from rotor_mbs.report.paper_set import MOTION, TORQUES, PaperFigure, available
-from rotor_mbs.store.read import StoredRun, StoredScene, open_results
+from rotor_mbs.report.paper_figures import HEADINGS, PATHS, PaperFigure, available, draw, legend, panel_runs
+from rotor_mbs.store.read import StoredScene, open_results
 
 
-def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]) -> list[Path]:
-    """`folder`/figNN.`kind` for each figure asked for, all that the file has where `numbers` is empty.
+def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
+    """`folder`/figNN.`kind` for each figure of `numbers`, or for all that the file has where `numbers` is empty.
 
-    Raises InputError for a figure that the file does not have, StoreError where file or folder is not as it should be.
+    `kind` is "pdf", "svg" or "png". Returns the files written. Raises InputError for a figure that the file does not
+    have, StoreError where the file cannot be read or the folder cannot be written.
     """
     with open_results(results) as opened:
         have = {one.number: one for one in available(opened.scenes)}
@@ -34,59 +30,35 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
 
 
 def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
-    """The whole figure: a column a model; rows (a) and (b), or a row a panel where paths are shown."""
-    stored = {name: scenes[name] for name in figure.scenes}
+    """The whole figure, a column per model: position above velocity, or a row per panel where paths are shown."""
+    pictures = panel_runs(figure, scenes)
+    letters = list(dict.fromkeys(letter for letter, _, _ in pictures))
+    keys = [key for key in HEADINGS if key in {key for _, key, _ in pictures}]
+    is_paths = figure.kind == PATHS
     with canvas.style(for_print=True):
-        panels = (_curves if figure.kind in (MOTION, TORQUES) else _paths)(figure, stored)
-    canvas.legend_below(panels.figure, [(one.label, one.colour, _dashes(one.dashes)) for one in legend(figure, stored)])
+        rows, height, heading = (len(letters), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
+        panels = canvas.grid(rows, len(keys), height, for_print=True)
+        table = [panels.axes[i : i + len(keys)] for i in range(0, len(panels.axes), len(keys))]
+        for letter, key, runs in pictures:
+            column = [row[keys.index(key)] for row in table]
+            draw(figure, [column[letters.index(letter)]] if is_paths else column, runs)
+        for axes, key in zip(table[0], keys, strict=True):
+            axes.text(0.5, heading, HEADINGS[key], transform=axes.transAxes, ha="center", weight="bold")
+        _tidy(table, letters if is_paths else [])
+    canvas.legend_below(panels.figure, legend(figure, scenes))
     return panels
 
 
-def _curves(figure: PaperFigure, stored: Mapping[str, StoredScene]) -> canvas.Panels:
-    by_heading: dict[str, dict[str, StoredRun]] = {}
-    for label, name in figure.panels:
-        for heading, run in columns(stored[name]).items():
-            by_heading.setdefault(heading, {})[label] = run
-    across = len(by_heading)
-    panels = canvas.grid(2, across, 1.55, for_print=True)
-    for place, (heading, runs) in enumerate(by_heading.items()):
-        axes = (panels.axes[place], panels.axes[across + place])
-        if figure.kind == TORQUES:
-            draw_torques(axes, runs)
-        else:
-            draw_motion(axes, next(iter(runs.values())))
-        _head(axes[0], heading, 1.16)
-        if place:
-            for one in axes:
-                one.set_ylabel("")
-    return panels
-
-
-def _paths(figure: PaperFigure, stored: Mapping[str, StoredScene]) -> canvas.Panels:
-    rows = [(letter, columns(stored[name])) for letter, name in figure.panels]
-    headings = list(dict.fromkeys(heading for _, runs in rows for heading in runs))
-    panels = canvas.grid(len(rows), len(headings), 1.8, for_print=True)
-    for i, (letter, runs) in enumerate(rows):
-        for j, heading in enumerate(headings):
-            axes = panels.axes[i * len(headings) + j]
-            if heading in runs and "tip" in runs[heading]:
-                draw_paths(axes, runs[heading].array("tip"))
-            else:
+def _tidy(table: list[list[Any]], letters: list[str]) -> None:
+    """Letters at the rows of paths; labels of the vertical axes at the first column alone; no empty frames."""
+    for row in table:
+        for axes in row:
+            if not axes.has_data():
                 axes.set_axis_off()
-            if not i:
-                _head(axes, heading, 1.02)
-            if not j:
-                axes.text(-0.08, 0.94, f"({letter})", transform=axes.transAxes)
-    return panels
-
-
-def _head(axes: Any, heading: str, height: float) -> None:
-    axes.text(0.5, height, heading, transform=axes.transAxes, ha="center", weight="bold")
-
-
-def _dashes(text: str) -> Any:
-    """A line's style of the dashes of a legend's sample, which are twice as long."""
-    return (0, tuple(0.5 * float(length) for length in text.split())) if text else "-"
+            if axes is not row[0]:
+                axes.set_ylabel("")
+    for row, letter in zip(table, letters, strict=False):
+        row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
 
 
 def _written(path: Path, content: bytes) -> Path:

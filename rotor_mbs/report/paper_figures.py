@@ -1,110 +1,136 @@
-"""How the paper's figures are drawn, upon given axes.
-
-Knows runs by their arrays. The same drawing serves a page (one picture a model) and a manuscript (one figure in all).
-"""
+"""The paper's figures: what each shows, of which scenes, and how it is drawn, on a page and for a manuscript."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
-from rotor_mbs.report import texts
-from rotor_mbs.report.core import canvas
-from rotor_mbs.report.names import COLOURS, GREY, coordinate_look
-from rotor_mbs.report.plots.time_histories import set_range, thin
+from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-Array = NDArray[Any]
-_BINS = 130  # stretches of a curve: a highest and a lowest point each
-_VIEW = np.radians((-62.0, 14.0))  # azimuth and elevation from which paths are seen
+MOTION, PATHS, TORQUES = "motion", "paths", "torques"
+# The models that are compared, by key, in order from left to right.
+HEADINGS = {"printed": "As printed", "corrected": "Corrected model", "exudyn": "Exudyn"}
+_BINS = 130  # intervals of a curve: a largest and a smallest point each
 
 
-def columns(scene: StoredScene) -> dict[str, StoredRun]:
-    """What stands side by side, by heading: as printed, the right model, Exudyn; those that have samples."""
+@dataclass(frozen=True)
+class PaperFigure:
+    """number; kind; panels: the letter ("" where it has none; a torque) and the scene of each."""
+
+    number: str
+    kind: str
+    panels: tuple[tuple[str, str], ...]
+
+    @property
+    def scenes(self) -> tuple[str, ...]:
+        """The scenes of all panels."""
+        return tuple(scene for _, scene in self.panels)
+
+
+def _figure(number: str, kind: str, **panels: str) -> PaperFigure:
+    return PaperFigure(number, kind, tuple((letter.strip("_"), f"paper/{name}") for letter, name in panels.items()))
+
+
+FIGURES = (
+    _figure("3", MOTION, _="fig03"),
+    _figure("4", PATHS, a="fig03", b="fig04b"),
+    _figure("5", MOTION, _="fig05"),
+    _figure("6", MOTION, _="fig06"),
+    _figure("7", PATHS, a="fig05", b="fig06"),
+    _figure("8", MOTION, _="fig08"),
+    _figure("9", MOTION, _="fig09"),
+    _figure("10", PATHS, a="fig08", b="fig09"),
+    _figure("11", MOTION, _="fig11"),
+    _figure("12", MOTION, _="fig12"),
+    _figure("13", PATHS, a="fig11", b="fig13b"),
+    _figure("14", PATHS, a="fig14a", b="fig14b", c="fig14c"),
+    PaperFigure("15", TORQUES, tuple((f"{n} kN·m", f"paper/fig15-{n}kNm") for n in (1, 10, 50, 100))),
+    _figure("16", PATHS, a="fig15-1kNm", b="fig15-100kNm"),
+)
+
+
+def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
+    """The figures of which `scenes` has a panel, with the panels that it has."""
+    found = (
+        PaperFigure(one.number, one.kind, tuple(panel for panel in one.panels if panel[1] in scenes)) for one in FIGURES
+    )
+    return tuple(one for one in found if one.panels)
+
+
+def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
+    """The scene's runs by the keys of HEADINGS, those that have samples of angles and rates."""
     exudyn = [
         run for name, run in methods.right_runs(scene).items()
         if methods.model_of(name).startswith("exudyn") and methods.has_samples(run)
     ]  # fmt: skip
     runs = {
-        texts.PRINTED_COLUMN: methods.printed_run(scene),
-        texts.RIGHT_COLUMN: methods.right_run(scene),
-        texts.EXUDYN_COLUMN: next(iter(sorted(exudyn, key=lambda run: not run.method.startswith("exudyn_tree"))), None),
+        "printed": methods.printed_run(scene),
+        "corrected": methods.right_run(scene),
+        "exudyn": next(iter(sorted(exudyn, key=lambda run: not run.method.startswith("exudyn_tree"))), None),
     }
     found: dict[str, StoredRun] = {}
-    for heading, run in runs.items():
+    for key, run in runs.items():
         if run is not None and run not in found.values() and "angles" in run and "rates" in run:
-            found[heading] = run
+            found[key] = run
     return found
 
 
-def draw_motion(axes: Sequence[Any], run: StoredRun) -> None:
-    """(a) position upon the first axes, (b) velocity upon the second: every coordinate."""
-    for one, name in zip(axes, ("angles", "rates"), strict=True):
-        values = run.array(name)
-        for column, curve in enumerate(values.T):
-            colour, line = coordinate_look(column)
-            one.plot(*thin(run.array("time"), curve, _BINS), color=colour, linestyle=line)
-        set_range(one, values)
-    _label(axes)
+def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple[str, str, dict[str, StoredRun]]]:
+    """(letter, key, runs by label) of each picture, row by row.
+
+    A figure of torques is one row, with the runs of all its scenes in one picture; elsewhere a picture has one run.
+    """
+    rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
+    for label, name in figure.panels:
+        letter = "" if figure.kind == TORQUES else label
+        for key, run in compared_runs(scenes[name]).items():
+            if figure.kind != PATHS or "tip" in run:
+                rows.setdefault(letter, {}).setdefault(key, {})[label] = run
+    return [(letter, key, runs) for letter, row in rows.items() for key, runs in row.items()]
 
 
-def draw_torques(axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
-    """The rotor's position and velocity for each torque (label -> run)."""
-    for one, name in zip(axes, ("angles", "rates"), strict=True):
-        for place, run in enumerate(runs.values()):
-            curve = run.array(name)[:, 0]
-            colour, line = torque_look(place)
-            one.plot(*thin(run.array("time"), curve, _BINS), color=colour, linestyle=line)
-        set_range(one, np.concatenate([run.array(name)[:, :1] for run in runs.values()]))
-    _label(axes)
+def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
+    """A picture on `axes`: one for paths, else two, position above velocity."""
+    from rotor_mbs.report.plots import paths  # late: matplotlib
+    from rotor_mbs.report.plots import time_histories as histories
 
-
-def torque_look(place: int) -> tuple[str, str]:
-    return COLOURS[place % len(COLOURS)], ("-", "--", "-.", ":")[place % 4]
-
-
-def _label(axes: Sequence[Any]) -> None:
-    axes[0].set_title(texts.PART_A, loc="left")
+    if figure.kind == PATHS:
+        paths.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
+        return
+    labels = (histories.ANGLE_AXIS, histories.RATE_AXIS)
+    for one, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
+        if figure.kind == MOTION:
+            run = next(iter(runs.values()))
+            histories.draw_coordinates(one, run.array("time"), run.array(name), label, _BINS)
+        else:
+            series = [
+                histories.Series(run.array("time"), run.array(name)[:, 0], torque_look(place))
+                for place, run in enumerate(runs.values())
+            ]
+            histories.draw_lines(one, series, label, _BINS)
+            histories.set_range(one, np.concatenate([run.values for run in series])[:, None])
+    axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)
-    axes[0].set_ylabel(texts.ANGLE_AXIS)
-    axes[1].set_title(texts.PART_B, loc="left")
-    axes[1].set(xlabel=texts.TIME_AXIS, ylabel=texts.RATE_AXIS)
+    axes[1].set_title("(b) angular velocity", loc="left")
+    axes[1].set_xlabel(histories.TIME_AXIS)
 
 
-def draw_paths(axes: Any, tip: Array) -> None:
-    """The tips' paths (n, blades, 3) as seen obliquely, the wire frame at the start dashed, at the end full."""
-    reach = 1.04 * float(np.linalg.norm(tip, axis=2).max())
-    canvas.flat_space(axes, 0.9 * reach, 1.0 * reach)
-    turned = np.linspace(0.0, 2.0 * np.pi, 73)
-    ring = reach * np.stack([np.sin(turned), 0.0 * turned, np.cos(turned)], axis=1)
-    axes.plot(*seen(ring).T, color="#dddddd", linewidth=0.7)
-    axes.plot(*seen(np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])).T, color=GREY, linewidth=3.0)
-    for blade in range(tip.shape[1]):
-        colour, _ = coordinate_look(blade + 1)
-        path = seen(tip[:, blade])
-        axes.plot(*_sparse(path, 0.004 * reach).T, color=colour, linewidth=0.8)
-        for end, dashes, fill in ((path[0], (0, (3, 2)), "white"), (path[-1], "-", colour)):
-            axes.plot((0.0, end[0]), (0.0, end[1]), color=colour, linestyle=dashes, linewidth=1.6)
-            axes.plot(*end[:, None], marker="o", markersize=4, markeredgecolor=colour, markerfacecolor=fill)
+def torque_look(place: int) -> Look:
+    """Line of the curve at `place` in a figure of torques."""
+    return Look(COLOURS[place % len(COLOURS)], ("-", "--", "-.", ":")[place % 4], "")
 
 
-def seen(points: Array) -> Array:
-    """(n, 2) m of (n, 3): across and up, from far away, slightly above and to the side."""
-    azimuth, elevation = _VIEW
-    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
-    projected: Array = points @ np.stack([right, up], axis=1)
-    return projected
-
-
-def _sparse(path: Array, step: float) -> Array:
-    """Points at least `step` m apart, the last one always."""
-    kept = [0]
-    for i in range(1, len(path)):
-        if np.hypot(*(path[i] - path[kept[-1]])) >= step:
-            kept.append(i)
-    return path[[*kept, len(path) - 1]]
+def legend(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple[str, Look]]:
+    """(label, look) of the curves: coordinates, blades, or torques."""
+    if figure.kind == TORQUES:
+        return [(label, torque_look(i)) for i, (label, _) in enumerate(figure.panels)]
+    runs = compared_runs(scenes[figure.scenes[0]])
+    labels = next(iter(runs.values())).labels if runs else []
+    if figure.kind == MOTION:
+        return [(label, coordinate_look(i)) for i, label in enumerate(labels)]
+    return [(f"blade {i}", coordinate_look(i)._replace(line="-")) for i in range(1, len(labels))]

@@ -13,7 +13,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.cli import main
-from rotor_mbs.report.frames import wires
+from rotor_mbs.report.animation import wires
 
 SHORT = paper("fig11", duration=1.0, samples=101)
 TURNING = rotor(lambda t: 2.0 * t, np.sin)
@@ -62,7 +62,7 @@ def test_wires_stand_where_the_rotor_is() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["paper/fig12", "-o", "a.webp"], "'paper/fig12': no such scene in it; allowed: paper/fig11"),
         (["../fig11", "-o", "a.webp"], "no such scene"),
@@ -72,12 +72,12 @@ def test_wires_stand_where_the_rotor_is() -> None:
 )
 def test_bad_input_is_one_line_and_status_2(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str], told: str,
+    arguments: list[str], message: str,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     assert main(["animate", "--results", str(results), *arguments]) == 2
     error = capsys.readouterr().err
-    assert told in error
+    assert message in error
     assert error.count("\n") == 1
     assert not list(tmp_path.iterdir())
 

@@ -12,7 +12,7 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.cli import main
 from rotor_mbs.report.manuscript import composed
-from rotor_mbs.report.paper_set import available
+from rotor_mbs.report.paper_figures import available
 from rotor_mbs.store.read import open_results
 
 RIGHT = rotor(lambda t: 0.5 + 0.1 * t, np.sin, np.cos)
@@ -58,7 +58,7 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(results: Path) -
         run = opened.scenes["paper/fig11"].runs["printed/ode45"]
         time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
     assert len(panels.axes) == 6
-    assert [axes.texts[0].get_text() for axes in panels.axes[:3]] == ["As printed", "Right model", "Exudyn"]
+    assert [axes.texts[0].get_text() for axes in panels.axes[:3]] == ["As printed", "Corrected model", "Exudyn"]
     for axes, values in ((panels.axes[0], angles), (panels.axes[3], rates)):
         for column in range(4):
             np.testing.assert_array_equal(
@@ -67,7 +67,7 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(results: Path) -
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["--figure", "2"], "figure 2: not in it; allowed: 8, 9"),
         (["--figure", "../11"], "figure ../11: not in it"),
@@ -75,11 +75,11 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(results: Path) -
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert main(["figures", "--results", str(results), "-o", str(tmp_path / "out"), *arguments]) == 2
     error = capsys.readouterr().err
-    assert told in error
+    assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.lines import Line2D
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
@@ -21,10 +22,11 @@ from rotor_mbs.methods.ladders import ladders
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core import numbers, svg
 from rotor_mbs.report.core.canvas import panels, svg_text
-from rotor_mbs.report.core.elements import run_sample
+from rotor_mbs.report.core.elements import LegendEntry
 from rotor_mbs.report.core.files import page_names
-from rotor_mbs.report.names import COLOURS, GREY, LOOKS, Look
+from rotor_mbs.report.core.looks import COLOURS, GREY, Look, label_of, look_of
 from rotor_mbs.report.plots import time_histories as figures
+from rotor_mbs.report.plots.paths import paths
 
 FIG11 = paper("fig11", samples=301)
 PLAIN = replace(FIG11, outputs=("angles",))
@@ -98,7 +100,7 @@ def test_only_what_is_there_is_drawn() -> None:
     assert len(figures.motion(figures.Motion(TIME, SWING(TIME), None)).axes) == 1
     # Nothing leaves the plane of rotation: no panel that shows how far.
     tip = np.stack([np.cos(TIME), 0.0 * TIME, np.sin(TIME)], axis=1)[:, None, :]
-    assert len(figures.paths(TIME, tip).axes) == 1
+    assert len(paths(TIME, tip).axes) == 1
 
 
 def test_thinning_loses_no_peak() -> None:
@@ -114,7 +116,7 @@ def test_thinning_loses_no_peak() -> None:
 def test_differences_are_drawn_at_their_largest_and_zero_is_a_gap() -> None:
     error = np.where(TIME < 5.0, 0.0, 1e-9 * TIME)
     error[700] = 1e-3
-    picture = figures.difference([figures.Series(TIME, error, LOOK)], None, None, None)
+    picture = figures.errors([figures.Series(TIME, error, LOOK)], "error (rad)")
     drawn = picture.axes[0].get_lines()[0].get_xydata()
     assert picture.axes[0].get_yscale() == "log"
     assert np.nanmax(drawn[:, 1]) == 1e-3
@@ -135,33 +137,35 @@ def test_rounding_is_not_blown_up_into_a_motion() -> None:
     assert high - low > 0.1
 
 
-def test_paths_have_equal_scales() -> None:
+def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
     tip = np.stack([30.0 * np.cos(TIME), 0.05 * np.sin(9.0 * TIME), 30.0 * np.sin(TIME)], axis=1)[:, None, :]
-    space, strip = figures.paths(TIME, tip).axes
-    spans = [np.ptp(limits) for limits in (space.get_xlim(), space.get_ylim(), space.get_zlim())]
-    box = space._box_aspect  # the drawn lengths of the axes
-    np.testing.assert_allclose(np.array(spans) / box, spans[0] / box[0])
+    space, strip = paths(TIME, tip).axes
+    assert space.get_aspect() == 1.0
+    assert "10 m" in [text.get_text() for text in space.texts]
+    axis = next(line.get_xydata() for line in space.get_lines() if len(line.get_xdata()) == 2 and _is_vertical(line))
+    np.testing.assert_allclose(np.ptp(axis[:, 1]), 10.0 * np.cos(np.radians(14.0)))
     np.testing.assert_allclose(strip.get_lines()[0].get_ydata().max(), 50.0, rtol=1e-3)  # mm
 
 
-def test_svg_is_made_small_without_moving_a_point_or_touching_a_label() -> None:
+def _is_vertical(line: Line2D) -> bool:
+    x, y = line.get_xydata().T
+    return bool(x[0] == x[1] and y[0] != y[1] and x[0] < 0.0)
+
+
+def test_embedding_moves_no_point_and_changes_no_label() -> None:
     picture = panels((2.0,), "time (s)")
     picture.axes[0].plot([0.0, 0.5, 1.0, 1.0, 2.0], [0.1234567, 0.5, 0.25, 0.75, 0.123])
     picture.axes[0].set_yticks([0.125, 0.625])
     plain = svg_text(picture.figure)
-    small = svg.embedded(plain, "n", "title <b>", "described & so")
-    assert len(small) < 0.7 * len(plain)
-    assert ">0.125<" in small
-    assert ">0.625<" in small
-    assert "title &lt;b&gt;" in small
-    assert "described &amp; so" in small
-    curve = max(re.findall(r' d="(M[^"]*)"', small), key=len)
-    wanted = max(re.findall(r' d="(M[^"]*)"', plain), key=len)
-    numbers_wanted = np.array(re.findall(r"-?[\d.]+", wanted), float).reshape(-1, 2)
-    start, steps = re.match(r"M(\S+?)[ ]?(-?[\d.]+)l(.*)", curve), re.findall(r"-?\d*\.?\d+", curve.split("l")[1])
-    assert start is not None
-    places = np.cumsum([[float(start[1]), float(start[2])], *np.array(steps, float).reshape(-1, 2)], axis=0)
-    np.testing.assert_allclose(places, numbers_wanted, atol=0.051)  # a tenth of a unit, rounded once
+    text = svg.embedded(plain, "n", "title <b>", "described & so")
+    assert ">0.125<" in text
+    assert ">0.625<" in text
+    assert "title &lt;b&gt;" in text
+    assert "described &amp; so" in text
+    assert all(name.startswith("n-") for name in re.findall(r'\b(?:id="|href="#|url\(#)([^")]*)', text))
+    found, wanted = (max(re.findall(r' d="(M[^"]*)"', one), key=len) for one in (text, plain))
+    numbers_found, numbers_wanted = (np.array(re.findall(r"-?[\d.]+", one), float) for one in (found, wanted))
+    np.testing.assert_allclose(numbers_found, numbers_wanted, atol=0.0051)
 
 
 # What a page has
@@ -181,9 +185,9 @@ def test_the_index_tells_the_finding(report: Path) -> None:
     found = page(report, "index.html")
     assert "1 of 1 published number is reproduced to every printed digit" in found.words
     # The fixture's scene: 9.8 m/s² and 10 s, as the paper's own.
-    assert "as they are printed: that of Fig. 11 with g = 9.8 m/s² and 10 s. The right model" in found.words
+    assert "as they are printed: that of Fig. 11 with g = 9.8 m/s² and 10 s. The corrected model" in found.words
     assert (
-        "more than a thousandth of the energy scale in 1 of 1 scene, among the runs that reach the end up to 1.00 MJ"
+        "by more than a thousandth of its scale in 1 of 1 scene, among the runs that reach the end by up to 1.00 MJ"
         in found.words
     )
     assert "1.0×10⁻¹¹ rad (closed form, Taylor)" in found.words  # 1e-12 per second over 10 s
@@ -202,7 +206,7 @@ FIG05_ANGLES = rotor(lambda t: 0.52 + 0.0073 * np.sin(2.0 * t))
 def test_matched_numbers_are_marked_on_every_page(tmp_path: Path) -> None:
     runs = [Made(FIG05, PRINTED, FIG05_ANGLES, refined=True), Made(FIG05, REFERENCE, rotor(lambda t: 0.52 + 0.0 * t))]
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
-    condition = "the 2 of Fig. 5, grown rounding error, for a length of the run and an order of adding"
+    condition = "the 2 of Fig. 5, grown rounding error, for a run length and an order of adding"
     assert condition in page(folder, "index.html").words
     for name, times in (("index.html", 2 + 1), ("paper-fig05.html", 2), ("figures.html", 1)):
         assert page(folder, name).words.count("chosen to match") >= times, name
@@ -216,28 +220,30 @@ def test_energy_of_runs_that_broke_off_is_not_the_largest_of_the_finding(tmp_pat
         Made(away, PRINTED, SWING, gain=1e12, until=0.5, attributes=broken),
     ]
     found = page(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent, "index.html")
-    assert "in 2 of 2 scenes, among the runs that reach the end up to 1.00 MJ, and in 1 it runs away" in found.words
+    assert "in 2 of 2 scenes, among the runs that reach the end by up to 1.00 MJ, and in 1 it diverges" in found.words
     assert "497 GJ" in found.words  # in the table: 149/300 of 1e12 J
 
 
-def test_ok_is_said_of_methods_that_are_held_to_something_alone(report: Path) -> None:
+def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) -> None:
     text = (report / "paper-fig11.html").read_text(encoding="utf-8")
     metrics = text[text.index('<section id="metrics">') :]
     rows = dict(re.findall(r'<tr><th scope="row">([^<]*)</th><td>(.*?)</td>', metrics))
     assert rows["as printed, ode45"] == "runs to the end"
     assert rows["closed form, Taylor"] == '<span class="good">ok</span>'
-    assert "says nothing of whether it is right" in metrics
+    assert "is not thereby correct" in metrics
 
 
 def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None:
-    assert set(LOOKS) == {"reference", *METHOD_NAMES, *(ladder.curve for ladder in ladders())}
-    assert len(set(LOOKS.values())) == len(LOOKS)
-    for one, other in combinations(METHOD_NAMES, 2):  # without variants: told apart by more than a colour
-        differing = sum(a != b for a, b in zip(LOOKS[one], LOOKS[other], strict=True))
-        assert differing >= 2, (one, other)
-    for look in LOOKS.values():
-        assert run_sample("", look).mark  # the legend can draw it
+    looks = {name: look_of(name) for name in ("reference", *METHOD_NAMES, *(ladder.curve for ladder in ladders()))}
+    assert len(set(looks.values())) == len(looks)
+    for one, other in combinations(METHOD_NAMES, 2):  # methods differ by more than a colour
+        a, b = looks[one], looks[other]
+        assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (one, other)
+    for look in looks.values():
+        assert LegendEntry("", look).mark  # the legend can draw it
         assert look.colour in (*COLOURS, GREY)
+    assert look_of("mine/own").colour == GREY
+    assert label_of("mine/own") == "mine/own"
 
 
 def test_no_caption_repeats_its_heading(report: Path) -> None:

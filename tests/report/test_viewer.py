@@ -67,7 +67,7 @@ def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path
     path = store(tmp_path / "r.h5", [Made(replace(FIG11, outputs=("angles",)), "lagrange/taylor", broken)])
     with open_results(path) as opened:
         scene = opened.scenes["paper/fig11"]
-        made = viewer(scene, dict(scene.runs), "")
+        made = viewer(scene, dict(scene.runs))
     assert made is not None
     data = json.loads(str(made.data))
     assert (FRAMES - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
@@ -80,7 +80,7 @@ def test_an_offset_is_drawn_as_a_tenth_of_the_blade_and_never_smaller(offset: fl
 
 
 @pytest.mark.parametrize(("offset", "shown"), [(0.1, True), (5.0, False)])
-def test_only_an_offset_that_is_too_small_to_be_seen_is_told_to_be(tmp_path: Path, offset: float, shown: bool) -> None:
+def test_only_an_offset_that_is_too_small_to_be_seen_is_explained(tmp_path: Path, offset: float, shown: bool) -> None:
     assert FIG11.text.count("tip = ") == 1
     text = re.sub(r"tip = .*", f"tip = [{offset}, 0, 11]", FIG11.text)
     path = store(tmp_path / "r.h5", [Made(replace(FIG11, text=text), "reference", TURNING)])

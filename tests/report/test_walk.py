@@ -1,4 +1,4 @@
-"""The walk through the paper's figures: their order, what is said of them, what is told to be unknown."""
+"""The walk through the paper's figures: their order, what they show, what is not known."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.walk_facts import facts, in_pi
-from rotor_mbs.report.paper_figures import seen
-from rotor_mbs.report.paper_set import FIGURES
+from rotor_mbs.report.pages.walk import comparison, in_pi
+from rotor_mbs.report.paper_figures import FIGURES
+from rotor_mbs.report.plots.paths import projected
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results
 
@@ -38,7 +38,7 @@ def test_the_set_is_every_figure_from_3_to_16_and_every_scene_is_shipped() -> No
             assert own in shipped[scene].figures, (figure.number, scene)
 
 
-def test_facts_tell_when_the_printed_model_is_seen_apart(tmp_path: Path) -> None:
+def test_the_comparison_gives_when_the_printed_model_visibly_departs(tmp_path: Path) -> None:
     printed = rotor(lambda t: 0.5 + 0.1 * t + 0.02 * t, np.sin)
     near = rotor(lambda t: 0.5 + 0.1 * t + 1e-9 * t, np.sin)
     runs = [
@@ -47,21 +47,21 @@ def test_facts_tell_when_the_printed_model_is_seen_apart(tmp_path: Path) -> None
         Made(FIG11, "exudyn_tree/rk67", near),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
-        found = facts(opened.scenes["paper/fig11"])
-    assert found.seen_apart == pytest.approx(2.5, abs=0.04)  # 0.02 t = 0.05 rad, at the next sample
+        found = comparison(opened.scenes["paper/fig11"])
+    assert found.visible_from == pytest.approx(2.5, abs=0.04)  # 0.02 t = 0.05 rad, at the next sample
     assert found.largest == pytest.approx(0.2)
     assert found.exudyn == pytest.approx(1e-8)
-    assert not found.right_still
+    assert not found.corrected_still
 
 
-def test_same_models_are_told_to_be_the_same(tmp_path: Path) -> None:
+def test_equal_models_do_not_visibly_depart(tmp_path: Path) -> None:
     still = rotor(lambda t: 0.1 * t)
     with open_results(
         store(tmp_path / "r.h5", [Made(FIG11, "reference", still), Made(FIG11, "printed/ode45", still)])
     ) as opened:
-        found = facts(opened.scenes["paper/fig11"])
-    assert found.seen_apart == math.inf
-    assert found.right_still
+        found = comparison(opened.scenes["paper/fig11"])
+    assert found.visible_from == math.inf
+    assert found.corrected_still
 
 
 def test_a_figure_has_three_pictures_with_a_message_and_the_published_number(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_a_figure_has_three_pictures_with_a_message_and_the_published_number(tmp
     assert "(b)</h3>" not in text
 
 
-def test_what_is_not_known_of_figure_14_is_said(tmp_path: Path) -> None:
+def test_what_is_not_known_of_figure_14_is_stated(tmp_path: Path) -> None:
     scene = paper("fig14a", samples=51)
     text = write(tmp_path, Made(scene, "reference", RIGHT), Made(scene, "printed/ode45", RIGHT))
     assert "the condition of panel (d) is not known" in text
@@ -103,7 +103,7 @@ def test_a_scene_named_like_the_walk_does_not_overwrite_it(tmp_path: Path) -> No
     assert 'id="figure-11"' in (folder / "figures.html").read_text(encoding="utf-8")
 
 
-def test_angles_are_told_in_parts_of_pi() -> None:
+def test_angles_are_written_as_multiples_of_pi() -> None:
     values = (11 * math.pi / 12, -math.pi / 3, math.pi, 0.0, 0.1, -2.0 * math.pi)
     assert [in_pi(x) for x in values] == ["11π/12", "−π/3", "π", "0", "0.1", "−2π"]
 
@@ -113,4 +113,4 @@ def test_the_view_keeps_what_lies_across_it_and_drops_what_lies_along_it() -> No
     across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     along = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     up = np.cross(along, across)
-    np.testing.assert_allclose(seen(np.stack([across, up, along])), [[1, 0], [0, 1], [0, 0]], atol=1e-15)
+    np.testing.assert_allclose(projected(np.stack([across, up, along])), [[1, 0], [0, 1], [0, 0]], atol=1e-15)

@@ -20,16 +20,13 @@ from rotor_mbs.analysis.work_precision import (
     succeeded,
     time_to_reach,
 )
-from rotor_mbs.report.names import LOOKS
-from rotor_mbs.report.pages.bench import write_bench_report
+from rotor_mbs.report.core.looks import look_of
+from rotor_mbs.report.pages.bench import omissions, overview, summary, write_bench_report
 from rotor_mbs.report.pages.bench_tables import (
     csv_text,
     failure_table,
-    omissions,
-    overview,
     overview_table,
     reach_table,
-    summary,
 )
 from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.store.bench import STATUSES, Curve, read_curves, write_curves
@@ -148,7 +145,9 @@ def test_failures_are_points_and_none_is_dropped() -> None:
 def test_the_diagram_draws_each_method_as_every_other_figure_does() -> None:
     drawn = [line for line in diagram([FAST, SLOW]).axes[0].lines if line.get_marker() not in ("x", "None")]
     found = [(line.get_color(), line.get_linestyle(), line.get_marker()) for line in drawn]
-    assert found == [tuple(LOOKS["lagrange/taylor"]), tuple(LOOKS["exudyn_tree/rk67"])]
+    assert found == [
+        (look.colour, look.line, look.marker) for look in map(look_of, ("lagrange/taylor", "exudyn_tree/rk67"))
+    ]
 
 
 def test_the_diagram_draws_what_was_measured() -> None:

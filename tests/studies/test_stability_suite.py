@@ -14,8 +14,7 @@ import pytest
 from rotor_mbs.analysis.stability import OUTCOMES, advice, cells, in_words, reached_by, unreached
 from rotor_mbs.cli import main
 from rotor_mbs.execution.pool import Finished
-from rotor_mbs.report.pages.stability import write_stability_report
-from rotor_mbs.report.pages.stability_texts import NOT_COMPARED
+from rotor_mbs.report.pages.stability import NOT_COMPARED, write_stability_report
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.stability import Record, read_records, write_records
 from rotor_mbs.studies import stability_records

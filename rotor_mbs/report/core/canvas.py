@@ -17,8 +17,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from rotor_mbs.report.core.looks import Look
 from rotor_mbs.report.core.numbers import power
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
@@ -57,50 +58,25 @@ class Panels(NamedTuple):
     axes: list[Any]
 
 
-def panels(heights: tuple[float, ...], x_label: str) -> Panels:
-    """Panels one below the other over one horizontal axis; heights in inches, that of the top one first."""
-    with matplotlib.rc_context(_STYLE):
-        figure = _figure(sum(heights) + 0.6)
+def panels(heights: tuple[float, ...], x_label: str, *, share_x: bool = True) -> Panels:
+    """Panels one below the other; heights in inches, that of the top one first. x_label: of the last one."""
+    with style():
+        figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
         grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
         axes: list[Axes] = []
         for row in range(len(heights)):
-            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
+            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes and share_x else None))
             axes[-1].tick_params(labelbottom=row == len(heights) - 1, length=3)
         axes[-1].set_xlabel(x_label)
-        _fit(figure, bottom=0.45)
-    return Panels(figure, axes)
-
-
-def space_above(strip: float, reach: float, depth: float) -> Panels:
-    """A space with equal scales (±reach m across, ±depth m along the shaft); below it, a panel `strip` inches high.
-
-    No panel where `strip` is 0.
-    """
-    from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]  # late: 0.1 s
-
-    with matplotlib.rc_context(_STYLE):
-        below = strip + 0.7 if strip else 0.0
-        height = 4.1 + below
-        figure = _figure(height)
-        lower = below / height
-        space = Axes3D(figure, (0.0, lower, 1.0, 1.0 - lower), auto_add_to_figure=False, proj_type="ortho")
-        figure.add_axes(space)
-        space.set_box_aspect((reach, depth, reach), zoom=1.08)
-        space.set(xlim=(-reach, reach), ylim=(-depth, depth), zlim=(-reach, reach))
-        space.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
-        space.view_init(elev=14.0, azim=-62.0)
-        for axis in (space.xaxis, space.yaxis, space.zaxis):
-            axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-            axis.set_major_locator(MultipleLocator(_step(reach)))
-        axes: list[Any] = [space]
-        if strip:
-            axes.append(figure.add_axes((0.16, 0.45 / height, 0.8, strip / height)))
+        # Fixed margins: the layout does not depend on the fonts.
+        height = float(figure.get_figheight())
+        figure.subplots_adjust(left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09)
     return Panels(figure, axes)
 
 
 def grid(rows: int, columns: int, height: float, *, for_print: bool = False) -> Panels:
     """Axes row by row, `height` inches each; for_print: at a journal's page width, in the style for manuscripts."""
-    with matplotlib.rc_context(PRINT_STYLE if for_print else _STYLE):
+    with style(for_print=for_print):
         top, bottom = (0.5, 0.75) if for_print else (0.28, 0.45)
         width = PRINT_WIDTH if for_print else WIDTH
         figure = Figure(figsize=(width, rows * height + top + bottom), facecolor="white")
@@ -125,24 +101,18 @@ def font_file() -> Path:
     return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 
 
-def flat_space(axes: Any, across: float, up: float) -> None:
-    """Empty axes of equal scales, ±across and ±up m, for a space that was projected by its drawer."""
-    axes.set(xlim=(-across, across), ylim=(-up, up), aspect="equal")
-    axes.set_axis_off()
-
-
-def legend_below(figure: Figure, labelled: Sequence[tuple[str, str, Any]]) -> None:
-    """(label, colour, line) of each curve, in a row at the foot of the figure."""
-    with matplotlib.rc_context(PRINT_STYLE):
-        lines = [Line2D([], [], color=colour, linestyle=line) for _, colour, line in labelled]
-        names = [label for label, _, _ in labelled]
+def legend_below(figure: Figure, labelled: Sequence[tuple[str, Look]]) -> None:
+    """A line per (label, look) at the foot of the figure."""
+    with style(for_print=True):
+        lines = [Line2D([], [], color=look.colour, ls=look.line) for _, look in labelled]
+        names = [label for label, _ in labelled]
         figure.legend(lines, names, loc="lower center", ncols=min(len(lines), 5), handlelength=2.6)
 
 
 def encoded(figure: Figure, kind: str) -> bytes:
     """The figure as a file: "pdf", "svg" or "png"; the same bytes every time."""
     metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
-    with matplotlib.rc_context(PRINT_STYLE):
+    with style(for_print=True):
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
@@ -162,7 +132,7 @@ def log_axis(axes: Any, lowest: float, highest: float) -> None:
 
 def svg_text(figure: Figure) -> str:
     """The figure as matplotlib writes it, without a date."""
-    with matplotlib.rc_context(_STYLE):
+    with style():
         stream = io.StringIO()
         FigureCanvasSVG(figure).print_svg(  # type: ignore[no-untyped-call]
             stream, metadata={"Date": None, "Creator": None}
@@ -170,24 +140,8 @@ def svg_text(figure: Figure) -> str:
     return stream.getvalue()
 
 
-def _figure(height: float) -> Figure:
-    return Figure(figsize=(WIDTH, height), facecolor="white")
-
-
-def _fit(figure: Figure, bottom: float) -> None:
-    """Fixed margins: nothing to lay out, so nothing that a different font could shift."""
-    height = float(figure.get_figheight())
-    figure.subplots_adjust(left=0.16, right=0.965, bottom=bottom / height, top=1.0 - 0.15 / height, hspace=0.09)
-
-
-def _step(reach: float) -> float:
-    """A tick's step of 1, 2 or 5 times a power of ten: two or three ticks each side of zero."""
-    power_of_ten = 10.0 ** math.floor(math.log10(reach))
-    return next(step * power_of_ten for step in (5.0, 2.0, 1.0, 0.5, 0.2) if reach / (step * power_of_ten) >= 1.5)
-
-
 def colour_bar(figure: Figure, axes: Any, drawn: Any, label: str) -> None:
     """What the colours of `drawn` mean, to the right of its axes."""
-    with matplotlib.rc_context(_STYLE):
+    with style():
         bar = figure.colorbar(drawn, ax=axes)
         bar.set_label(label)

@@ -1,14 +1,13 @@
-"""What pages are made of: cells, tables, pictures, legends. Plain data for the templates; knows no run."""
+"""What pages are made of: tables, pictures, legends, sections. Plain data for the templates."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from rotor_mbs.report.names import GREY, Look
-from rotor_mbs.report.pages.viewer import Viewer
+from rotor_mbs.report.core.looks import GREY, Look
 
 _DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
 _MARKS = {
@@ -27,41 +26,63 @@ _MARKS = {
 
 
 @dataclass(frozen=True)
-class Cell:
-    """Text of a cell; `tone` good, bad or "" for the colour of a verdict; href a page of this report."""
+class TableCell:
+    """A cell of a table.
+
+    tone      "good", "bad" or "": the colour of a verdict
+    href      a page of the report, or ""
+    note      small text below the cell's own; note_language: of that text, where it is not English
+    """
 
     text: str
     tone: str = ""
     href: str = ""
     note: str = ""
-    language: str = ""
+    note_language: str = ""
 
 
 @dataclass(frozen=True)
-class Table:
-    """Columns with a heading; numeric ones stand to the right. Rows begin with their own heading."""
+class PageTable:
+    """A table; numeric: indices of the columns aligned to the right. The first cell of a row is its heading."""
 
     caption: str
     head: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
+    rows: Sequence[Sequence[TableCell]]
     numeric: Sequence[int] = ()
+
+    def without_empty_columns(self) -> PageTable:
+        """The columns that have a value in any row, and the first one."""
+        kept = [i for i in range(len(self.head)) if i == 0 or any(row[i].text not in ("", "–") for row in self.rows)]
+        return PageTable(
+            self.caption,
+            [self.head[i] for i in kept],
+            [[row[i] for i in kept] for row in self.rows],
+            [place for place, i in enumerate(kept) if i in self.numeric],
+        )
 
 
 @dataclass(frozen=True)
-class Sample:
-    """A line of a legend: a piece of the curve, or of its mark, and what it is."""
+class LegendEntry:
+    """A label with a piece of the curve, with its marker, or with the marker alone (line "")."""
 
     label: str
-    colour: str
-    dashes: str = ""
+    look: Look
     width: float = 2.0
-    mark: str = ""
-    has_line: bool = True
+
+    @property
+    def dashes(self) -> str:
+        """Value of `stroke-dasharray`."""
+        return _DASHES.get(self.look.line, "")
+
+    @property
+    def mark(self) -> str:
+        """The marker's path in SVG."""
+        return _MARKS.get(self.look.marker, "")
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A drawn figure as SVG inside the page, with what stands below it."""
+    """A figure as SVG for the inside of a page, its caption, and notes below the caption."""
 
     svg: Markup
     caption: str
@@ -70,55 +91,34 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: pictures side by side with a common legend, then tables. Left out where it has neither.
+    """Pictures side by side with one legend, then tables and notes. A section with neither is left out of the page."""
 
-    viewer: what moves above the pictures.
-    """
-
-    id: str
-    heading: str
     pictures: Sequence[Picture] = ()
-    legend: Sequence[Sample] = ()
-    tables: Sequence[Table] = ()
-    notes: Sequence[str] = field(default_factory=tuple)
-    viewer: Viewer | None = None
+    legend: Sequence[LegendEntry] = ()
+    tables: Sequence[PageTable] = ()
+    notes: Sequence[str] = ()
 
     @property
     def tables_beside(self) -> bool:
-        """Whether the tables fill the free place beside the last picture."""
+        """Whether the tables stand in the free place beside the last picture."""
         return bool(self.tables) and len(self.pictures) % 2 == 1
 
     @property
     def is_single(self) -> bool:
-        """Whether a picture stands alone: the legend fills the free place beside it."""
+        """Whether the legend stands in the free place beside the only picture."""
         return len(self.pictures) == 1 and not self.tables
 
     @property
     def has_content(self) -> bool:
+        """Whether there is a picture or a row of a table."""
         return bool(self.pictures or any(table.rows for table in self.tables))
 
 
-def line_sample(label: str, colour: str, line: object, width: float = 2.0) -> Sample:
-    """`line`: a style of lines, or dashes as (offset, lengths)."""
-    if isinstance(line, tuple):
-        return Sample(label, colour, " ".join(f"{2 * length:g}" for length in line[1]), width)
-    return Sample(label, colour, _DASHES.get(str(line), ""), width)
+def line_entry(label: str, colour: str = GREY, line: str = "-", width: float = 2.0) -> LegendEntry:
+    """An entry for a line without a marker."""
+    return LegendEntry(label, Look(colour, line, ""), width)
 
 
-def run_sample(label: str, look: Look) -> Sample:
-    return Sample(label, look.colour, _DASHES.get(look.line, ""), 2.0, _MARKS[look.marker])
-
-
-def mark_sample(label: str, look: Look) -> Sample:
-    return Sample(label, GREY, "", 2.0, _MARKS[look.marker], has_line=False)
-
-
-def without_empty_columns(table: Table) -> Table:
-    """Columns in which no row says anything are left out."""
-    kept = [i for i in range(len(table.head)) if i == 0 or any(row[i].text not in ("", "–") for row in table.rows)]
-    return Table(
-        table.caption,
-        [table.head[i] for i in kept],
-        [[row[i] for i in kept] for row in table.rows],
-        [place for place, i in enumerate(kept) if i in table.numeric],
-    )
+def mark_entry(label: str, marker: str) -> LegendEntry:
+    """An entry for a marker without a line."""
+    return LegendEntry(label, Look(GREY, "", marker))

@@ -1,121 +1,195 @@
-"""Pages on error against run time from a results file: one for each scene, an index, and the numbers as CSV beside."""
+"""The pages on error against run time: one for each scene, an index, and their numbers as CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from markupsafe import Markup
 
-from rotor_mbs.analysis.work_precision import by_scene
+from rotor_mbs.analysis.work_precision import TARGETS_RAD, by_scene, fastest, left_out
 from rotor_mbs.errors import StoreError
-from rotor_mbs.report.core.canvas import Panels, svg_text
-from rotor_mbs.report.core.elements import Picture, Sample, Section, mark_sample, run_sample
+from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry, mark_entry
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import INDEX, page_names, write_pages
-from rotor_mbs.report.core.svg import embedded
-from rotor_mbs.report.names import GREY, Look, look_of
+from rotor_mbs.report.core.looks import look_of
+from rotor_mbs.report.core.numbers import number, prefixed
+from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import bench_tables as tables
-from rotor_mbs.report.pages import bench_texts as texts
-from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_floor
+from rotor_mbs.report.pages.bench_tables import curve_label, target_text
+from rotor_mbs.report.pages.index import versions
+from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
 from rotor_mbs.scenario.names import natural_order
 from rotor_mbs.store.bench import GROWTH, Curve, read_curves
 from rotor_mbs.store.read import open_results
 
-_MACHINE = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "platform", "cpu", "created")
+Curves = Sequence[Curve]
+_MODELS = {"lagrange": "the closed form", "exudyn_tree": "Exudyn's tree", "exudyn_chain": "Exudyn's chain"}
 
 
 @dataclass(frozen=True)
-class BenchPage:
-    """A page. up: file of the index, "" on the index itself; csv: file beside it; machine: (what, version)."""
+class BenchScenePage:
+    """A scene. facts: the attributes of its curves, such as the horizon and the number of samples; csv: a file name."""
 
-    title: str
-    about: str
-    lead: Sequence[str]
-    sections: Sequence[Section]
+    scene: str
+    summary: Sequence[str]
+    facts: Mapping[str, float]
+    diagram: Section
+    reach: Section
+    order: Section
+    failures: Section
+    points: Section
     csv: str
-    csv_label: str = texts.CSV
-    up: str = ""
-    machine: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True)
+class BenchIndexPage:
+    """All scenes. scaling: (what the cost was measured over, its section)."""
+
+    summary: Sequence[str]
+    fastest: Section
+    scenes: Section
+    scaling: Sequence[tuple[str, Section]]
+    csv: str
+    versions: Sequence[tuple[str, str]]
 
 
 def write_bench_report(results: Path, output: Path) -> Path:
-    """Pages into the folder `output`; returns the index. Raises StoreError, also where the file has no bench."""
+    """Write the pages on the curves of `results` into the folder `output`; returns the path of the index.
+
+    Raises StoreError where the file cannot be read or has no bench, or where the folder cannot be written.
+    """
     grouped = by_scene(read_curves(results))
     if not grouped:
         raise StoreError(f"{results}: no bench in it, nothing to report")
     with open_results(results) as opened:
-        machine = [(name, str(opened.attributes[name])) for name in _MACHINE if opened.attributes.get(name)]
-    growth = {name: curves for name, curves in grouped.items() if name.startswith(f"{GROWTH}/")}
-    scenes = {name: grouped[name] for name in natural_order(grouped) if name not in growth}
+        made_with = versions(opened)
+    scaling = {name: curves for name, curves in grouped.items() if name.startswith(f"{GROWTH}/")}
+    scenes = {name: grouped[name] for name in natural_order(grouped) if name not in scaling}
     files = page_names(scenes)
-    pages = {INDEX: render("bench", _index(scenes, growth, files, machine))}
+    pages = {INDEX: render("bench", _index(scenes, scaling, files, made_with))}
     pages["bench.csv"] = tables.csv_text([curve for curves in scenes.values() for curve in curves])
     for name, curves in scenes.items():
         csv = files[name].removesuffix(".html") + ".csv"
-        pages[files[name]] = render("bench", _scene(name, curves, csv))
+        pages[files[name]] = render("bench_scene", _scene(name, curves, csv))
         pages[csv] = tables.csv_text(curves)
     write_pages(output, pages)
     return output / INDEX
 
 
-def _scene(name: str, curves: Sequence[Curve], csv: str) -> BenchPage:
-    facts = curves[0].attributes
+def _scene(name: str, curves: Curves, csv: str) -> BenchScenePage:
+    captions = {
+        False: "Integration alone: its run time over the whole scene; marks on the left failed.",
+        True: "The cost of one run: also building the model, compiling everything anew, and reading out samples.",
+    }
     pictures = [
-        _picture(diagram(curves), "run", name, texts.RUN_CAPTION),
-        _picture(diagram(curves, with_setup=True), "setup", name, texts.SETUP_CAPTION),
+        picture(diagram(curves, with_setup=setup), f"bench-{int(setup)}", caption, f"{name}: {caption}")
+        for setup, caption in captions.items()
     ]
-    sections = [
-        Section("diagram", texts.DIAGRAM_HEADING, pictures, _legend(curves)),
-        Section("reach", texts.REACH_HEADING, tables=[tables.reach_table(curves)], notes=[texts.REACH_NOTE]),
-        Section("order", texts.ORDER_HEADING, tables=[tables.order_table(curves)]),
-        Section("failures", texts.FAILURES_HEADING, tables=[tables.failure_table(curves)]),
-        Section("points", texts.POINTS_HEADING, tables=[tables.point_table(curves)]),
-    ]
-    notes = [
-        texts.horizon(facts["horizon_s"], facts["duration_s"], facts["uncertainty_rad"]),
-        texts.sampling(facts["samples"], facts["budget_s"], facts["load_before"], facts["pinned_core"]),
-    ]
-    lead = [*tables.summary(name, curves), *notes]
-    shown = [section for section in sections if section.has_content]
-    return BenchPage(f"{texts.TITLE}: {name}", name, lead, shown, csv, up=INDEX)
+    return BenchScenePage(
+        name,
+        summary(name, curves),
+        curves[0].attributes,
+        Section(pictures, _legend(curves)),
+        Section(tables=[tables.reach_table(curves)]),
+        Section(tables=[tables.order_table(curves)]),
+        Section(tables=[tables.failure_table(curves)]),
+        Section(tables=[tables.point_table(curves)]),
+        csv,
+    )
 
 
 def _index(
-    scenes: Mapping[str, Sequence[Curve]],
-    growth: Mapping[str, Sequence[Curve]],
-    files: Mapping[str, str],
-    machine: Sequence[tuple[str, str]],
-) -> BenchPage:
-    pictures = [
-        _picture(diagram(curves, height=2.6, small=True), f"s{i}", name, name, href=files[name])
-        for i, (name, curves) in enumerate(scenes.items())
+    scenes: Mapping[str, Curves], scaling: Mapping[str, Curves], files: Mapping[str, str],
+    made_with: Sequence[tuple[str, str]],
+) -> BenchIndexPage:  # fmt: skip
+    pictures = []
+    for i, (name, curves) in enumerate(scenes.items()):
+        link = Markup('<a href="{}">{}</a>').format(files[name], name)
+        panels = diagram(curves, height=2.6, small=True)
+        shown = picture(panels, f"bench-s{i}", name, f"Error against run time, {name}")
+        pictures.append(replace(shown, caption=link))
+    one_of_each = {curve.name: curve for curves in scenes.values() for curve in curves}
+    return BenchIndexPage(
+        overview(scenes),
+        Section(tables=[tables.overview_table(scenes, files)]) if scenes else Section(),
+        Section(pictures, _legend(list(one_of_each.values()))),
+        [(name.rpartition("/")[2], Section(tables=[tables.scaling_table(curves)])) for name, curves in scaling.items()],
+        "bench.csv",
+        made_with,
+    )
+
+
+def _legend(curves: Curves) -> list[LegendEntry]:
+    entries = [LegendEntry(curve_label(curve), look_of(curve.name)) for curve in curves]
+    entries.append(line_entry("best of all (Pareto front)", FRONT_COLOUR, width=6.0))
+    entries.append(mark_entry("failed: drawn at its time", "x"))
+    if has_visible_uncertainty(curves):
+        entries.append(line_entry("uncertainty of the reference", width=8.0))
+    return entries
+
+
+def summary(scene: str, curves: Curves) -> list[str]:
+    """For each target accuracy each model's fastest method, by increasing time: "paper/fig11, 10⁻⁹ rad: closed form,
+    Taylor 4 ms; Exudyn tree, RK67 50 ms (13 times)."."""
+    sentences = []
+    for target in TARGETS_RAD:
+        best: dict[str, tuple[str, float]] = {}
+        for curve, reach in fastest(curves, target):
+            best.setdefault(curve.name.partition("/")[0], (curve_label(curve), reach.seconds))
+        ranked = sorted(best.values(), key=lambda item: item[1])
+        parts = [
+            f"{label} {prefixed(time, 's', 2)}"
+            + (f" ({number(time / ranked[0][1])} times)" if time > ranked[0][1] else "")
+            for label, time in ranked
+        ]
+        reached = "; ".join(parts) or "reached by no method within the budget"
+        sentences.append(f"{scene}, {target_text(target)}: {reached}.")
+    return [*sentences, *omissions(curves)]
+
+
+def overview(scenes: Mapping[str, Curves]) -> list[str]:
+    """For each target accuracy the fastest methods over all scenes, and how much longer the other models take."""
+    sentences = [_overview(list(scenes.values()), target) for target in TARGETS_RAD]
+    return [*filter(None, sentences), *omissions([curve for curves in scenes.values() for curve in curves])]
+
+
+def _overview(scenes: Sequence[Curves], target: float) -> str:
+    wins: dict[str, list[float]] = {}
+    ratios: dict[str, list[float]] = {}
+    for curves in scenes:
+        best: dict[str, float] = {}
+        for place, (curve, reach) in enumerate(fastest(curves, target)):
+            if not place:
+                wins.setdefault(curve_label(curve), []).append(reach.seconds)
+            best.setdefault(curve.name.partition("/")[0], reach.ratio)
+        for model, ratio in best.items():
+            if ratio > 1.0:
+                ratios.setdefault(model, []).append(ratio)
+    first = [
+        f"{label} in {len(seconds)} of {len(scenes)} scenes ({_range(seconds, lambda s: prefixed(s, 's', 2))})"
+        for label, seconds in sorted(wins.items(), key=lambda item: -len(item[1]))
     ]
-    every = [curve for curves in scenes.values() for curve in curves]
-    one_of_each = list({curve.name: curve for curve in every}.values())
-    sections = []
-    if scenes:
-        overview = tables.overview_table(scenes, files)
-        sections.append(Section("fastest", texts.OVERVIEW_HEADING, tables=[overview], notes=[texts.REACH_NOTE]))
-        sections.append(Section("scenes", texts.SCENES_HEADING, pictures, _legend(one_of_each)))
-    sections += [
-        Section(name.replace("/", "-"), texts.growth_heading(name), tables=[tables.growth_table(measured)])
-        for name, measured in growth.items()
+    slower = [
+        f"the best of {_MODELS.get(model, model)} takes {_range(found, number)} times as long "
+        f"({len(found)} of {len(scenes)})"
+        for model, found in ratios.items()
     ]
-    return BenchPage(texts.TITLE, texts.LEAD, tables.overview(scenes), sections, "bench.csv", machine=machine)
+    return f"To {target_text(target)} the fastest is {'; '.join([' and '.join(first), *slower])}." if first else ""
 
 
-def _picture(panels: Panels, kind: str, scene: str, caption: str, href: str = "") -> Picture:
-    svg = embedded(svg_text(panels.figure), f"bench-{kind}", f"{texts.TITLE}, {scene}", caption)
-    shown = Markup(f'<a href="{href}">{caption}</a>') if href else caption
-    return Picture(Markup(svg), shown)
+def _range(values: Sequence[float], shown: Callable[[float], str]) -> str:
+    low, high = shown(min(values)), shown(max(values))
+    return low if low == high else f"{low} to {high}"
 
 
-def _legend(curves: Sequence[Curve]) -> list[Sample]:
+def omissions(curves: Curves) -> list[str]:
+    """A sentence on the settings that the time budget left out, where there are any."""
+    count, total = sum(map(left_out, curves)), sum(len(curve.statuses) for curve in curves)
+    if not count:
+        return []
     return [
-        *(run_sample(tables.name(curve), look_of(curve.name)) for curve in curves),
-        Sample(texts.FRONT, FRONT_COLOUR, width=6.0),
-        mark_sample(texts.FAILED, Look(GREY, "-", "x")),
-        *([Sample(texts.FLOOR, GREY, width=8.0)] if has_visible_floor(curves) else []),
+        f"The budget left out {count} of {total} settings, always the finest of their ladders: what they would reach "
+        "is given as not measured."
     ]

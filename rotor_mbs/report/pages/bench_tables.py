@@ -1,9 +1,10 @@
-"""Tables and CSV of error against run time: every point, time to an accuracy, orders, failures, growth. No HTML."""
+"""Tables and CSV of error against run time: every point, time to an accuracy, orders, failures, cost scaling."""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -17,12 +18,16 @@ from rotor_mbs.analysis.work_precision import (
     reaches,
     succeeded,
 )
-from rotor_mbs.report import texts as report_texts
-from rotor_mbs.report.core.elements import Cell, Table
-from rotor_mbs.report.core.numbers import NOTHING, number, prefixed
-from rotor_mbs.report.pages import bench_texts as texts
+from rotor_mbs.report.core.elements import PageTable, TableCell
+from rotor_mbs.report.core.looks import label_of
+from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, quantity
+from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.store.bench import Curve
 
+_POINT_COLUMNS = (
+    "method", "setting", "angle error (rad)", "at the end (rad)", "tip error (m)", "energy drift", "median",
+    "quartiles", "shortest", "set-up", "again", "read-out", "repeats", "steps", "status",
+)  # fmt: skip
 _CSV_COLUMNS = (
     "setting", "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "run_time_s",
     "run_time_min_s", "run_time_q1_s", "run_time_q3_s", "setup_time_s", "setup_again_time_s", "output_time_s",
@@ -30,8 +35,19 @@ _CSV_COLUMNS = (
 )  # fmt: skip
 
 
-def name(curve: Curve) -> str:
-    return texts.curve_name(curve.name, str(curve.attributes["method"]))
+_FIXED_SETTINGS = {"rho0.7": "ρ∞ 0.7", "rho1.0": "ρ∞ 1", "rotation_vector": "rotation vector"}
+
+
+def curve_label(curve: Curve) -> str:
+    """The method's label, and its fixed settings where they are not the default ones."""
+    method = str(curve.attributes["method"])
+    rest = curve.name.removeprefix(method)
+    return ", ".join([label_of(method), *(text for short, text in _FIXED_SETTINGS.items() if short in rest)])
+
+
+def target_text(target: float) -> str:
+    """ "10⁻⁶ rad": the targets are powers of ten."""
+    return f"{power(round(math.log10(target)))} rad"
 
 
 def csv_text(curves: Sequence[Curve]) -> str:
@@ -46,99 +62,86 @@ def csv_text(curves: Sequence[Curve]) -> str:
     return stream.getvalue()
 
 
-def reach_table(curves: Sequence[Curve]) -> Table:
+def reach_table(curves: Sequence[Curve]) -> PageTable:
     """A row per curve: time and ratio for each target."""
     found = reaches(curves)
-    head = [texts.METHOD, *(texts.target(target) for target in TARGETS_RAD)]
+    head = ["method", *(target_text(target) for target in TARGETS_RAD)]
     rows = []
     for curve in curves:
-        cells = [Cell(name(curve))]
+        cells = [TableCell(curve_label(curve))]
         for target in TARGETS_RAD:
             reach = found[curve.name][target]
             cells.append(_unreached(curve) if reach is None else _reached(reach))
         rows.append(cells)
-    return Table(texts.REACH_CAPTION, head, rows, numeric=range(1, len(head)))
+    caption = (
+        "Run time to an angle error, interpolated linearly in the logarithms between the points of a method's own "
+        "front, and its ratio to the fastest method's. A dash: no setting of the ladder was as accurate. Not measured: "
+        "the budget left out finer settings, which might have been."
+    )
+    return PageTable(caption, head, rows, numeric=range(1, len(head)))
 
 
-def _reached(reach: Reach) -> Cell:
-    return Cell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
+def _reached(reach: Reach) -> TableCell:
+    return TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
 
 
-def _unreached(curve: Curve) -> Cell:
+def _unreached(curve: Curve) -> TableCell:
     """Whether the method cannot, or was not asked to."""
-    if left_out(curve):
-        return Cell(texts.NOT_MEASURED, note=texts.finer_left_out(left_out(curve)))
+    count = left_out(curve)
+    if count:
+        return TableCell("not measured", note=f"{count} finer {'setting' if count == 1 else 'settings'} left out")
     errors = curve.arrays["angle_error_max"][succeeded(curve)]
-    return Cell(NOTHING, note=texts.best_reached(float(errors.min()) if len(errors) else None))
+    best = f"{quantity(float(errors.min()), 'rad')} at best" if len(errors) else "no run is ok"
+    return TableCell(NOTHING, note=best)
 
 
-def overview_table(scenes: Mapping[str, Sequence[Curve]], files: Mapping[str, str]) -> Table:
+def overview_table(scenes: Mapping[str, Sequence[Curve]], files: Mapping[str, str]) -> PageTable:
     """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
-    head = [texts.SCENE, *(texts.target(target) for target in TARGETS_RAD)]
+    head = ["scene", *(target_text(target) for target in TARGETS_RAD)]
     rows = [
-        [Cell(scene, href=files[scene]), *(_fastest_cell(curves, target) for target in TARGETS_RAD)]
+        [TableCell(scene, href=files[scene]), *(_fastest_cell(curves, target) for target in TARGETS_RAD)]
         for scene, curves in scenes.items()
     ]
-    return Table(texts.OVERVIEW_CAPTION, head, rows)
+    return PageTable(
+        "Run time of the fastest method to an angle error, and how many times as long the next one takes.", head, rows
+    )
 
 
-def _fastest_cell(curves: Sequence[Curve], target: float) -> Cell:
+def _fastest_cell(curves: Sequence[Curve], target: float) -> TableCell:
     found, is_cut = fastest(curves, target), any(map(left_out, curves))
     if not found:
-        return Cell(texts.NOT_MEASURED if is_cut else NOTHING)
+        return TableCell("not measured" if is_cut else NOTHING)
     (first, reach), *others = found
     if others:
-        next_one = texts.runner_up(name(others[0][0]), others[0][1].ratio)
+        next_one = f"then {curve_label(others[0][0])}, {number(others[0][1].ratio)} times as long"
     else:
-        next_one = texts.OTHERS_NOT_MEASURED if is_cut else texts.ALONE
-    return Cell(f"{name(first)}: {prefixed(reach.seconds, 's', 2)}", note=next_one)
+        next_one = "no other was measured to there" if is_cut else "no other gets there"
+    return TableCell(f"{curve_label(first)}: {prefixed(reach.seconds, 's', 2)}", note=next_one)
 
 
-def overview(scenes: Mapping[str, Sequence[Curve]]) -> list[str]:
-    """Plain words over all scenes: for each target who is fastest, and by how much the other models are slower."""
-    sentences = [_overview(list(scenes.values()), target) for target in TARGETS_RAD]
-    return [*filter(None, sentences), *omissions([curve for curves in scenes.values() for curve in curves])]
-
-
-def _overview(scenes: Sequence[Sequence[Curve]], target: float) -> str:
-    wins: dict[str, list[float]] = {}
-    ratios: dict[str, list[float]] = {}
-    for curves in scenes:
-        best: dict[str, float] = {}
-        for place, (curve, reach) in enumerate(fastest(curves, target)):
-            model = curve.name.partition("/")[0]
-            if not place:
-                wins.setdefault(name(curve), []).append(reach.seconds)
-            best.setdefault(model, reach.ratio)
-        for model, ratio in best.items():
-            if ratio > 1.0:
-                ratios.setdefault(model, []).append(ratio)
-    return texts.overview(target, len(scenes), wins, ratios) if wins else ""
-
-
-def omissions(curves: Sequence[Curve]) -> list[str]:
-    """How much the budget left out, and what that means for the tables; nothing where it left out nothing."""
-    count = sum(map(left_out, curves))
-    return [texts.omissions(count, sum(len(curve.statuses) for curve in curves))] if count else []
-
-
-def order_table(curves: Sequence[Curve]) -> Table:
+def order_table(curves: Sequence[Curve]) -> PageTable:
     """A row per fixed-step curve."""
     rows = [
-        [Cell(name(curve)), Cell(number(curve.attributes.get("order"), 3)), Cell(f"{a['order_expected']:g}")]
+        [
+            TableCell(curve_label(curve)),
+            TableCell(number(curve.attributes.get("order"), 3)),
+            TableCell(f"{a['order_expected']:g}"),
+        ]
         for curve in curves
         if "order_expected" in (a := curve.attributes)
     ]
-    return Table(texts.ORDER_CAPTION, [texts.METHOD, texts.ORDER, texts.EXPECTED], rows, numeric=(1, 2))
+    return PageTable(
+        "Fitted on the finest points above the round-off floor.", ["method", "order", "expected"], rows, numeric=(1, 2)
+    )
 
 
-def point_table(curves: Sequence[Curve]) -> Table:
+def point_table(curves: Sequence[Curve]) -> PageTable:
     """A row per point that was run."""
     rows = [row for curve in curves for row in _point_rows(curve)]
-    return Table(texts.POINTS_CAPTION, texts.POINT_COLUMNS, rows, numeric=range(1, 14))
+    return PageTable("Every setting measured.", _POINT_COLUMNS, rows, numeric=range(1, 14))
 
 
-def _point_rows(curve: Curve) -> Iterator[list[Cell]]:
+def _point_rows(curve: Curve) -> Iterator[list[TableCell]]:
     a = curve.arrays
     for i, status in enumerate(curve.statuses):
         if status == "left_out":
@@ -147,62 +150,58 @@ def _point_rows(curve: Curve) -> Iterator[list[Cell]]:
         errors = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
         seconds = ("run_time_min_s", "setup_time_s", "setup_again_time_s", "output_time_s")
         yield [
-            Cell(name(curve)),
-            Cell(_setting(curve, i)),
-            *(Cell(number(_known(a[error][i]))) for error in errors),
-            Cell(prefixed(_known(a["run_time_s"][i]), "s", 3)),
-            Cell(f"{low} to {high}"),
-            *(Cell(prefixed(_known(a[second][i]), "s", 3)) for second in seconds),
-            Cell(str(a["repeats"][i])),
-            Cell(str(a["steps"][i])),
-            Cell(report_texts.status(status), tone="" if status == "ok" else "bad"),
+            TableCell(curve_label(curve)),
+            TableCell(_setting(curve, i)),
+            *(TableCell(number(_known(a[error][i]))) for error in errors),
+            TableCell(prefixed(_known(a["run_time_s"][i]), "s", 3)),
+            TableCell(f"{low} to {high}"),
+            *(TableCell(prefixed(_known(a[second][i]), "s", 3)) for second in seconds),
+            TableCell(str(a["repeats"][i])),
+            TableCell(str(a["steps"][i])),
+            TableCell(status_text(status), tone="" if status == "ok" else "bad"),
         ]
 
 
-def failure_table(curves: Sequence[Curve]) -> Table:
+def failure_table(curves: Sequence[Curve]) -> PageTable:
     """Every point that is not on a curve, with the reason."""
     rows = [
         [
-            Cell(name(curve)),
-            Cell(_setting(curve, i)),
-            Cell(prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3)),
-            Cell("left out" if status == "left_out" else report_texts.status(status)),
-            Cell("yes" if curve.arrays["false_success"][i] else ""),
-            Cell(message),
+            TableCell(curve_label(curve)),
+            TableCell(_setting(curve, i)),
+            TableCell(prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3)),
+            TableCell("left out" if status == "left_out" else status_text(status)),
+            TableCell("yes" if curve.arrays["false_success"][i] else ""),
+            TableCell(message),
         ]
         for curve in curves
         for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True))
         if status != "ok"
     ]
-    head = [texts.METHOD, texts.SETTING, texts.TIME, texts.STATUS, texts.FALSE, texts.REASON]
-    return Table(texts.FAILURES_CAPTION, head, rows, numeric=(1, 2))
+    head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
+    return PageTable(
+        "Runs that failed, found from their state, and settings that the budget left out.", head, rows, numeric=(1, 2)
+    )
 
 
-def growth_table(curves: Sequence[Curve]) -> Table:
+def scaling_table(curves: Sequence[Curve]) -> PageTable:
     """A row per method over the sizes of a study (blades, or s of duration): run time per simulated second."""
     sizes = sorted({float(size) for curve in curves for size in curve.arrays["setting"]})
     kind = str(curves[0].attributes["setting_kind"])
-    head = [texts.METHOD, *(f"{size:g} {'s' if kind == 'duration' else kind}" for size in sizes), texts.EXPONENT]
+    head = ["method", *(f"{size:g} {'s' if kind == 'duration' else kind}" for size in sizes), "exponent"]
     rows = []
     for curve in curves:
         ok = np.array([status == "ok" for status in curve.statuses])
         rate = curve.arrays["run_time_s"] / np.array(curve.arrays["simulated_s"])
         at = dict(zip(curve.arrays["setting"][ok].tolist(), rate[ok].tolist(), strict=True))
         exponent = growth_exponent(curve.arrays["setting"][ok], rate[ok])
-        cells = [Cell(prefixed(at.get(size), "s", 3)) for size in sizes]
-        rows.append([Cell(name(curve)), *cells, Cell(number(exponent))])
-    return Table(texts.GROWTH_CAPTION, head, rows, numeric=range(1, len(head)))
-
-
-def summary(scene: str, curves: Sequence[Curve]) -> list[str]:
-    """Plain words from the numbers: for each target, each model's best; what the budget left out."""
-    sentences = []
-    for target in TARGETS_RAD:
-        best: dict[str, tuple[str, float]] = {}
-        for curve, reach in fastest(curves, target):
-            best.setdefault(curve.name.partition("/")[0], (name(curve), reach.seconds))
-        sentences.append(texts.summary(scene, target, dict(best.values())))
-    return [*sentences, *omissions(curves)]
+        cells = [TableCell(prefixed(at.get(size), "s", 3)) for size in sizes]
+        rows.append([TableCell(curve_label(curve)), *cells, TableCell(number(exponent))])
+    return PageTable(
+        "Run time of one simulated second, and the exponent fitted on the larger half of the sizes.",
+        head,
+        rows,
+        numeric=range(1, len(head)),
+    )
 
 
 def _setting(curve: Curve, i: int) -> str:

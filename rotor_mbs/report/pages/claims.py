@@ -1,119 +1,122 @@
-"""Tables of what the paper says against what the models give. Knows verdicts, judges nothing."""
+"""Tables of the paper's numbers and claims against the models, for the index and for the pages of scenes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 
 from rotor_mbs.analysis.claims import Claim, Outcome, Reading
-from rotor_mbs.report import texts
-from rotor_mbs.report.core.elements import Cell, Table
-from rotor_mbs.report.core.numbers import fixed
+from rotor_mbs.analysis.published import TrajectoryNumber
+from rotor_mbs.report.core.elements import PageTable, TableCell
+from rotor_mbs.report.core.numbers import fixed, number, quantity
+
+MATCHED = "for a run length and an order of adding the weights that were chosen to match"
+_STATISTICS = {
+    "min": "smallest",
+    "max": "largest",
+    "max_abs": "largest magnitude of",
+    "range": "range of",
+    "max_abs_change": "largest change of",
+    "net_change": "change from start to end of",
+    "reversals": "changes of sign of",
+    "growth": "growth (later by earlier departure) of",
+    "swing_ratio": "largest by smallest swing of",
+}
+_WITHOUT_UNIT = ("reversals", "growth", "swing_ratio")
+_UNITS = {"angle": "rad", "rate": "rad/s"}
 
 
-def number_table(claims: Iterable[Claim]) -> Table:
+def number_table(claims: Iterable[Claim]) -> PageTable:
     """The published numbers, a row each."""
+    head = ("Figure", "In the paper", "Printed", "As printed", "Verdict", "Corrected model", "Corrected model agrees?")
     rows = [_number_row(claim) for claim in claims if claim.published.is_number]
-    head = (
-        texts.FIGURE, texts.IN_THE_PAPER, texts.PRINTED, texts.PRINTED_COLUMN, texts.VERDICT, texts.RIGHT_COLUMN,
-        texts.ALSO_RIGHT,
-    )  # fmt: skip
-    return Table(texts.NUMBERS, head, rows, numeric=(2, 3, 5))
+    return PageTable("Published numbers", head, rows, numeric=(2, 3, 5))
 
 
-def claim_table(claims: Iterable[Claim]) -> Table:
+def claim_table(claims: Iterable[Claim]) -> PageTable:
     """The claims in words, a row each."""
     rows = [_claim_row(claim) for claim in claims if not claim.published.is_number]
-    return Table(texts.CLAIMS, (texts.FIGURE, texts.IN_THE_PAPER, texts.PRINTED_COLUMN, texts.RIGHT_COLUMN), rows)
+    return PageTable("Published claims", ("Figure", "In the paper", "As printed", "Corrected model"), rows)
 
 
-def conditions_of(scene: str, conditions: Mapping[str, str]) -> list[str]:
-    """What had to be found out for this scene alone."""
-    key = scene.rpartition("/")[2]
-    return [conditions[key]] if key in conditions else []
+def description_of(asked: TrajectoryNumber) -> str:
+    """What is read off a trajectory: "largest pitch 1 rate"."""
+    body = "rotor" if asked.coordinate == 0 else f"pitch {asked.coordinate}"
+    return f"{_STATISTICS.get(asked.statistic, asked.statistic)} {body} {asked.quantity}"
 
 
-def general_conditions(conditions: Mapping[str, str]) -> list[str]:
-    """What had to be found out for all."""
-    return [text for key, text in conditions.items() if not key.startswith("fig")]
+def unit_of(asked: TrajectoryNumber) -> str:
+    """The unit of the number, "" where it has none."""
+    return "" if asked.statistic in _WITHOUT_UNIT else _UNITS[asked.quantity]
 
 
-def _number_row(claim: Claim) -> list[Cell]:
-    item = claim.published
-    assert item.of is not None
-    what = texts.asked(item.of.quantity, item.of.coordinate, item.of.statistic)
-    unit = "rad" if item.of.quantity == "angle" else "rad/s"
-    printed, right = claim.printed, claim.right
+def _number_row(claim: Claim) -> list[TableCell]:
+    item, printed, corrected = claim.published, claim.printed, claim.right
+    assert item.of is not None  # every number has it
+    verdict = _verdict(printed.holds, "reproduced", "not reproduced")
+    if item.matched and printed.holds:
+        verdict = replace(verdict, note=f"grown rounding error, {MATCHED}")
     return [
-        Cell(item.figure),
-        Cell(f"{what} ({unit})", note=f"«{item.quote}»", language="es"),
-        Cell(fixed(item.value, item.decimals)),
-        Cell(fixed(printed.value, item.decimals + 2)),
-        _reproduced(claim),
-        Cell(fixed(right.value, item.decimals + 2)),
-        _verdict(right.holds, texts.YES, texts.NO),
+        TableCell(item.figure),
+        TableCell(f"{description_of(item.of)} ({unit_of(item.of)})", note=f"«{item.quote}»", note_language="es"),
+        TableCell(fixed(item.value, item.decimals)),
+        TableCell(fixed(printed.value, item.decimals + 2)),
+        verdict,
+        TableCell(fixed(corrected.value, item.decimals + 2)),
+        _verdict(corrected.holds, "yes", "no"),
     ]
 
 
-def _reproduced(claim: Claim) -> Cell:
-    cell = _verdict(claim.printed.holds, texts.REPRODUCED, texts.NOT_REPRODUCED)
-    is_matched = claim.published.matched and claim.printed.holds
-    return replace(cell, note=f"{texts.GROWN_ROUNDING}; {texts.MATCHED}") if is_matched else cell
-
-
-def _claim_row(claim: Claim) -> list[Cell]:
+def _claim_row(claim: Claim) -> list[TableCell]:
     item = claim.published
     return [
-        Cell(item.figure),
-        Cell(item.statement, note=f"«{item.quote}»", language="es"),
-        _claim_cell(claim.printed),
-        _claim_cell(claim.right),
+        TableCell(item.figure),
+        TableCell(item.statement, note=f"«{item.quote}»", note_language="es"),
+        *(
+            replace(_verdict(one.holds, "holds", "does not hold"), note=_evidence(one) if one.holds is not None else "")
+            for one in (claim.printed, claim.right)
+        ),
     ]
 
 
-def _verdict(holds: bool | None, yes: str, no: str) -> Cell:
+def _verdict(holds: bool | None, yes: str, no: str) -> TableCell:
     if holds is None:
-        return Cell(texts.UNDECIDED)
-    return Cell(yes if holds else no, tone="good" if holds else "bad")
-
-
-def _claim_cell(outcome: Outcome) -> Cell:
-    cell = _verdict(outcome.holds, texts.HOLDS, texts.HOLDS_NOT)
-    return Cell(cell.text, cell.tone, note=_evidence(outcome)) if outcome.holds is not None else cell
+        return TableCell("–")
+    return TableCell(yes if holds else no, tone="good" if holds else "bad")
 
 
 def _evidence(outcome: Outcome) -> str:
-    """The reading that decides: the first that fails; the first of all where none does."""
+    """The reading that decides: the first that fails, or the first of all where none does."""
     failed = [reading for reading in outcome.readings if reading.holds is False]
     shown = failed or list(outcome.readings)
     if not shown:
         return ""
     text = _reading(shown[0])
     if len(shown) > 1:
-        text += texts.more_readings(len(shown) - 1, bool(failed))
+        text += f"; {len(shown) - 1} more {'fail' if failed else 'tests hold'}"
     if outcome.broke_off:
-        text += f" ({texts.ENDED_EARLY_NOTE} {', '.join(outcome.broke_off)})"
+        text += f" (judged by the samples there are: the run ended early in {', '.join(outcome.broke_off)})"
     return text
 
 
 def _reading(reading: Reading) -> str:
-    test, of = reading.test, reading.test.of
-    text = (
-        f"{of.scene}: {texts.asked(of.quantity, of.coordinate, of.statistic)} "
-        f"{texts.measured(reading.value, of.quantity, of.statistic)}"
-    )
-    if reading.value is None and test.than is None:
+    """ "paper/fig05: largest pitch 1 angle 0.21 rad, < 0.5"."""
+    test, of, than = reading.test, reading.test.of, reading.test.than
+    text = f"{of.scene}: {description_of(of)} {_measured(reading.value, of)}"
+    if reading.value is None and than is None:
         return text
-    sign = (
-        texts.relation(test.relation, test.bound)
-        if reading.holds
-        else texts.not_so(texts.relation(test.relation, test.bound))
-    )
-    text += f", {sign}"
-    if test.than is not None:
-        than = test.than
-        other = "" if than.scene == of.scene else f"{than.scene} "
+    sign: str = "opposite to" if test.relation == "opposite" else test.relation
+    if test.bound is not None:
+        sign += f" {number(test.bound, 3)}"
+    text += f", {sign}" if reading.holds else f", not {sign}"
+    if than is not None:
+        scene = "" if than.scene == of.scene else f"{than.scene} "
         same = (than.quantity, than.coordinate, than.statistic) == (of.quantity, of.coordinate, of.statistic)
-        what = "" if same else f"{texts.asked(than.quantity, than.coordinate, than.statistic)} "
-        text += f" {other}{what}{texts.measured(reading.limit, than.quantity, than.statistic)}"
+        text += f" {scene}{'' if same else description_of(than) + ' '}{_measured(reading.limit, than)}"
     return text
+
+
+def _measured(value: float | None, asked: TrajectoryNumber) -> str:
+    if value is None:
+        return "undefined (no motion)"
+    return quantity(value, unit_of(asked), 3) if unit_of(asked) else number(value, 3)

@@ -1,76 +1,86 @@
-"""The errata page: what is wrong in print, every checked entry, what each erratum does to each scene. Knows no HTML."""
+"""The errata page: the errors in print, every entry that was checked, the effect of each erratum on each scene."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
-from rotor_mbs.analysis.errata import Effect, Entry, effects
+from rotor_mbs.analysis.errata import CheckedEntry, Effect, effects
 from rotor_mbs.analysis.methods import ALONE
 from rotor_mbs.analysis.published import Erratum
-from rotor_mbs.report import texts
-from rotor_mbs.report.core.elements import Cell, Section, Table, without_empty_columns
-from rotor_mbs.report.core.environment import ErrataPage
+from rotor_mbs.report.core.elements import PageTable, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
+from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.store.read import StoredScene
 
 
+@dataclass(frozen=True)
+class ErrataPage:
+    """largest_agreeing: the largest relative difference of an entry that agrees."""
+
+    errata: Sequence[Erratum]
+    differing: Section
+    effects: Section
+    agreeing: PageTable
+    largest_agreeing: float
+
+
 def errata_page(
-    errata: Sequence[Erratum], entries: Sequence[Entry], scenes: Mapping[str, StoredScene], files: Mapping[str, str]
+    errata: Sequence[Erratum],
+    entries: Sequence[CheckedEntry],
+    scenes: Mapping[str, StoredScene],
+    files: Mapping[str, str],
 ) -> ErrataPage:
-    """scenes: in order; files: each scene's page."""
-    differing = [entry for entry in entries if not entry.agrees]
+    """scenes: in order; files: the file name of each scene's page."""
     agreeing = [entry for entry in entries if entry.agrees]
-    sections = [
-        Section("entries", texts.ENTRIES, tables=[_differing_table(differing, len(entries))]),
-        Section("effects", texts.EFFECTS, tables=[_effects_table(scenes, files)], notes=[texts.EFFECTS_NOTE]),
-    ]
-    largest = max((entry.difference for entry in agreeing), default=0.0)
     return ErrataPage(
         errata,
-        [section for section in sections if section.has_content],
-        _agreeing_table(agreeing) if agreeing else None,
-        texts.agreeing_summary(len(agreeing), largest),
+        Section(tables=[_differing_table([entry for entry in entries if not entry.agrees], len(entries))]),
+        Section(tables=[_effects_table(scenes, files)]),
+        _agreeing_table(agreeing),
+        max((entry.difference for entry in agreeing), default=0.0),
     )
 
 
-def _differing_table(entries: Sequence[Entry], checked: int) -> Table:
-    head = (texts.EQUATION, texts.ENTRY, texts.PRINTED, texts.RIGHT, texts.RELATIVE_DIFFERENCE, texts.EXPLAINED_BY)
+def _differing_table(entries: Sequence[CheckedEntry], checked: int) -> PageTable:
+    head = ("Equation", "Entry", "Printed", "Correct", "Relative difference", "Explained by")
     rows = [
         [
-            Cell(one.equation), Cell(one.entry), Cell(one.printed), Cell(one.right), Cell(number(one.difference)),
-            Cell(one.explained_by or texts.UNEXPLAINED),
+            TableCell(one.equation), TableCell(one.entry), TableCell(one.printed), TableCell(one.right),
+            TableCell(number(one.difference)), TableCell(one.explained_by or "nothing"),
         ]
         for one in entries
     ]  # fmt: skip
-    return Table(texts.differing_caption(len(entries), checked), head, rows, numeric=(4,))
+    caption = f"{len(entries)} of {checked} printed entries differ from what follows from (3)"
+    return PageTable(caption, head, rows, numeric=(4,))
 
 
-def _agreeing_table(entries: Sequence[Entry]) -> Table:
-    head = (texts.EQUATION, texts.ENTRY, texts.PRINTED, texts.RELATIVE_DIFFERENCE)
-    rows = [[Cell(e.equation), Cell(e.entry), Cell(e.printed), Cell(number(e.difference))] for e in entries]
-    return Table(texts.AGREEING, head, rows, numeric=(3,))
+def _agreeing_table(entries: Sequence[CheckedEntry]) -> PageTable:
+    head = ("Equation", "Entry", "Printed", "Relative difference")
+    rows = [[*map(TableCell, (e.equation, e.entry, e.printed, number(e.difference)))] for e in entries]
+    return PageTable("", head, rows, numeric=(3,))
 
 
-def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> Table:
-    head = [texts.SCENE]
+def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
+    head = ["Scene"]
     for erratum in ALONE:
-        head += [texts.effect_column(erratum, what) for what in texts.EFFECT_COLUMNS]
+        head += [
+            f"{erratum}: {what}" for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain")
+        ]
     rows = []
     for name, scene in scenes.items():
         found = effects(scene)
         if found:
             cells = [cell for erratum in ALONE for cell in _effect_cells(found.get(erratum))]
-            rows.append([Cell(name, href=files[name], note=scene.title), *cells])
-    table = Table(texts.EFFECTS, head, rows, numeric=range(1, len(head)))
-    return without_empty_columns(table) if rows else table
+            rows.append([TableCell(name, href=files[name], note=scene.title), *cells])
+    return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
 
 
-def _effect_cells(effect: Effect | None) -> list[Cell]:
+def _effect_cells(effect: Effect | None) -> list[TableCell]:
     if effect is None:
-        return [Cell(""), Cell(""), Cell("")]
-    ended = "" if effect.status == "ok" else texts.status(effect.status)
+        return [TableCell(""), TableCell(""), TableCell("")]
     return [
-        Cell(number(effect.angle_horizon), note=ended),
-        Cell(number(effect.angle_whole)),
-        Cell(prefixed(effect.energy_gain, "J")),
+        TableCell(number(effect.angle_horizon), note="" if effect.status == "ok" else status_text(effect.status)),
+        TableCell(number(effect.angle_whole)),
+        TableCell(prefixed(effect.energy_gain, "J")),
     ]

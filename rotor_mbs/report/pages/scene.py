@@ -1,315 +1,312 @@
-"""The sections of a scene's page: pictures and tables from its stored runs. Knows no HTML and writes no file.
-
-Each section is made of what the scene has; one that has nothing is left out.
-"""
+"""The page of a scene: pictures and tables from its stored runs. Sections for which it has no data are empty."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import texts
-from rotor_mbs.report.core import canvas, svg
-from rotor_mbs.report.core.elements import Picture, Sample, Section, line_sample, mark_sample, run_sample
-from rotor_mbs.report.names import GREY, Look, coordinate_look, look_of, name_of
+from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
+from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.report.core.numbers import number, prefixed, quantity
+from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import claims as claim_tables
-from rotor_mbs.report.pages import scene_tables as metrics
-from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.report.plots import time_histories as figures
+from rotor_mbs.report.pages import error_pictures, scene_tables
+from rotor_mbs.report.pages.scene_tables import metric
+from rotor_mbs.report.pages.viewer import Viewer, viewer
+from rotor_mbs.report.paper_figures import HEADINGS
+from rotor_mbs.report.plots import time_histories as histories
+from rotor_mbs.report.plots.paths import paths
+from rotor_mbs.report.plots.time_histories import LOWEST, Series
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-Array = NDArray[Any]
+Array = NDArray[np.float64]
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")
-_ROUNDING = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
-class Drawn:
+class ScenePage:
+    """A scene. previous, next: file names of the neighbouring pages or ""; source: the comment of the scene file."""
+
+    name: str
+    title: str
+    figures: str
+    toml: str
+    source: str
+    lead: Sequence[str]
+    failures: Sequence[str]
+    claims: Section
+    viewer: Viewer | None
+    paths: Section
+    motion: Section
+    difference: Section
+    energy: Section
+    metrics: Section
+    has_horizon: bool
+    has_errata: bool
+    previous: str
+    next: str
+
+
+@dataclass(frozen=True)
+class DrawnRuns:
     """The runs of a scene that are drawn.
 
-    printed, right   the printed model and what stands for the right one
-    others           runs of the right models other than `right`
+    printed, corrected   the printed model, and the run that stands for the corrected one
+    others               the other runs of corrected models, by method
     """
 
     scene: StoredScene
     printed: StoredRun | None
-    right: StoredRun | None
+    corrected: StoredRun | None
     others: dict[str, StoredRun]
     horizon: float | None
 
     @classmethod
-    def of(cls, scene: StoredScene) -> Drawn:
-        printed, right = methods.printed_run(scene), methods.right_run(scene)
+    def of(cls, scene: StoredScene) -> DrawnRuns:
+        """The runs of `scene` that have samples."""
+        printed, corrected = methods.printed_run(scene), methods.right_run(scene)
         good = {n: run for n, run in methods.right_runs(scene).items() if methods.has_samples(run)}
-        others = {name: run for name, run in good.items() if right is None or name != right.method}
-        return cls(scene, printed, right, others, metrics.horizon(scene))
+        others = {name: run for name, run in good.items() if corrected is None or name != corrected.method}
+        return cls(scene, printed, corrected, others, scene_tables.horizon(scene))
 
     @property
-    def sides(self) -> list[StoredRun]:
-        """Printed, then right, as they stand side by side."""
-        return [run for run in (self.printed, self.right) if run is not None]
+    def sides(self) -> dict[str, StoredRun]:
+        """Printed and corrected, by the heading of their column."""
+        runs = {HEADINGS["printed"]: self.printed, HEADINGS["corrected"]: self.corrected}
+        return {heading: run for heading, run in runs.items() if run is not None}
 
     @property
-    def compared(self) -> dict[str, StoredRun]:
-        """The runs whose errors are drawn; the reference is none of them."""
-        runs = {run.method: run for run in self.sides} | self.others
-        return {name: run for name, run in runs.items() if name != REFERENCE}
+    def all(self) -> dict[str, StoredRun]:
+        """Every run that is drawn, by method."""
+        return {run.method: run for run in self.sides.values()} | self.others
+
+    def sides_with(self, *names: str) -> dict[str, StoredRun]:
+        """Those of `sides` that have all of these datasets."""
+        return {heading: run for heading, run in self.sides.items() if all(name in run for name in names)}
 
 
-def lead(scene: StoredScene) -> list[str]:
-    """What its page shows, in sentences."""
-    printed, right = methods.printed_run(scene), methods.right_runs(scene).values()
-    departure = gain = ended = None
-    if printed is not None:
-        departure, gain = (metrics.metric(printed, name) for name in ("angle_error_whole", "energy_gain_J"))
-        if printed.status not in ("ok", "inaccurate"):
-            ended = float(printed.array("time")[-1])
-    errors = [
-        error for run in right if run.status == "ok" and (error := metrics.metric(run, "angle_error_max")) is not None
-    ]
-    return texts.scene_lead(departure, metrics.horizon(scene), gain, ended, max(errors, default=None))
-
-
-def sections(scene: StoredScene, claims: Sequence[Claim], conditions: Sequence[str]) -> list[Section]:
-    """All sections that have something to show, in their order on the page."""
-    drawn = Drawn.of(scene)
+def scene_page(
+    scene: StoredScene, claims: Sequence[Claim], conditions: Mapping[str, str], *,
+    has_errata: bool, previous: str, following: str,
+) -> ScenePage:  # fmt: skip
+    """claims: those of the paper about this scene; conditions: what the paper does not print, by key."""
+    drawn = DrawnRuns.of(scene)
+    own = conditions.get(scene.name.rpartition("/")[2])
     tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims)]
-    found = [
-        Section("said", texts.PAPER_SAYS, tables=[table for table in tables if table.rows], notes=conditions),
-        paths(drawn),
-        motion(drawn),
-        difference(drawn),
-        energy(drawn),
-        Section("metrics", texts.METRICS, tables=[metrics.metrics_table(scene)], notes=metrics.metrics_notes(scene)),
-    ]
-    return [section for section in found if section.has_content]
+    figures = str(scene.attributes.get("figures", ""))
+    sides = {label_of(run.method): run for run in drawn.sides.values()}
+    return ScenePage(
+        name=scene.name,
+        title=scene.title,
+        figures=figures and f"{'Figures' if ',' in figures else 'Figure'} {figures} of the paper",
+        toml=str(scene.attributes.get("scene_toml", "")),
+        source=opening_comment(scene),
+        lead=_lead(drawn),
+        failures=scene_tables.failures(scene),
+        claims=Section(tables=[table for table in tables if table.rows], notes=[own] if own else []),
+        viewer=viewer(scene, sides) if drawn.sides_with("tip") else None,
+        paths=paths_section(drawn),
+        motion=motion_section(drawn),
+        difference=difference_section(drawn),
+        energy=energy_section(drawn),
+        metrics=Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
+        has_horizon=drawn.horizon is not None,
+        has_errata=has_errata,
+        previous=previous,
+        next=following,
+    )
 
 
-def motion(drawn: Drawn) -> Section:
-    """Angles above, rates below, as the paper plots them; printed model beside the right ones."""
-    runs = [run for run in drawn.sides if "angles" in run or "rates" in run]
+def _lead(drawn: DrawnRuns) -> list[str]:
+    """What the pictures show, a sentence each."""
+    printed, found = drawn.printed, []
+    departure = None if printed is None else metric(printed, "angle_error_whole")
+    if printed is not None and printed.status not in ("ok", "inaccurate"):
+        end = quantity(float(printed.array("time")[-1]), "s", 3)
+        found.append(f"The printed model diverges: ode45 stops at {end}.")
+    elif printed is not None and departure is not None:
+        gain = metric(printed, "energy_gain_J")
+        energy = "" if gain is None else f"; its energy rises by up to {prefixed(gain, 'J')}"
+        found.append(f"The printed model departs from the reference by up to {quantity(departure, 'rad')}{energy}.")
+    runs = [run for run in methods.right_runs(drawn.scene).values() if run.status == "ok"]
+    errors = [error for run in runs if (error := metric(run, "angle_error_max")) is not None]
+    if errors and drawn.horizon is not None:
+        found.append(
+            f"Up to the horizon, {quantity(drawn.horizon, 's', 3)}, the corrected models agree with the reference to "
+            f"within {quantity(max(errors), 'rad')}."
+        )
+    return found
+
+
+def paths_section(drawn: DrawnRuns) -> Section:
+    """Paths of the tips in space, the printed model beside the corrected one."""
+    runs = drawn.sides_with("tip")
     if not runs:
-        return Section("motion", texts.MOTION)
+        return Section()
+    blades = next(iter(runs.values())).array("tip").shape[1]
+    legend = [line_entry(f"blade {i}", coordinate_look(i).colour) for i in range(1, blades + 1)]
+    legend += [
+        line_entry("blade at the start", line="--"),
+        line_entry("blade at the end"),
+        line_entry("shaft", width=4),
+    ]
+    pictures = [_path_picture(f"paths-{i}", run) for i, run in enumerate(runs.values())]
+    return Section(pictures, legend, [scene_tables.path_table(runs)])
+
+
+def _path_picture(name: str, run: StoredRun) -> Picture:
+    tip, label = run.array("tip"), label_of(run.method)
+    text = f"{label}: paths of the blade tips in space with the blades at the start and at the end"
+    if "angles" in run:
+        turned = float(run.array("angles")[-1, 0] - run.array("angles")[0, 0])
+        text += f"; the rotor ends {number(turned, 3)} rad from its start"
+    text += f"; tips leave the plane of rotation by up to {prefixed(float(np.abs(tip[:, :, 1]).max()), 'm')}."
+    return picture(paths(run.array("time"), tip), name, with_capital(label), text)
+
+
+def motion_section(drawn: DrawnRuns) -> Section:
+    """Angles above rates, as the paper plots them; the printed model beside the corrected ones."""
+    runs = {heading: run for heading, run in drawn.sides.items() if "angles" in run or "rates" in run}
+    if not runs:
+        return Section()
     pictures: list[Picture] = []
     marked: dict[str, StoredRun] = {}
-    for run in runs:
-        others = drawn.others if run is drawn.right else {}
-        marked |= {n: other for n, other in others.items() if "angles" in other or "rates" in other}
-        pictures.append(_motion_picture(drawn, run, marked))
-    labels = runs[0].labels
-    legend = [line_sample(label, *coordinate_look(i)) for i, label in enumerate(labels)]
-    legend += [mark_sample(name_of(name), look_of(name)) for name in marked]
+    for i, run in enumerate(runs.values()):
+        if run is drawn.corrected:
+            marked = {n: other for n, other in drawn.others.items() if "angles" in other or "rates" in other}
+        pictures.append(_motion_picture(f"motion-{i}", run, marked, drawn.horizon))
+    legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(next(iter(runs.values())).labels)]
+    legend += [mark_entry(label_of(name), look_of(name).marker) for name in marked]
     pictures += _rotor_picture(drawn)
-    table = metrics.range_table({_heading(drawn, run): run for run in runs})
-    return Section("motion", texts.MOTION, pictures, [*legend, *_horizon_sample(drawn)], [table])
+    return Section(pictures, [*legend, *_horizon_entry(drawn)], [scene_tables.range_table(runs)])
 
 
-def _heading(drawn: Drawn, run: StoredRun) -> str:
-    return texts.PRINTED_COLUMN if run is drawn.printed else texts.RIGHT_COLUMN
+def _motion_picture(name: str, run: StoredRun, marked: Mapping[str, StoredRun], horizon: float | None) -> Picture:
+    motion = motion_of(run)
+    notes = []
+    for values, what, unit in ((motion.angles, "Angles", "rad"), (motion.rates, "Rates", "rad/s")):
+        if values is not None and histories.is_cut(values):
+            largest = quantity(float(np.abs(values).max()), unit)
+            notes.append(f"{what} beyond the axis are cut off; the largest is {largest}.")
+    label = label_of(run.method)
+    caption = with_capital(label)
+    if marked:
+        caption += f", as lines; marks: {'; '.join(map(label_of, marked))}"
+    ranges = {} if motion.angles is None else dict(zip(run.labels, motion.angles.T, strict=False))
+    panels = histories.motion(motion, [(motion_of(other), look_of(n)) for n, other in marked.items()], horizon)
+    return picture(panels, name, caption, _described(label, ranges), notes)
 
 
-def _motion_picture(drawn: Drawn, run: StoredRun, marked: dict[str, StoredRun]) -> Picture:
-    marks = [(_motion(other), look_of(name)) for name, other in marked.items()]
-    plain = _motion(run)
-    name = name_of(run.method)
-    ranges = []
-    if plain.angles is not None:
-        extremes = zip(run.labels, plain.angles.min(axis=0), plain.angles.max(axis=0), strict=False)
-        ranges = [(label, float(low), float(high)) for label, low, high in extremes]
-    pairs = ((plain.angles, texts.cut_angles_note), (plain.rates, texts.cut_rates_note))
-    notes = [note(float(np.abs(x).max())) for x, note in pairs if x is not None and figures.is_cut(x)]
-    return _picture(
-        figures.motion(plain, marks, drawn.horizon),
-        f"motion-{len(marked)}-{'p' if run is drawn.printed else 'r'}",
-        texts.motion_caption(name, [name_of(other) for other in marked]),
-        texts.motion_described(name, ranges),
-        notes,
-    )
+def motion_of(run: StoredRun) -> histories.Motion:
+    """The run's time, angles and rates."""
+    angles, rates = (run.array(name) if name in run else None for name in ("angles", "rates"))
+    return histories.Motion(run.array("time"), angles, rates)
 
 
-def _rotor_picture(drawn: Drawn) -> Iterator[Picture]:
-    """Where both sides are there: beside pitches of many turns the rotor is a flat line."""
-    runs = [run for run in drawn.sides if "angles" in run]
+def _rotor_picture(drawn: DrawnRuns) -> list[Picture]:
+    """The rotor's angle alone, where both sides have it: beside pitches of many turns it is a flat line."""
+    runs = drawn.sides_with("angles")
     if len(runs) < 2:
-        return
+        return []
+    looks = (Look("#000000", "-", ""), Look("#0072b2", "--", ""))
     series = [
-        figures.Series(run.array("time"), run.array("angles")[:, 0], look)
-        for run, look in zip(runs, (Look("#000000", "-", ""), Look("#0072b2", "--", "")), strict=True)
+        Series(run.array("time"), run.array("angles")[:, 0], look)
+        for run, look in zip(runs.values(), looks, strict=True)
     ]
-    names = [name_of(run.method) for run in runs]
-    extremes = [
-        (name, float(one.values.min()), float(one.values.max())) for name, one in zip(names, series, strict=True)
-    ]
-    yield _picture(
-        figures.rotor(series, drawn.horizon), "rotor", texts.rotor_caption(*names),
-        texts.motion_described(texts.ROTOR_ALONE, extremes),
-    )  # fmt: skip
+    labels = [label_of(run.method) for run in runs.values()]
+    caption = f"The rotor's angle alone: {labels[0]}, solid black; {labels[1]}, dashed blue"
+    ranges = {label: one.values for label, one in zip(labels, series, strict=True)}
+    described = _described("Rotor angle alone", ranges)
+    return [picture(histories.rotor_angles(series, drawn.horizon), "rotor", caption, described)]
 
 
-def _motion(run: StoredRun) -> figures.Motion:
-    arrays = (run.array(name) if name in run else None for name in ("angles", "rates"))
-    return figures.Motion(run.array("time"), *arrays)
+def _described(what: str, curves: Mapping[str, Array]) -> str:
+    """Alternative text: the range of each curve (rad)."""
+    ranges = [f"{n} from {number(float(x.min()), 3)} to {number(float(x.max()), 3)} rad" for n, x in curves.items()]
+    return f"{what} over time: {'; '.join(ranges)}."
 
 
-def difference(drawn: Drawn) -> Section:
-    """Each run's largest angle difference from the reference."""
+def difference_section(drawn: DrawnRuns) -> Section:
+    """Each run's largest angle difference from the reference, and the reference's own uncertainty."""
     reference = drawn.scene.reference
-    if reference is None or "angles" not in reference or not methods.has_samples(reference):
-        return Section("difference", texts.DIFFERENCE)
-    series, exact, described = [], [], []
-    for name, run in drawn.compared.items():
-        if "angles" not in run:
-            continue
-        one = figures.Series(*angle_difference(run, reference), look_of(name))
-        described.append((name_of(name), float(one.values.max())))
-        if one.values.max() > figures.LOWEST:
-            series.append(one)
-        else:
-            exact.append(name_of(name))
-    if not described:
-        return Section("difference", texts.DIFFERENCE)
-    notes = [texts.exact_note(exact)] if exact else []
-    legend = [run_sample(name_of(n), look_of(n)) for n in drawn.compared if name_of(n) not in exact]
-    carried, uncertainty = carried_rounding(reference), None
-    if carried is not None:
-        legend.append(line_sample(texts.CARRIED, GREY, ":"))
+    runs = {name: run for name, run in drawn.all.items() if name != REFERENCE}
+    curves = error_pictures.differences(runs, reference)
+    if not curves or reference is None:
+        return Section()
+    others, notes = [], []
+    legend = error_pictures.run_legend(list(error_pictures.visible(curves)))
+    time = reference.array("time")
+    if "error_growth" in reference:
+        growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
+        others.append(Series(time, float(np.finfo(float).eps) * growth, Look(GREY, ":", "")))
+        legend.append(line_entry("rounding error of the initial state, grown", line=":"))
     if "angle_uncertainty" in reference:
-        uncertainty = reference.array("time"), reference.array("angle_uncertainty")
-        if float(uncertainty[1].max()) > figures.LOWEST:
-            legend.append(line_sample(texts.UNCERTAINTY, GREY, "-"))
+        uncertainty = float(reference.array("angle_uncertainty").max())
+        if uncertainty > LOWEST:
+            others.append(Series(time, reference.array("angle_uncertainty"), Look(GREY, "-", "")))
+            legend.append(line_entry("uncertainty of the reference"))
+        elif uncertainty:
+            notes.append(f"The uncertainty of the reference, {quantity(uncertainty, 'rad')}, is far below the axis.")
         else:
-            notes.append(texts.below_axis_note(float(uncertainty[1].max())))
-    shown = _picture(
-        figures.difference(series, carried, uncertainty, drawn.horizon),
-        "difference", texts.DIFFERENCE_CAPTION, texts.difference_described(described), notes,
+            notes.append("Two quad-precision runs of the reference do not differ at all.")
+    shown = error_pictures.error_picture(
+        curves, "largest angle difference (rad)", "difference",
+        "Largest difference from the reference, over all angles", drawn.horizon, others,
     )  # fmt: skip
-    table = metrics.difference_table(drawn.compared)
-    return Section("difference", texts.DIFFERENCE, [shown], [*legend, *_horizon_sample(drawn)], [table])
+    table = scene_tables.difference_table(runs)
+    return Section([shown] if shown else [], [*legend, *_horizon_entry(drawn)], [table], notes)
 
 
-def angle_difference(run: StoredRun, reference: StoredRun) -> tuple[Array, Array]:
-    """(time, rad) over the samples that both have: largest over the coordinates."""
-    n = min(len(run.array("time")), len(reference.array("time")))
-    gap = np.abs(run.array("angles")[:n] - reference.array("angles")[:n])
-    return reference.array("time")[:n], gap.max(axis=1)
+def energy_section(drawn: DrawnRuns) -> Section:
+    """Energies of the printed and of the corrected model; energy error of every run."""
+    runs = {name: run for name, run in drawn.all.items() if "energy_error" in run}
+    curves, relative = error_pictures.energy_errors(runs)
+    axis = "energy error / energy scale" if relative else "energy error (J)"
+    shown = error_pictures.error_picture(curves, axis, "energy-error", "Energy error of each method", drawn.horizon)
+    if shown is None:
+        return Section()
+    sides = drawn.sides_with(*_ENERGIES)
+    pictures = [_energy_picture(f"energy-{i}", drawn, run) for i, run in enumerate(sides.values())]
+    legend = [LegendEntry(name, look, width) for name, look, width in histories.ENERGY_LOOKS] if sides else []
+    legend += error_pictures.run_legend(list(error_pictures.visible(curves)))
+    return Section([*pictures, shown], [*legend, *_horizon_entry(drawn)], [scene_tables.energy_table(runs)])
 
 
-def carried_rounding(reference: StoredRun) -> tuple[Array, Array] | None:
-    """(time, rad): what rounding the initial state to a double has grown to, by the stored error growth."""
-    if "error_growth" not in reference:
-        return None
-    growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
-    return reference.array("time"), _ROUNDING * growth
-
-
-def energy(drawn: Drawn) -> Section:
-    """Energies of the printed and of the right model; energy error of all."""
-    runs = [run for run in drawn.sides if all(name in run for name in _ENERGIES)]
-    pictures = [_energy_picture(drawn, run) for run in runs]
-    errors = {n: run for n, run in ({r.method: r for r in drawn.sides} | drawn.others).items() if "energy_error" in run}
-    if not errors:
-        return Section("energy", texts.ENERGY)
-    scales = {name: metrics.metric(run, "energy_scale_J") or 0.0 for name, run in errors.items()}
-    relative = all(scales.values())
-    series, exact, described = [], [], []
-    for name, run in errors.items():
-        values = np.abs(run.array("energy_error")) / (scales[name] if relative else 1.0)
-        described.append((name_of(name), float(values.max())))
-        if values.max() > figures.LOWEST:
-            series.append(figures.Series(run.array("time"), values, look_of(name)))
-        else:
-            exact.append(name_of(name))
-    notes = [texts.exact_energy_note(exact)] if exact else []
-    pictures.append(
-        _picture(
-            figures.energy_errors(series, relative, drawn.horizon),
-            "energy-error",
-            texts.ENERGY_ERROR_CAPTION,
-            texts.energy_errors_described(described),
-            notes,
-        )
-    )
-    names = (texts.KINETIC, texts.POTENTIAL, texts.TOTAL)
-    legend = [line_sample(name, *look) for name, look in zip(names, figures.ENERGY_LOOKS, strict=True)] if runs else []
-    legend += [run_sample(name_of(name), look_of(name)) for name in errors if name_of(name) not in exact]
-    return Section("energy", texts.ENERGY, pictures, [*legend, *_horizon_sample(drawn)], [metrics.energy_table(errors)])
-
-
-def _energy_picture(drawn: Drawn, run: StoredRun) -> Picture:
+def _energy_picture(name: str, drawn: DrawnRuns, run: StoredRun) -> Picture:
     kinetic, potential, work = (run.array(name) for name in _ENERGIES)
     total = kinetic + potential - work
-    # What a run that runs away may reach is no scale; the scene's own is.
-    scale = metrics.metric(drawn.right or run, "energy_scale_J") or 0.0
+    # The scale is the scene's: the energy of a run that diverges may be of any size.
+    scale = metric(drawn.corrected or run, "energy_scale_J") or 0.0
     largest = max(float(np.abs(curve).max()) for curve in (kinetic, potential, total))
-    name = name_of(run.method)
-    return _picture(
-        figures.energies(run.array("time"), (kinetic, potential, total), scale),
-        f"energy-{'p' if run is drawn.printed else 'r'}",
-        name.capitalize(),
-        texts.energies_described(name, float(total[0]), float(total[-1])),
-        [texts.cut_energy_note(largest) if 0.0 < 3.0 * scale < largest else ""],
-    )
+    label, start, end = label_of(run.method), prefixed(float(total[0]), "J"), prefixed(float(total[-1]), "J")
+    notes = []
+    if 0.0 < 3.0 * scale < largest:
+        notes.append(f"Energies beyond the axis are cut off; the largest is {prefixed(largest, 'J')}.")
+    panels = histories.energies(run.array("time"), (kinetic, potential, total), scale)
+    described = f"{label}: total energy less work {start} at the start, {end} at the end."
+    return picture(panels, name, with_capital(label), described, notes)
 
 
-def paths(drawn: Drawn) -> Section:
-    """Paths of the tips in space, printed beside right."""
-    runs = [run for run in drawn.sides if "tip" in run]
-    if not runs:
-        return Section("paths", texts.PATHS)
-    pictures = [_path_picture(drawn, run) for run in runs]
-    blades = runs[0].array("tip").shape[1]
-    legend = [line_sample(f"{texts.BLADE} {i}".lower(), coordinate_look(i)[0], "-") for i in range(1, blades + 1)]
-    legend += [
-        line_sample(texts.WIRE_START, GREY, (0, (3, 2))),
-        line_sample(texts.WIRE_END, GREY, "-"),
-        replace(line_sample(texts.SHAFT, GREY, "-"), width=4.0),
-    ]
-    table = metrics.path_table({_heading(drawn, run): run for run in runs})
-    moving = viewer(
-        drawn.scene, {name_of(run.method): run for run in drawn.sides}, texts.viewer_described(drawn.scene.title)
-    )
-    heading = texts.PATHS if moving is None else texts.MOVING
-    return Section("paths", heading, pictures, legend, [table], [texts.PATHS_NOTE], moving)
+def _horizon_entry(drawn: DrawnRuns) -> list[LegendEntry]:
+    """For the legend, where the line is drawn: before the end."""
+    ends = [float(run.array("time")[-1]) for run in drawn.sides.values()]
+    if drawn.horizon is None or not any(drawn.horizon < end for end in ends):
+        return []
+    return [line_entry(f"horizon {quantity(drawn.horizon, 's', 3)}", line="--")]
 
 
-def _path_picture(drawn: Drawn, run: StoredRun) -> Picture:
-    tip, name = run.array("tip"), name_of(run.method)
-    turned = float(run.array("angles")[-1, 0] - run.array("angles")[0, 0]) if "angles" in run else None
-    return _picture(
-        figures.paths(run.array("time"), tip),
-        f"paths-{'p' if run is drawn.printed else 'r'}",
-        name.capitalize(),
-        texts.paths_described(name, turned, float(np.abs(tip[:, :, 1]).max())),
-    )
-
-
-def _horizon_sample(drawn: Drawn) -> Iterator[Sample]:
-    """In the legend where the line is drawn: before the end."""
-    ends = [float(run.array("time")[-1]) for run in drawn.sides]
-    if drawn.horizon is not None and any(drawn.horizon < end for end in ends):
-        yield line_sample(f"{texts.HORIZON} {texts.seconds(drawn.horizon)}", GREY, (0, (2, 2)))
-
-
-def _picture(panels: canvas.Panels, name: str, caption: str, described: str, notes: Iterable[str] = ()) -> Picture:
-    """Draws it. `name` is unique on the page; `described` says what one would see."""
-    text = svg.embedded(canvas.svg_text(panels.figure), name, caption, described)
-    return Picture(Markup(text), caption, [note for note in notes if note])
-
-
-def source_comment(scene: StoredScene) -> str:
-    """The comment that opens the scene's file, as running text; "" where there is none."""
+def opening_comment(scene: StoredScene) -> str:
+    """The comment at the start of the scene's file, as running text; "" where there is none."""
     lines = []
     for line in str(scene.attributes.get("scene_toml", "")).splitlines():
         if not line.startswith("#"):
             break
-        if "doi " not in line:  # the paper itself is named on the index
+        if "doi " not in line:  # the index names the paper
             lines.append(line.lstrip("#").strip())
     return " ".join(lines).strip()

@@ -1,4 +1,4 @@
-"""Tables of a scene's numbers from the metrics stored with its runs, and from its samples. Draws nothing."""
+"""Tables of a scene's runs, from the metrics stored with them and from their samples."""
 
 from __future__ import annotations
 
@@ -8,20 +8,24 @@ import numpy as np
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.escape_rate import escape_rate
-from rotor_mbs.report import texts
-from rotor_mbs.report.core.elements import Cell, Table, without_empty_columns
-from rotor_mbs.report.core.numbers import number, prefixed
-from rotor_mbs.report.names import name_of
+from rotor_mbs.report.core.elements import PageTable, TableCell
+from rotor_mbs.report.core.looks import label_of
+from rotor_mbs.report.core.numbers import number, prefixed, quantity
 from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 
-def status_cell(run: StoredRun) -> Cell:
-    """Not "ok" for a model that is held to nothing: that its run reached the end says nothing of its equations."""
+def status_text(status: str) -> str:
+    """A stored status as text: "solver failed" of "solver_failed"."""
+    return status.replace("_", " ")
+
+
+def status_cell(run: StoredRun) -> TableCell:
+    """The status; "runs to the end" of an "ok" run of equations that are not claimed to be correct."""
     if run.status == "ok":
-        return Cell(texts.status("ok"), tone="good") if is_held(run.method) else Cell(texts.RAN_TO_THE_END)
-    return Cell(texts.status(run.status), tone="bad")
+        return TableCell("ok", tone="good") if is_held(run.method) else TableCell("runs to the end")
+    return TableCell(status_text(run.status), tone="bad")
 
 
 def metric(run: StoredRun, name: str) -> float | None:
@@ -31,108 +35,124 @@ def metric(run: StoredRun, name: str) -> float | None:
 
 
 def horizon(scene: StoredScene) -> float | None:
-    """s; None where no run was held against a reference."""
+    """s; None where no run was compared with a reference."""
     known = [metric(run, "horizon_s") for run in scene.runs.values()]
     return next((value for value in known if value is not None), None)
 
 
-def metrics_table(scene: StoredScene) -> Table:
+def metrics_table(scene: StoredScene) -> PageTable:
     """Every run of the scene."""
-    head = (texts.METHOD, texts.STATUS, *texts.METRIC_COLUMNS)
+    head = (
+        "Method", "Status", "Angle error to the horizon (rad)", "Angle error, whole run (rad)",
+        "Tip error to the horizon (m)", "Energy drift (relative)", "Joint gap (m)", "Zero pitch", "Steps",
+        "Evaluations", "Set-up", "Run",
+    )  # fmt: skip
     rows = [_metrics_row(run) for run in methods.in_order(scene).values()]
-    return without_empty_columns(Table(texts.METRICS, head, rows, numeric=(2, 3, 4, 5, 6, 8, 9, 10, 11)))
+    return PageTable("", head, rows, numeric=(2, 3, 4, 5, 6, 8, 9, 10, 11)).without_empty_columns()
 
 
-def _metrics_row(run: StoredRun) -> list[Cell]:
+def _metrics_row(run: StoredRun) -> list[TableCell]:
     errors = ("angle_error_max", "angle_error_whole", "tip_error_max")
-    is_reference = run.method == REFERENCE
-    cells = [Cell("" if is_reference else number(metric(run, name))) for name in errors]
-    counts = [
-        Cell(f"{count:.0f}" if (count := metric(run, name)) is not None else "")
-        for name in ("steps", "rhs_evaluations")
-    ]
-    times = [Cell(prefixed(metric(run, name), "s")) for name in ("setup_time_s", "run_time_s")]
-    drift, gap = metric(run, "energy_drift_max"), metric(run, "constraint_error_max")
-    kept = ""
-    if "zero_pitch_max" in run.attributes:
-        kept = texts.left_zero(metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s"))
-    return [
-        Cell(name_of(run.method)), status_cell(run), *cells, Cell(number(drift)), Cell(number(gap)), Cell(kept),
-        *counts, *times,
-    ]  # fmt: skip
+    texts = ["" if run.method == REFERENCE else number(metric(run, name)) for name in errors]
+    texts += [number(metric(run, name)) for name in ("energy_drift_max", "constraint_error_max")]
+    texts.append(_zero_pitch(run))
+    counts = [metric(run, name) for name in ("steps", "rhs_evaluations")]
+    texts += ["" if count is None else f"{count:.0f}" for count in counts]
+    texts += [prefixed(metric(run, name), "s") for name in ("setup_time_s", "run_time_s")]
+    return [TableCell(label_of(run.method)), status_cell(run), *map(TableCell, texts)]
+
+
+def _zero_pitch(run: StoredRun) -> str:
+    """Whether pitches that are exactly zero in the reference stayed so, and until when."""
+    if "zero_pitch_max" not in run.attributes:
+        return ""
+    left, rate = metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s")
+    if left is None:
+        return "kept"
+    return f"left at {quantity(left, 's', 3)}" + ("" if rate is None else f", growing {quantity(rate, '/s', 3)}")
 
 
 def metrics_notes(scene: StoredScene) -> list[str]:
-    """What the numbers mean, and the reason of every run that is not ok."""
-    notes = [texts.HORIZON_NOTE] if horizon(scene) is not None else []
+    """What the columns mean, as far as it depends on the runs."""
+    notes = []
     if any(run.status == "ok" and not is_held(run.method) for run in scene.runs.values()):
-        notes.append(texts.NOT_HELD_NOTE)
+        notes.append(
+            "The printed equations are not judged against the reference or by their energy: that they depart from both "
+            "is the finding. A run of theirs that reaches its end is not thereby correct."
+        )
     if any("zero_pitch_max" in run.attributes for run in scene.runs.values()):
-        notes.append(texts.zero_pitch_note(escape_rate(scene)))
+        text = "Zero pitch: whether pitches that are exactly zero in the reference stay below 10⁻⁹ rad."
+        rate = escape_rate(scene)
+        if rate is not None:
+            text += (
+                " A pitch below the shaft is an inverted pendulum: rounding errors grow at up to √(g/c) = "
+                f"{quantity(rate, '/s', 3)}."
+            )
+        notes.append(text)
     return notes
 
 
 def failures(scene: StoredScene) -> list[str]:
     """A sentence for every run that is not ok."""
-    return [
-        texts.ended_early(run.method, run.status, str(run.attributes.get("message", "")), _reached(run))
-        for run in methods.in_order(scene).values()
-        if run.status != "ok"
-    ]
+    found = []
+    for run in methods.in_order(scene).values():
+        if run.status != "ok":
+            message = str(run.attributes.get("message", ""))
+            reached = float(run.array("time")[-1]) if methods.has_samples(run) else 0.0
+            parts = [f"{label_of(run.method)}: {status_text(run.status)}", *([message] if message else [])]
+            found.append(f"{'. '.join(parts)} (samples up to {quantity(reached, 's', 4)})")
+    return found
 
 
-def _reached(run: StoredRun) -> float:
-    return float(run.array("time")[-1]) if methods.has_samples(run) else 0.0
-
-
-def range_table(runs: Mapping[str, StoredRun]) -> Table:
+def range_table(runs: Mapping[str, StoredRun]) -> PageTable:
     """Extremes of each coordinate in each of the runs (heading -> run)."""
-    labels = next(iter(runs.values())).labels
-    head = [texts.COORDINATE]
+    head = ["Coordinate"]
     columns: list[list[str]] = []
     for heading, run in runs.items():
         if "angles" in run:
             low, high = run.array("angles").min(axis=0), run.array("angles").max(axis=0)
-            head.append(texts.angle_column(heading))
-            columns.append([texts.RANGE.format(number(a, 4), number(b, 4)) for a, b in zip(low, high, strict=True)])
+            head.append(f"{heading}: angle (rad)")
+            columns.append([f"{number(a, 4)} to {number(b, 4)}" for a, b in zip(low, high, strict=True)])
         if "rates" in run:
-            head.append(texts.LARGEST_RATE)
+            head.append("largest rate (rad/s)")
             columns.append([number(x, 3) for x in np.abs(run.array("rates")).max(axis=0)])
-    rows = [[Cell(label), *(Cell(column[i]) for column in columns)] for i, label in enumerate(labels)]
-    return Table(texts.EXTREMES_CAPTION, head, rows, numeric=range(1, len(head)))
+    labels = next(iter(runs.values())).labels
+    rows = [[TableCell(label), *(TableCell(column[i]) for column in columns)] for i, label in enumerate(labels)]
+    return PageTable("Extremes", head, rows, numeric=range(1, len(head)))
 
 
-def difference_table(runs: Mapping[str, StoredRun]) -> Table:
+def difference_table(runs: Mapping[str, StoredRun]) -> PageTable:
     """Errors of each run against the reference."""
-    head = (texts.METHOD, *texts.DIFFERENCE_COLUMNS)
+    head = ("Method", "Up to the horizon (rad)", "Whole run (rad)", "At the end (rad)")
     names = ("angle_error_max", "angle_error_whole", "angle_error_end")
-    rows = [[Cell(name_of(name)), *(Cell(number(metric(run, n))) for n in names)] for name, run in runs.items()]
-    return without_empty_columns(Table(texts.DIFFERENCE_CAPTION, head, rows, numeric=(1, 2, 3)))
+    rows = [
+        [TableCell(label_of(name)), *(TableCell(number(metric(run, n))) for n in names)] for name, run in runs.items()
+    ]
+    caption = "Largest difference from the reference, over all angles"
+    return PageTable(caption, head, rows, numeric=(1, 2, 3)).without_empty_columns()
 
 
-def energy_table(runs: Mapping[str, StoredRun]) -> Table:
-    """Each run's energies and how well it keeps them."""
-    head = (texts.METHOD, *texts.ENERGY_COLUMNS)
+def energy_table(runs: Mapping[str, StoredRun]) -> PageTable:
+    """Each run's energies and how well it conserves them."""
+    head = ("Method", "Largest kinetic energy", "Work at the end", "Largest gain", "Drift (relative)")
     rows = []
     for name, run in runs.items():
         kinetic = float(run.array("kinetic_energy").max()) if "kinetic_energy" in run else None
         work = float(run.array("work")[-1]) if "work" in run and run.array("work").any() else None
-        gain, drift = metric(run, "energy_gain_J"), metric(run, "energy_drift_max")
-        rows.append(
-            [Cell(name_of(name)), *(Cell(prefixed(x, "J")) for x in (kinetic, work, gain)), Cell(number(drift))]
-        )
-    return without_empty_columns(Table(texts.ENERGY, head, rows, numeric=(1, 2, 3, 4)))
+        joules = [prefixed(x, "J") for x in (kinetic, work, metric(run, "energy_gain_J"))]
+        rows.append([*map(TableCell, (label_of(name), *joules, number(metric(run, "energy_drift_max"))))])
+    return PageTable("", head, rows, numeric=(1, 2, 3, 4)).without_empty_columns()
 
 
-def path_table(runs: Mapping[str, StoredRun]) -> Table:
+def path_table(runs: Mapping[str, StoredRun]) -> PageTable:
     """Length of each tip's path and how far it leaves the plane of rotation (heading -> run)."""
-    blades = next(iter(runs.values())).array("tip").shape[1]
-    head = [texts.BLADE]
+    head = ["Blade"]
     columns = []
     for heading, run in runs.items():
         tip = run.array("tip")
         lengths = np.linalg.norm(np.diff(tip, axis=0), axis=2).sum(axis=0)
-        head += [texts.length_column(heading), texts.OFF_PLANE]
+        head += [f"{heading}: length of path", "off the plane"]
         columns += [[prefixed(x, "m") for x in lengths], [prefixed(x, "m") for x in np.abs(tip[:, :, 1]).max(axis=0)]]
-    rows = [[Cell(str(blade + 1)), *(Cell(column[blade]) for column in columns)] for blade in range(blades)]
-    return Table(texts.PATHS, head, rows, numeric=range(1, len(head)))
+    blades = range(len(columns[0]))
+    rows = [[TableCell(str(blade + 1)), *(TableCell(column[blade]) for column in columns)] for blade in blades]
+    return PageTable("Paths of the tips", head, rows, numeric=range(1, len(head)))

@@ -1,26 +1,52 @@
-"""Pages of the stability suite: the map, and a page per scene. Reads the store alone; judges nothing."""
+"""Pages of the stability suite: the map of all scenes and methods, and a page per scene."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rotor_mbs.analysis.stability import OUTCOMES, Advice, Cell, advice, cells, in_words, is_number, reached_by
-from rotor_mbs.report.core.elements import Cell as Entry
-from rotor_mbs.report.core.elements import Section, Table
+import numpy as np
+
+from rotor_mbs.analysis import methods
+from rotor_mbs.analysis.stability import (
+    OUTCOMES,
+    TARGET,
+    Advice,
+    Cell,
+    advice,
+    cells,
+    in_words,
+    is_number,
+    reached_by,
+)
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, TableCell
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import INDEX, page_names, write_pages
-from rotor_mbs.report.names import name_of
-from rotor_mbs.report.pages import stability_texts as words
-from rotor_mbs.report.pages.stability_scene import scene_page
-from rotor_mbs.store.read import open_results
+from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages import error_pictures
+from rotor_mbs.report.pages.scene import motion_of, opening_comment
+from rotor_mbs.report.pages.scene_tables import horizon
+from rotor_mbs.report.plots import time_histories as histories
+from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 from rotor_mbs.store.stability import Record, read_records
+
+NOT_COMPARED = "horizon before the second sample"
+_FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
+_CONSERVED = {
+    "angular_momentum_drift": "angular momentum (relative)",
+    "mirror_error": "mirror image (rad)",
+    "relabelling_error": "blades renumbered (rad)",
+    "reversal_error": "there and back (rad)",
+    "exponent": "drift exponent",
+}
+_NOT_BAD = ("holds", "energy_alone", "smaller_step", "refuses")
 
 
 @dataclass(frozen=True)
-class Mark:
-    """A cell of the map: outcome names its colour, symbol and text are read, href leads to the scene's page."""
+class MapMark:
+    """A scene under a method: outcome names the colour, text is read out, href leads to the scene's page."""
 
     outcome: str
     symbol: str
@@ -30,39 +56,65 @@ class Mark:
 
 @dataclass(frozen=True)
 class MapRow:
+    """A scene on the map; fastest: the method that reaches the target accuracy in the least time."""
+
     scene: str
     href: str
     title: str
-    marks: Sequence[Mark | None]
-    right_by: str
+    marks: Sequence[MapMark | None]
+    fastest: str
 
 
 @dataclass(frozen=True)
 class StabilityPage:
-    """The map. families: (name, rows); key: (outcome, symbol, words)."""
+    """The map. families: (heading, rows); key: (outcome, symbol, meaning)."""
 
     methods: Sequence[str]
     families: Sequence[tuple[str, Sequence[MapRow]]]
     key: Sequence[tuple[str, str, str]]
     summary: Sequence[str]
+    false_successes: int
+    limits: Section
+    conservation: Section
+
+
+@dataclass(frozen=True)
+class StabilityScenePage:
+    """A scene of the suite; fields as in the page of any scene."""
+
+    name: str
+    title: str
     lead: Sequence[str]
-    sections: Sequence[Section]
+    source: str
+    toml: str
+    outcomes: Section
+    motion: Section
+    errors: Section
+    steps: Section
+    previous: str
+    next: str
+    figures: str = ""
+    failures: Sequence[str] = ()
+    has_errata: bool = False
 
 
 def write_stability_report(results: Path, output: Path) -> Path:
-    """The map and a page per scene into `output`; returns the map's path. Raises StoreError."""
+    """Write the map and a page per scene into the folder `output`; returns the path of the map.
+
+    Raises StoreError where the file cannot be read or the folder cannot be written.
+    """
     found, records = cells(results), read_records(results)
     with open_results(results) as opened:
         names = list(dict.fromkeys(cell.scene for cell in found))
         files = page_names(names)
         titles = {name: opened.scenes[name].title for name in names}
         pages = {INDEX: render("stability", _map(found, records, files, titles))}
-        for i, name in enumerate(names):
+        for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
             own = [cell for cell in found if cell.scene == name]
             ladders = [record for record in records if record.kind == "steps" and record.scene == name]
-            previous, following = names[i - 1] if i else "", names[i + 1] if i + 1 < len(names) else ""
-            page = scene_page(opened.scenes[name], own, ladders, files.get(previous, ""), files.get(following, ""))
-            pages[files[name]] = render("scene", page)
+            page = _scene_page(opened.scenes[name], own, ladders)
+            page = replace(page, previous=files.get(previous, ""), next=files.get(following, ""))
+            pages[files[name]] = render("stability_scene", page)
     write_pages(output, pages)
     return output / INDEX
 
@@ -70,73 +122,176 @@ def write_stability_report(results: Path, output: Path) -> Path:
 def _map(
     found: Sequence[Cell], records: Sequence[Record], files: dict[str, str], titles: dict[str, str]
 ) -> StabilityPage:
-    methods = list(dict.fromkeys(cell.method for cell in found))
+    names = list(dict.fromkeys(cell.method for cell in found))
     families: dict[str, list[MapRow]] = {}
-    for name, file in files.items():
-        own = {cell.method: cell for cell in found if cell.scene == name}
-        any_cell = next(iter(own.values()))
-        marks = [_mark(own[method], file) if method in own else None for method in methods]
-        row = MapRow(name, file, titles[name], marks, _right_by(own.values(), any_cell))
-        families.setdefault(words.FAMILIES.get(any_cell.family, any_cell.family), []).append(row)
-    sections = [_limits(records), _kept(records)]
+    for scene, file in files.items():
+        own = {cell.method: cell for cell in found if cell.scene == scene}
+        marks = [_mark(own[name], file) if name in own else None for name in names]
+        row = MapRow(scene, file, titles[scene], marks, _fastest(list(own.values())))
+        families.setdefault(_family(next(iter(own.values())).family), []).append(row)
     used = {cell.outcome for cell in found}
     return StabilityPage(
-        [name_of(method) for method in methods],
+        [label_of(name) for name in names],
         list(families.items()),
         [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        [in_words(_named(one)) for one in advice(found)],
-        [words.LEAD, words.false_successes(sum(cell.false_success for cell in found))],
-        [section for section in sections if section.has_content],
+        [in_words(_labelled(one)) for one in advice(found)],
+        sum(cell.false_success for cell in found),
+        _limits(records),
+        _conservation(records),
     )
 
 
-def _named(one: Advice) -> Advice:
-    """Methods by the names, families by the headings that the map has for them."""
+def _family(name: str) -> str:
+    return _FAMILIES.get(name, name)
+
+
+def _labelled(one: Advice) -> Advice:
+    """The advice with labels of methods and headings of families."""
     use, in_part, avoid = (
-        tuple(f"“{words.FAMILIES.get(family, family)}”" for family in kind)
-        for kind in (one.use, one.in_part, one.avoid)
+        tuple(f"“{_family(family)}”" for family in kind) for kind in (one.use, one.in_part, one.avoid)
     )
-    return replace(one, method=name_of(one.method), use=use, in_part=in_part, avoid=avoid)
+    return replace(one, method=label_of(one.method), use=use, in_part=in_part, avoid=avoid)
 
 
-def _mark(cell: Cell, file: str) -> Mark:
+def _mark(cell: Cell, file: str) -> MapMark:
     symbol, text = OUTCOMES[cell.outcome]
     claimed = "!" if cell.false_success and cell.outcome != "false_success" else ""
-    return Mark(cell.outcome, symbol + claimed, f"{name_of(cell.method)}: {text}. {cell.message}".strip(), file)
+    return MapMark(cell.outcome, symbol + claimed, f"{label_of(cell.method)}: {text}. {cell.message}".strip(), file)
 
 
-def _right_by(own: Collection[Cell], any_cell: Cell) -> str:
-    if not any_cell.has_reference:
-        return words.NO_REFERENCE
+def _fastest(own: Sequence[Cell]) -> str:
+    if not own[0].has_reference:
+        return "no reference"
     if all(cell.angle_error is None for cell in own):
-        return words.NOT_COMPARED
-    method = reached_by(own, any_cell.scene)
-    return words.NOBODY if method is None else name_of(method)
+        return NOT_COMPARED
+    method = reached_by(own, own[0].scene)
+    return "no method" if method is None else label_of(method)
 
 
 def _limits(records: Sequence[Record]) -> Section:
     rows = []
     for record in records:
-        if record.kind != "limits" or not is_number(record.attributes["largest_stable_step_s"]):
-            continue
         facts = record.attributes
-        step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
-        numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
-        numbers.append(f"{facts['mode_damping_ratio']:.3g}")
-        rows.append([Entry(record.scene), Entry(name_of(record.method)), *map(Entry, numbers)])
-    head = [words.SCENE, words.METHOD, words.MEASURED, words.THEORY, words.RATIO, words.SCALED, words.DAMPING]
-    return Section(
-        "limits", words.LIMITS, tables=[Table(words.LIMITS, head, rows, (2, 3, 4, 5, 6))], notes=[words.LIMITS_NOTE]
+        if record.kind == "limits" and is_number(facts["largest_stable_step_s"]):
+            step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
+            numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
+            numbers.append(f"{facts['mode_damping_ratio']:.3g}")
+            rows.append([*map(TableCell, (record.scene, label_of(record.method), *numbers))])
+    head = (
+        "Scene", "Method", "found by bisection (s)", "theory (s)", "found / theory", "step × |λ|", "damping ratio of λ",
+    )  # fmt: skip
+    return Section(tables=[PageTable("", head, rows, (2, 3, 4, 5, 6))])
+
+
+def _conservation(records: Sequence[Record]) -> Section:
+    rows = [
+        [*map(TableCell, (r.scene, label_of(r.method), *(_shown(r.attributes.get(name)) for name in _CONSERVED)))]
+        for r in records
+        if r.kind == "conservation"
+    ]
+    head = ["Scene", "Method", *_CONSERVED.values()]
+    return Section(tables=[PageTable("", head, rows, tuple(range(2, len(head))))])
+
+
+def _shown(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2g}"
+
+
+def _scene_page(scene: StoredScene, own: Sequence[Cell], ladders: Sequence[Record]) -> StabilityScenePage:
+    corrected = methods.right_runs(scene)
+    runs = {name: run for name, run in corrected.items() if methods.has_samples(run) and len(run.array("time")) > 1}
+    return StabilityScenePage(
+        scene.name,
+        scene.title,
+        _lead(scene, own),
+        opening_comment(scene),
+        str(scene.attributes["scene_toml"]),
+        Section(tables=[_outcome_table(own)]),
+        _motion(methods.right_run(scene)),
+        _errors(scene, runs),
+        _error_over_step(ladders),
+        previous="",
+        next="",
     )
 
 
-def _kept(records: Sequence[Record]) -> Section:
+def _lead(scene: StoredScene, own: Sequence[Cell]) -> list[str]:
+    """The fastest method, or why none is accurate: by 1e10 the rounding error 1e-16 rad of the start is 1e-6 rad."""
+    if not own or not own[0].has_reference or all(cell.angle_error is None for cell in own):
+        return []
+    best = reached_by(own, scene.name)
+    if best is not None:
+        return [f"Fastest to 10⁻⁶ rad up to the horizon: {label_of(best)}."]
+    reference = scene.reference
+    assert reference is not None  # has_reference says so
+    uncertainty, growth = (float(reference.array(name).max()) for name in ("angle_uncertainty", "error_growth"))
+    return [
+        f"{scene.name}: no method reaches 1e-6 rad. The uncertainty of the reference is {uncertainty:.1e} rad, and an "
+        f"initial error has grown {growth:.1e}-fold by the end: "
+        f"the cause is {'the problem, not a code' if growth >= 1e10 else 'the methods'}."
+    ]
+
+
+def _outcome_table(own: Sequence[Cell]) -> PageTable:
     rows = []
-    for record in records:
-        if record.kind == "conservation":
-            values = [record.attributes.get(name) for name in words.KEPT_COLUMNS]
-            shown = [Entry("–" if value is None else f"{value:.2g}") for value in values]
-            rows.append([Entry(record.scene), Entry(name_of(record.method)), *shown])
-    head = [words.SCENE, words.METHOD, *words.KEPT_COLUMNS.values()]
-    columns = range(2, len(head))
-    return Section("kept", words.KEPT, tables=[Table(words.KEPT, head, rows, tuple(columns))], notes=[words.KEPT_NOTE])
+    for cell in own:
+        symbol, text = OUTCOMES[cell.outcome]
+        if cell.outcome in _NOT_BAD:
+            outcome = TableCell(f"{symbol} {text}", note=cell.message)
+        else:  # the tone brings its own symbol
+            outcome = TableCell(text, "bad", note=cell.message)
+        numbers = [_shown(x) for x in (cell.angle_error, cell.energy_drift, cell.run_time_s or None, cell.step)]
+        rows.append(
+            [TableCell(label_of(cell.method)), outcome, *map(TableCell, [*numbers, f"{cell.time_reached:.4g}"])]
+        )
+    head = (
+        "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 1e-6 rad (s)",
+        "reached (s)",
+    )  # fmt: skip
+    return PageTable("", head, rows, (2, 3, 4, 5, 6))
+
+
+def _motion(run: StoredRun | None) -> Section:
+    if run is None or len(run.array("time")) < 2:
+        return Section()
+    caption, unresolved = f"Angles and rates of {label_of(run.method)}", _unresolved(run)
+    if unresolved:
+        names = " and ".join(filter(None, [", ".join(unresolved[:-1]), unresolved[-1]]))
+        caption += f". The samples are too far apart to resolve the swings of {names}: only their range is meaningful"
+    legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(run.labels)]
+    return Section([picture(histories.motion(motion_of(run)), "motion", caption, caption)], legend)
+
+
+def _unresolved(run: StoredRun) -> list[str]:
+    """Coordinates that at their largest rate would cross their whole range between two samples."""
+    interval = float(run.array("time")[1] - run.array("time")[0])
+    ranges, fastest = np.ptp(run.array("angles"), axis=0), np.abs(run.array("rates")).max(axis=0)
+    return [label for label, a, w in zip(run.labels, ranges, fastest, strict=True) if w * interval > a > 0.0]
+
+
+def _errors(scene: StoredScene, runs: error_pictures.Runs) -> Section:
+    energy, relative = error_pictures.energy_errors(runs)
+    energy_axis = "energy error / energy scale" if relative else "energy error (J)"
+    kinds = [
+        (error_pictures.differences(runs, scene.reference), "largest angle difference (rad)", "difference",
+         "Largest angle difference from the reference", horizon(scene)),
+        (energy, energy_axis, "energy", "Energy error", None),
+        (error_pictures.joint_gaps(runs), "largest joint gap (m)", "gaps",
+         "Largest position error in a joint of the chain", None),
+    ]  # fmt: skip
+    pictures: list[Picture] = []
+    for curves, axis, name, caption, end in kinds:
+        shown = error_pictures.error_picture(curves, axis, name, caption, end)
+        pictures += [shown] if shown is not None and error_pictures.visible(curves) else []
+    drawn = [name for name in runs if any(name in error_pictures.visible(kind[0]) for kind in kinds)]
+    return Section(pictures, error_pictures.run_legend(drawn))
+
+
+def _error_over_step(ladders: Sequence[Record]) -> Section:
+    drawn = {r.method: r.arrays for r in ladders if np.isfinite(r.arrays["angle_error_max"]).any()}
+    if not drawn:
+        return Section()
+    curves = [(arrays["step"], arrays["angle_error_max"], look_of(name)) for name, arrays in drawn.items()]
+    caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
+    shown = picture(histories.error_over_step(curves, TARGET), "steps", caption, caption)
+    return Section([shown], error_pictures.run_legend(list(drawn)))

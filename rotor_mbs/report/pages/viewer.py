@@ -1,8 +1,7 @@
-"""What the viewer of a scene's page needs: the bodies, and each model's angles thinned to what the eye sees.
+"""The data of the viewer on a scene's page: the bodies, and each model's angles at equally spaced times.
 
-Angles are whole turns in 16 bits (1e-4 rad, a pixel at the tip on any screen), frames are equally spaced in time.
-Between frames the viewer goes the short way round: a coordinate may turn half a revolution from one to the next.
-Knows no page and draws nothing: `templates/viewer.js` does.
+Angles are turns in 16 bits (1e-4 rad, a pixel at the tip on any screen). Between frames the viewer goes the shorter
+way round: a coordinate may turn half a revolution from one to the next. `templates/viewer.js` draws.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.names import COLOURS
+from rotor_mbs.report.core.looks import coordinate_look
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]
 FRAMES = 361
-SEEN = 0.1
+_VISIBLE = 0.1  # of the longest blade
 _TURN = 65536  # values of 16 bits
 
 
@@ -40,7 +39,6 @@ class Viewer:
     data: Markup
     models: Sequence[str]
     magnified: int | None
-    described: str
 
 
 def scene_of(stored: StoredScene) -> Scene | None:
@@ -51,7 +49,7 @@ def scene_of(stored: StoredScene) -> Scene | None:
         return None
 
 
-def viewer(stored: StoredScene, runs: Mapping[str, StoredRun], described: str) -> Viewer | None:
+def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> Viewer | None:
     """runs: at most two, by the name to be shown. None where the scene's bodies or the angles are not known."""
     scene = scene_of(stored)
     if scene is None:
@@ -65,26 +63,26 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun], described: str) -
     step = end / (FRAMES - 1)
     data = {
         "step": step,
-        "colours": [COLOURS[(i + 1) % len(COLOURS)] for i in range(len(scene.blades))],
+        "colours": [coordinate_look(i + 1).colour for i in range(len(scene.blades))],
         "blades": [
             {"phase": phase, "tip": blade.tip, "mass": blade.centre_of_mass}
             for phase, blade in zip(scene.phases, scene.blades, strict=True)
         ],
         "models": [{"name": name, "angles": packed(*move, step)} for name, move in moves.items()],
     }
-    return Viewer(script_json(data), list(moves), magnification(scene), described)
+    return Viewer(script_json(data), list(moves), magnification(scene))
 
 
 def magnification(scene: Scene) -> int | None:
-    """So many times the largest distance of a tip from its pitch axis makes SEEN of the longest blade; at least 1.
+    """How many times a tip's distance from its pitch axis is drawn, so that it is a tenth of the blade; at least 1.
 
-    None where no tip lies off its axis: there no pitch can be seen at all.
+    None where every tip lies on its axis: its pitch cannot be seen.
     """
     offset = max(math.hypot(*blade.tip[:2]) for blade in scene.blades)
     if not offset:
         return None
     length = max(math.hypot(*blade.tip) for blade in scene.blades)
-    return max(1, round(SEEN * length / offset))
+    return max(1, round(_VISIBLE * length / offset))
 
 
 def packed(time: Array, angles: Array, step: float) -> str:
@@ -97,7 +95,7 @@ def packed(time: Array, angles: Array, step: float) -> str:
 
 
 def script_json(data: object) -> Markup:
-    """JSON that no HTML parser can take for the end of its script element or for a comment."""
+    """JSON in which no character can end a script element or begin a comment."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")

@@ -1,125 +1,237 @@
-"""The page that goes through the paper's figures in its order: printed model, right model and Exudyn side by side.
-
-Knows no HTML: plain data for the template.
-"""
+"""The page that goes through the paper's figures in its order: the models side by side, and what differs."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
 
-from markupsafe import Markup
+import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.report import texts
-from rotor_mbs.report.core import canvas, svg
-from rotor_mbs.report.core.elements import Picture, Sample, line_sample
-from rotor_mbs.report.core.environment import Entry, Row
-from rotor_mbs.report.core.numbers import fixed
-from rotor_mbs.report.names import coordinate_look, name_of
-from rotor_mbs.report.pages.walk_facts import conditions, facts
-from rotor_mbs.report.paper_figures import columns, draw_motion, draw_paths, draw_torques, torque_look
-from rotor_mbs.report.paper_set import MOTION, PATHS, TORQUES, PaperFigure
+from rotor_mbs.report import paper_figures
+from rotor_mbs.report.core.elements import LegendEntry, Picture
+from rotor_mbs.report.core.looks import label_of, with_capital
+from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, quantity
+from rotor_mbs.report.pages.claims import description_of, unit_of
+from rotor_mbs.report.pages.scene_tables import horizon, metric
+from rotor_mbs.report.pages.viewer import scene_of
+from rotor_mbs.report.paper_figures import HEADINGS, PATHS, TORQUES, PaperFigure, compared_runs
 from rotor_mbs.store.read import StoredRun, StoredScene
 
+VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
+_ROUNDING = 1e-9  # rad
 
-def entry(
+
+@dataclass(frozen=True)
+class WalkPanel:
+    """A panel of a figure: its letter, its scene's page and initial conditions, a picture per model, what they show."""
+
+    letter: str
+    scene: str
+    href: str
+    conditions: str
+    pictures: Sequence[Picture]
+    same: str
+    different: str
+
+
+@dataclass(frozen=True)
+class WalkFigure:
+    """A figure of the paper. numbers: those that the paper prints about it, a sentence each."""
+
+    number: str
+    kind: str
+    legend: Sequence[LegendEntry]
+    panels: Sequence[WalkPanel]
+    numbers: Sequence[str]
+    has_matched_number: bool
+
+
+@dataclass(frozen=True)
+class WalkPage:
+    """All figures in order."""
+
+    figures: Sequence[WalkFigure]
+    has_errata: bool
+
+
+@dataclass(frozen=True)
+class ModelComparison:
+    """How the models of a scene differ; None where the file does not have the runs.
+
+    visible_from      s, when the printed angles differ from the corrected ones by VISIBLE; inf: never
+    largest           rad, the largest difference of the two
+    ended             s, when the printed run ended early
+    corrected_still   whether no blade of the corrected model pitches
+    printed_pitch     rad, the largest pitch of the printed model
+    gain              J, rise of the printed model's energy without work
+    exudyn            rad, difference of Exudyn from the corrected model up to the time `until` (s)
+    """
+
+    visible_from: float | None
+    largest: float | None
+    ended: float | None
+    corrected_still: bool
+    printed_pitch: float | None
+    gain: float | None
+    exudyn: float | None
+    until: float
+
+
+def walk_figure(
     figure: PaperFigure, scenes: Mapping[str, StoredScene], claims: Sequence[Claim], files: Mapping[str, str]
-) -> Entry:
-    """claims: all; files: each scene's page."""
-    stored = {name: scenes[name] for name in figure.scenes}
-    if figure.kind == TORQUES:
-        rows = [_torque_row(figure, stored, files)]
-    else:
-        rows = [_row(figure, letter, stored[name], files[name]) for letter, name in figure.panels]
+) -> WalkFigure:
+    """claims: all of the paper; files: the file name of each scene's page."""
     numbers = [claim for claim in claims if claim.published.is_number and claim.published.figure == figure.number]
-    notes = [texts.MATCHED_NOTE] if any(claim.published.matched for claim in numbers) else []
-    notes += [texts.FIGURE_NOTES[figure.number]] if figure.number in texts.FIGURE_NOTES else []
-    return Entry(
-        figure.number,
-        texts.figure_heading(figure.number, figure.kind),
-        legend(figure, stored),
-        rows,
-        [_number(claim) for claim in numbers],
-        notes,
-    )
-
-
-def legend(figure: PaperFigure, stored: Mapping[str, StoredScene]) -> list[Sample]:
-    """Curves by colour: coordinates, blades, or torques."""
+    legend = [LegendEntry(label, look) for label, look in paper_figures.legend(figure, scenes)]
+    rows: dict[str, list[tuple[str, dict[str, StoredRun]]]] = {}
+    for letter, key, runs in paper_figures.panel_runs(figure, scenes):
+        rows.setdefault(letter, []).append((key, runs))
     if figure.kind == TORQUES:
-        return [line_sample(label, *torque_look(i)) for i, (label, _) in enumerate(figure.panels)]
-    runs = next(iter(columns(next(iter(stored.values()))).values()), None)
-    labels = runs.labels if runs is not None else []
-    if figure.kind == MOTION:
-        return [line_sample(label, *coordinate_look(i)) for i, label in enumerate(labels)]
-    return [line_sample(f"{texts.BLADE} {i}".lower(), coordinate_look(i)[0], "-") for i in range(1, len(labels))]
+        panels = [_torque_panel(figure, scenes, rows.get("", []), files)]
+    else:
+        panels = [_panel(figure, letter, scenes[name], rows.get(letter, []), files) for letter, name in figure.panels]
+    matched = any(claim.published.matched for claim in numbers)
+    return WalkFigure(figure.number, figure.kind, legend, panels, [_number(claim) for claim in numbers], matched)
 
 
-def _row(figure: PaperFigure, letter: str, scene: StoredScene, href: str) -> Row:
-    known = facts(scene)
-    same, different = texts.walk_same(known), texts.walk_different(known)
-    pictures = [
-        _picture(figure, f"f{figure.number}{letter}{place}", heading, run, f"{same} {different}")
-        for place, (heading, run) in enumerate(columns(scene).items())
-        if figure.kind == MOTION or "tip" in run
-    ]
-    return Row(letter, scene.name, href, conditions(scene), pictures, same, different)
+def _panel(
+    figure: PaperFigure, letter: str, scene: StoredScene, row: Sequence[tuple[str, dict[str, StoredRun]]],
+    files: Mapping[str, str],
+) -> WalkPanel:  # fmt: skip
+    found = comparison(scene)
+    same, different = _same(found), _different(found)
+    pictures = [_picture(figure, letter, key, runs, f"{same} {different}") for key, runs in row]
+    return WalkPanel(letter, scene.name, files[scene.name], _conditions(scene), pictures, same, different)
 
 
-def _picture(figure: PaperFigure, name: str, heading: str, run: StoredRun, message: str) -> Picture:
+def _torque_panel(
+    figure: PaperFigure, scenes: Mapping[str, StoredScene], row: Sequence[tuple[str, dict[str, StoredRun]]],
+    files: Mapping[str, str],
+) -> WalkPanel:  # fmt: skip
+    """All torques in one picture per model."""
+    gaps = [gap for name in figure.scenes if (gap := comparison(scenes[name]).exudyn) is not None]
+    same = "The same: every torque accelerates the rotor from rest"
+    same += f"; Exudyn and the corrected model differ by {quantity(max(gaps), 'rad')} at most." if gaps else "."
+    turned = [f"{HEADINGS[key]}: {', '.join(_turned(run, at) for at, run in runs.items())}" for key, runs in row]
+    different = (
+        "Not the same: in the corrected model the blades stay at zero pitch and the rotor turns by "
+        f"τt²/(2·3·m·(c²+d²)). Turned at the end: {'; '.join(turned)}."
+    )
+    pictures = [_picture(figure, "", key, runs, f"{same} {different}") for key, runs in row]
+    first = figure.scenes[0]
+    conditions = _conditions(scenes[first], with_torque=False)
+    return WalkPanel("", first, files[first], conditions, pictures, same, different)
+
+
+def _turned(run: StoredRun, torque: str) -> str:
+    return f"{number(float(run.array('angles')[-1, 0] - run.array('angles')[0, 0]), 3)} rad at {torque}"
+
+
+def _picture(figure: PaperFigure, letter: str, key: str, runs: Mapping[str, StoredRun], message: str) -> Picture:
+    from rotor_mbs.report.core import canvas, svg  # late: matplotlib, in the workers alone
+
+    panels = canvas.grid(1, 1, 3.6) if figure.kind == PATHS else canvas.grid(2, 1, 1.7)
     with canvas.style():
-        if figure.kind == PATHS:
-            panels = canvas.grid(1, 1, 3.6)
-            draw_paths(panels.axes[0], run.array("tip"))
-        else:
-            panels = canvas.grid(2, 1, 1.7)
-            draw_motion(panels.axes, run)
-    return _embedded(panels, name, heading, name_of(run.method), figure.number, message)
-
-
-def _torque_row(figure: PaperFigure, stored: Mapping[str, StoredScene], files: Mapping[str, str]) -> Row:
-    """All torques in one picture a model."""
-    labels = {scene: label for label, scene in figure.panels}
-    by_heading: dict[str, dict[str, StoredRun]] = {}
-    for name, scene in stored.items():
-        for heading, run in columns(scene).items():
-            by_heading.setdefault(heading, {})[labels[name]] = run
-    near = [found for scene in stored.values() if (found := facts(scene).exudyn) is not None]
-    same = texts.torques_same(max(near, default=None))
-    different = texts.torques_different({k: _swing(r) for k, r in by_heading.items()})
-    pictures = []
-    for place, (heading, runs) in enumerate(by_heading.items()):
-        with canvas.style():
-            panels = canvas.grid(2, 1, 1.7)
-            draw_torques(panels.axes, runs)
-        method = name_of(next(iter(runs.values())).method)
-        message = f"{same} {different}"
-        pictures.append(_embedded(panels, f"f15{place}", heading, method, figure.number, message))
-    first = next(iter(stored))
-    return Row("", first, files[first], conditions(stored[first], with_torque=False), pictures, same, different)
-
-
-def _swing(runs: Mapping[str, StoredRun]) -> dict[str, float]:
-    """rad: how far each torque turns the rotor."""
-    return {label: float(run.array("angles")[-1, 0] - run.array("angles")[0, 0]) for label, run in runs.items()}
-
-
-def _embedded(panels: canvas.Panels, name: str, heading: str, method: str, figure: str, message: str) -> Picture:
-    title = texts.walk_picture(figure, heading)
-    text = svg.embedded(canvas.svg_text(panels.figure), name, title, message)
-    return Picture(Markup(text), method.capitalize() if method.startswith(heading.lower()) else f"{heading}: {method}")
+        paper_figures.draw(figure, panels.axes, runs)
+    heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
+    caption = with_capital(label) if label.startswith(heading.lower()) else f"{heading}: {label}"
+    return svg.picture(panels, f"f{figure.number}{letter}-{key}", caption, message)
 
 
 def _number(claim: Claim) -> str:
     item = claim.published
-    assert item.of is not None
-    what = texts.asked(item.of.quantity, item.of.coordinate, item.of.statistic)
-    unit = "rad" if item.of.quantity == "angle" else "rad/s"
-    decimals = item.decimals
-    return texts.walk_number(
-        what,
-        unit,
-        fixed(item.value, decimals),
-        fixed(claim.printed.value, decimals),
-        fixed(claim.right.value, decimals),
+    assert item.of is not None  # every number has it
+    published, printed, corrected = (
+        fixed(value, item.decimals) for value in (item.value, claim.printed.value, claim.right.value)
     )
+    return (
+        f"{with_capital(description_of(item.of))}: published {published} {unit_of(item.of)}; as printed {printed}; "
+        f"corrected model {corrected}."
+    )
+
+
+def comparison(scene: StoredScene) -> ModelComparison:
+    """Of the printed model, the corrected one and Exudyn."""
+    runs = compared_runs(scene)
+    printed, corrected, exudyn = (runs.get(key) for key in HEADINGS)
+    visible = largest = ended = gain = pitch = near = None
+    known = horizon(scene)
+    until = math.inf if known is None else known
+    if printed is not None:
+        gain = metric(printed, "energy_gain_J")
+        pitch = float(np.abs(printed.array("angles")[:, 1:]).max(initial=0.0))
+        if printed.status not in ("ok", "inaccurate"):
+            ended = float(printed.array("time")[-1])
+    if printed is not None and corrected is not None:
+        gap = _difference(printed, corrected)
+        largest = float(gap.max())
+        apart = np.flatnonzero(gap > VISIBLE)
+        visible = float(printed.array("time")[apart[0]]) if len(apart) else math.inf
+    if exudyn is not None and corrected is not None:
+        gap = _difference(exudyn, corrected)
+        time = exudyn.array("time")[: len(gap)]
+        until = min(until, float(time[-1]))
+        near = float(gap[time <= until].max(initial=0.0))
+    still = corrected is not None and bool(np.abs(corrected.array("angles")[:, 1:]).max(initial=0.0) < _ROUNDING)
+    return ModelComparison(visible, largest, ended, still, pitch, gain, near, until)
+
+
+def _difference(one: StoredRun, other: StoredRun) -> NDArray[Any]:
+    n = min(len(one.array("time")), len(other.array("time")))
+    found: NDArray[Any] = np.abs(one.array("angles")[:n] - other.array("angles")[:n]).max(axis=1)
+    return found
+
+
+def _same(found: ModelComparison) -> str:
+    parts = []
+    if found.visible_from is not None and found.visible_from > 0.0:
+        until = "throughout" if found.visible_from == math.inf else f"up to {quantity(found.visible_from, 's', 3)}"
+        parts.append(f"the printed model moves as the corrected one {until}")
+    if found.exudyn is not None:
+        parts.append(
+            f"Exudyn and the corrected model differ by no more than {quantity(found.exudyn, 'rad')} up to "
+            f"{quantity(found.until, 's', 3)}"
+        )
+    return f"The same: {'; '.join(parts)}." if parts else ""
+
+
+def _different(found: ModelComparison) -> str:
+    parts = []
+    if found.corrected_still and found.printed_pitch is not None and found.printed_pitch > 1e-3:
+        pitch = quantity(found.printed_pitch, "rad")
+        parts.append(f"no blade pitches in the corrected model; in print the pitches reach {pitch}")
+    if found.largest is not None and found.visible_from != math.inf:
+        parts.append(f"the printed angles differ from the corrected ones by up to {quantity(found.largest, 'rad')}")
+    if found.gain is not None and found.gain > 1e3:
+        parts.append(f"the energy of the printed model rises by {prefixed(found.gain, 'J')} without work done")
+    if found.ended is not None:
+        parts.append(f"it diverges, and ode45 stops at {quantity(found.ended, 's', 3)}")
+    return f"Not the same: {'; '.join(parts)}." if parts else "Not the same: nothing visible."
+
+
+def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:
+    """The initial state, torque, gravity and duration; "" where the stored text is not a scene."""
+    scene = scene_of(stored)
+    if scene is None:
+        return ""
+    angles, rates = (", ".join(in_pi(x) for x in values) for values in (scene.initial_angles, scene.initial_rates))
+    parts = [f"q(0) = [{angles}] rad", f"dq/dt(0) = [{rates}] rad/s"]
+    if with_torque and not scene.has_constant_torque:
+        parts.append("a torque that changes over time")
+    elif with_torque and scene.torque_at(0.0):
+        parts.append(f"rotor torque {prefixed(scene.torque_at(0.0), 'N·m')}")
+    return f"{', '.join(parts)}, g = {number(scene.gravity, 3)} m/s², {quantity(scene.duration, 's', 4)}."
+
+
+def in_pi(value: float) -> str:
+    """ "11π/12" where `value` is a simple multiple of π, else four digits."""
+    part = Fraction(value / math.pi).limit_denominator(12)
+    if value and abs(float(part) * math.pi - value) < 1e-12:
+        top = {1: "π", -1: "−π"}.get(part.numerator, f"{minus(str(part.numerator))}π")
+        return top if part.denominator == 1 else f"{top}/{part.denominator}"
+    return minus(f"{value:.4g}")

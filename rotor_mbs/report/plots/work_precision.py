@@ -1,4 +1,4 @@
-"""The diagram of error against run time: curves, front, whiskers, failure rail. Knows no file and no page.
+"""The diagram of error against run time: curves, Pareto front, quartiles, failed runs on a strip at the left.
 
 Error on the horizontal axis, falling to the right, so that accuracy grows to the right; time on the vertical one.
 """
@@ -14,9 +14,8 @@ import numpy as np
 from rotor_mbs.analysis.work_precision import failed, pareto, points, succeeded
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.core.looks import GREY, Look, look_of
 from rotor_mbs.report.core.numbers import power
-from rotor_mbs.report.names import GREY, Look, look_of
-from rotor_mbs.report.pages import bench_texts as texts
 from rotor_mbs.store.bench import Curve
 
 FRONT_COLOUR = "#c8c8c8"
@@ -30,7 +29,7 @@ class _Drawn(NamedTuple):
 
 def diagram(curves: Sequence[Curve], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
     """All curves of a scene; `small` for one of many side by side: front and curves alone."""
-    picture = canvas.panels((height,), texts.ERROR_AXIS)
+    picture = canvas.panels((height,), "largest angle error up to the horizon (rad)")
     axes = picture.axes[0]
     drawn = [_Drawn(*points(curve, with_setup=with_setup)) for curve in curves]
     _front(axes, drawn)
@@ -44,11 +43,11 @@ def diagram(curves: Sequence[Curve], *, with_setup: bool = False, height: float 
             _whiskers(axes, curve, style)
         _rail(axes, curve, style, with_setup)
     _axes(axes, drawn, curves)
-    axes.set_ylabel(texts.SETUP_TIME_AXIS if with_setup else texts.TIME_AXIS)
+    axes.set_ylabel("set-up, run and read-out (s)" if with_setup else "run time (s)")
     return picture
 
 
-def has_visible_floor(curves: Sequence[Curve]) -> bool:
+def has_visible_uncertainty(curves: Sequence[Curve]) -> bool:
     """Whether the reference's uncertainty lies within the diagram: in quad precision it is far beyond its edge."""
     return _uncertainty(curves) > _LOWEST_ERROR
 
@@ -81,13 +80,13 @@ def _rail(axes: Any, curve: Curve, style: Look, with_setup: bool) -> None:
 
 
 def _axes(axes: Any, drawn: Sequence[_Drawn], curves: Sequence[Curve]) -> None:
-    if has_visible_floor(curves):
+    if has_visible_uncertainty(curves):
         axes.axvspan(_LOWEST_ERROR / 10.0, _uncertainty(curves), color=GREY, alpha=0.2, linewidth=0)
     axes.axvspan(_RAIL_START, _RAIL_END, color="#f2e3de", linewidth=0, zorder=0)
     axes.set_xscale("log")
     axes.set_xlim(_RAIL_END, _LOWEST_ERROR / 2.0)
     exponents = range(-3, -17, -3)
-    axes.set_xticks([_RAIL, *(10.0**e for e in exponents)], [texts.RAIL, *(power(e) for e in exponents)])
+    axes.set_xticks([_RAIL, *(10.0**e for e in exponents)], ["failed", *(power(e) for e in exponents)])
     axes.set_xticks([], minor=True)
     times = [*(one.seconds for one in drawn), *(curve.arrays["run_time_s"][failed(curve)] for curve in curves)]
     known = np.concatenate([np.ravel(time) for time in times] or [np.empty(0)])

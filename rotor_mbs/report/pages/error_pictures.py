@@ -1,0 +1,78 @@
+"""Pictures of errors over time: difference from the reference, energy error, joint gap. A curve per run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rotor_mbs.report.core.elements import LegendEntry, Picture
+from rotor_mbs.report.core.looks import label_of, look_of
+from rotor_mbs.report.core.numbers import number
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.plots import time_histories as histories
+from rotor_mbs.report.plots.time_histories import LOWEST, Series
+from rotor_mbs.store.read import StoredRun
+
+Runs = Mapping[str, StoredRun]
+Curves = dict[str, Series]  # by method
+
+
+def error_picture(
+    curves: Curves, axis: str, name: str, caption: str, horizon: float | None = None, others: Sequence[Series] = ()
+) -> Picture | None:
+    """The curves and `others`, which have no marker; None where there is nothing to draw or to note."""
+    if not curves:
+        return None
+    exact = [label_of(method) for method in curves if method not in visible(curves)]
+    notes = [f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else []
+    largest = "; ".join(f"{label_of(method)} up to {number(float(c.values.max()))}" for method, c in curves.items())
+    panels = histories.errors([*others, *visible(curves).values()], axis, horizon)
+    return picture(panels, name, caption, f"{caption}, logarithmic axis: {largest}", notes)
+
+
+def visible(curves: Curves) -> Curves:
+    """The curves that a logarithmic axis can show."""
+    return {method: one for method, one in curves.items() if one.values.max() > LOWEST}
+
+
+def run_legend(methods: Sequence[str]) -> list[LegendEntry]:
+    """An entry per method, as its error curves are drawn."""
+    return [LegendEntry(label_of(method), look_of(method)) for method in methods]
+
+
+def differences(runs: Runs, reference: StoredRun | None) -> Curves:
+    """Largest angle difference (rad) from the reference over the coordinates, at the samples that both have."""
+    if reference is None or "angles" not in reference or not len(reference.array("time")):
+        return {}
+    found = {}
+    for method, run in runs.items():
+        if "angles" in run:
+            n = min(len(run.array("time")), len(reference.array("time")))
+            gap = np.abs(run.array("angles")[:n] - reference.array("angles")[:n]).max(axis=1)
+            found[method] = Series(reference.array("time")[:n], gap, look_of(method))
+    return found
+
+
+def energy_errors(runs: Runs) -> tuple[Curves, bool]:
+    """|energy error| of each run, and whether it is relative to the scene's energy scale (else in J)."""
+    known = {method: run for method, run in runs.items() if "energy_error" in run}
+    scales = {method: float(run.attributes.get("energy_scale_J", 0.0)) for method, run in known.items()}
+    relative = all(scales.values())
+    return {
+        method: Series(
+            run.array("time"),
+            np.abs(run.array("energy_error")) / (scales[method] if relative else 1.0),
+            look_of(method),
+        )
+        for method, run in known.items()
+    }, relative
+
+
+def joint_gaps(runs: Runs) -> Curves:
+    """Largest position error (m) in a joint, of the runs with redundant coordinates."""
+    return {
+        method: Series(run.array("time"), run.array("constraint_error"), look_of(method))
+        for method, run in runs.items()
+        if "constraint_error" in run
+    }
