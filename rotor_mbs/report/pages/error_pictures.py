@@ -1,4 +1,4 @@
-"""Pictures of errors over time: difference from the reference, energy error, joint gap. A curve per run."""
+"""Pictures of errors over time, such as the difference from the reference and the energy error. A curve per run."""
 
 from __future__ import annotations
 
@@ -67,12 +67,3 @@ def energy_errors(runs: Runs) -> tuple[Curves, bool]:
         )
         for method, run in known.items()
     }, relative
-
-
-def joint_gaps(runs: Runs) -> Curves:
-    """Largest position error (m) in a joint, of the runs with redundant coordinates."""
-    return {
-        method: Series(run.array("time"), run.array("constraint_error"), look_of(method))
-        for method, run in runs.items()
-        if "constraint_error" in run
-    }

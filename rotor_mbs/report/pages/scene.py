@@ -16,6 +16,7 @@ from rotor_mbs.report.core.numbers import number, prefixed, quantity
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages import error_pictures, scene_tables
+from rotor_mbs.report.pages.quantities import quantity_sections
 from rotor_mbs.report.pages.scene_tables import metric
 from rotor_mbs.report.pages.viewer import Viewer, viewer
 from rotor_mbs.report.paper_figures import HEADINGS
@@ -31,7 +32,12 @@ _ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 @dataclass(frozen=True)
 class ScenePage:
-    """A scene. previous, next: file names of the neighbouring pages or ""; source: the comment of the scene file."""
+    """A scene.
+
+    source          the comment at the start of the scene's file
+    quantities      (id, heading, section) of the further quantities that are drawn
+    previous, next  file names of the neighbouring pages, or ""
+    """
 
     name: str
     title: str
@@ -46,6 +52,7 @@ class ScenePage:
     motion: Section
     difference: Section
     energy: Section
+    quantities: Sequence[tuple[str, str, Section]]
     metrics: Section
     has_horizon: bool
     has_errata: bool
@@ -115,6 +122,7 @@ def scene_page(
         motion=motion_section(drawn),
         difference=difference_section(drawn),
         energy=energy_section(drawn),
+        quantities=quantity_sections(scene, drawn.all, drawn.horizon),
         metrics=Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
         has_horizon=drawn.horizon is not None,
         has_errata=has_errata,
@@ -223,7 +231,7 @@ def _rotor_picture(drawn: DrawnRuns) -> list[Picture]:
     caption = f"The rotor's angle alone: {labels[0]}, solid black; {labels[1]}, dashed blue"
     ranges = {label: one.values for label, one in zip(labels, series, strict=True)}
     described = _described("Rotor angle alone", ranges)
-    return [picture(histories.rotor_angles(series, drawn.horizon), "rotor", caption, described)]
+    return [picture(histories.lines(series, "rotor angle (rad)", drawn.horizon), "rotor", caption, described)]
 
 
 def _described(what: str, curves: Mapping[str, Array]) -> str:

@@ -26,6 +26,7 @@ from rotor_mbs.report.core.files import INDEX, page_names, write_pages
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import error_pictures
+from rotor_mbs.report.pages.quantities import plotted_quantities, sizes
 from rotor_mbs.report.pages.scene import motion_of, opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon
 from rotor_mbs.report.plots import time_histories as histories
@@ -276,9 +277,12 @@ def _errors(scene: StoredScene, runs: error_pictures.Runs) -> Section:
         (error_pictures.differences(runs, scene.reference), "largest angle difference (rad)", "difference",
          "Largest angle difference from the reference", horizon(scene)),
         (energy, energy_axis, "energy", "Energy error", None),
-        (error_pictures.joint_gaps(runs), "largest joint gap (m)", "gaps",
-         "Largest position error in a joint of the chain", None),
     ]  # fmt: skip
+    kinds += [
+        (sizes(quantity, runs), plot.axis, quantity.name, plot.title, None)
+        for quantity, plot in plotted_quantities(scene)
+        if plot.logarithmic
+    ]
     pictures: list[Picture] = []
     for curves, axis, name, caption, end in kinds:
         shown = error_pictures.error_picture(curves, axis, name, caption, end)

@@ -84,10 +84,10 @@ def set_range(axes: Any, values: Array) -> None:
         axes.set_ylim(middle - 0.1, middle + 0.1)
 
 
-def rotor_angles(series: Sequence[Series], horizon: float | None) -> Panels:
-    """The rotor's angle of several runs on one axis."""
+def lines(series: Sequence[Series], label: str, horizon: float | None) -> Panels:
+    """The curves on one axis."""
     panels = canvas.panels((2.3,), TIME_AXIS)
-    draw_lines(panels.axes[0], series, "rotor angle (rad)")
+    draw_lines(panels.axes[0], series, label)
     _draw_horizon(panels.axes[0], max((one.time for one in series), key=lambda time: float(time[-1])), horizon)
     return panels
 

@@ -1,0 +1,58 @@
+"""A quantity that an installed package brings has a panel on the scene's page, by its declaration alone."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+from rotor_mbs.report.build import write_report
+
+PACKAGE = """
+from rotor_mbs.solution.quantities import Plot, Quantity
+BROUGHT = (
+    Quantity("shaft_power", ("time",), "W", "power", output="report_test",
+             producer=lambda scene, samples: 1e3 * samples.rates[:, 0], plot=Plot("Power at the shaft", "power (W)")),
+    Quantity("pitch_speed", ("time", "blade"), "rad/s", "pitch speed", output="report_test",
+             producer=lambda scene, samples: samples.rates[:, 1:], plot=Plot("Pitch speeds", "speed (rad/s)")),
+    Quantity("spread", ("time", "blade"), "rad", "distance of the pitches", output="report_test",
+             producer=lambda scene, samples: abs(samples.angles[:, 1:]),
+             plot=Plot("Spread of the pitches", "spread (rad)", logarithmic=True)),
+)
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An installed package with quantities for the output "report_test"."""
+    (tmp_path / "report_test_quantities.py").write_text(PACKAGE)
+    information = tmp_path / "report_test_quantities-1.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: report-test-quantities\nVersion: 1\n")
+    (information / "entry_points.txt").write_text(
+        "[rotor_mbs.quantities]\nreport_test = report_test_quantities:BROUGHT\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+@pytest.mark.usefixtures("package")
+def test_a_stored_quantity_of_another_package_is_drawn(tmp_path: Path) -> None:
+    scene = paper("fig11", samples=101)
+    outputs = ("angles", "rates", "report_test")
+    text = f'outputs = ["angles", "rates", "report_test"]\n{re.sub(r"outputs = .*", "", scene.text)}'
+    scene = replace(scene, outputs=outputs, text=text)
+    runs = [Made(scene, name, rotor(np.sin, np.cos)) for name in ("lagrange/taylor", "exudyn_tree/rk67")]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
+    page = (folder / "paper-fig11.html").read_text(encoding="utf-8")
+    sections = dict(re.findall(r'<section id="quantity-(\w+)">(.*?)</section>', page, re.S))
+    assert list(sections) == ["shaft_power", "pitch_speed", "spread"]
+    assert "<h2>Power at the shaft</h2>" in sections["shaft_power"]
+    assert sections["shaft_power"].count("<figure>") == sections["spread"].count("<figure>") == 1
+    assert sections["pitch_speed"].count("<figure>") == 2  # one for each run
+    assert "blade 3" in sections["pitch_speed"]
+    assert "closed form, Taylor from" in sections["shaft_power"]
