@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rotor_mbs.analysis.methods import ALONE
+from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.store.errata import read_errata
 from rotor_mbs.store.read import Results, StoredScene
 
@@ -41,7 +41,8 @@ def entries(results: Results) -> list[CheckedEntry]:
 
 def effects(scene: StoredScene) -> dict[str, Effect]:
     """By erratum, for those whose run the file has."""
-    return {erratum: _effect(scene.methods[run].attributes) for erratum, run in ALONE.items() if run in scene.methods}
+    found = {erratum: scene.methods.get(name) for erratum, name in errata_methods().items()}
+    return {erratum: _effect(run.attributes) for erratum, run in found.items() if run is not None}
 
 
 def _entry(attributes: Mapping[str, Any]) -> CheckedEntry:

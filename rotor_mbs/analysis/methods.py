@@ -5,17 +5,24 @@ Knows the names of methods only; no numbers.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from rotor_mbs.methods.catalogue import errata_methods, method_names
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 PRINTED = "printed/ode45"
-ALONE = {"E1": "printed_e1/ode45", "E2": "printed_e2/ode45", "E3": "printed_e3/ode45"}
-RIGHT_MODELS = ("lagrange", "exudyn_tree", "exudyn_chain")
 
 
 def model_of(method: str) -> str:
     """ "lagrange" of "lagrange/taylor"."""
     return method.partition("/")[0]
+
+
+def in_catalogue_order(names: Iterable[str]) -> list[str]:
+    """The names as the catalogue has them; after them those that it does not know."""
+    known = method_names()
+    return sorted(names, key=lambda name: known.index(name) if name in known else len(known))
 
 
 def has_samples(run: StoredRun) -> bool:
@@ -30,9 +37,9 @@ def printed_run(scene: StoredScene) -> StoredRun | None:
 
 
 def right_runs(scene: StoredScene) -> dict[str, StoredRun]:
-    """Runs of the right models, closed form first; those without samples too."""
-    found = {name: run for name, run in scene.methods.items() if model_of(name) in RIGHT_MODELS}
-    return dict(sorted(found.items(), key=lambda item: (RIGHT_MODELS.index(model_of(item[0])), item[0])))
+    """Runs of the corrected models, in the order of the catalogue; those without samples too."""
+    corrected = method_names(is_corrected=True)
+    return {name: scene.methods[name] for name in corrected if name in scene.methods}
 
 
 def right_run(scene: StoredScene) -> StoredRun | None:
@@ -44,6 +51,6 @@ def right_run(scene: StoredScene) -> StoredRun | None:
 def in_order(scene: StoredScene) -> dict[str, StoredRun]:
     """All runs as a reader wants them: printed, reference, right models, each erratum alone, others."""
     right = right_runs(scene)
-    first = [PRINTED, REFERENCE, *right, *ALONE.values()]
+    first = [PRINTED, REFERENCE, *right, *errata_methods().values()]
     names = [name for name in first if name in scene.runs]
     return {name: scene.runs[name] for name in [*names, *(name for name in scene.runs if name not in names)]}

@@ -143,8 +143,7 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
 
 def _agreement(scenes: Mapping[str, StoredScene]) -> tuple[Agreement, ...]:
     names = dict.fromkeys(name for scene in scenes.values() for name in methods.right_runs(scene))
-    found = [_worst(name, scenes) for name in names]
-    return tuple(sorted(found, key=lambda a: (methods.RIGHT_MODELS.index(methods.model_of(a.method)), a.method)))
+    return tuple(_worst(name, scenes) for name in methods.in_catalogue_order(names))
 
 
 def _worst(method: str, scenes: Mapping[str, StoredScene]) -> Agreement:

@@ -15,9 +15,10 @@ from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.rehydrate import Rehydrated, rehydrate
+from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import energy_slack, is_held, judge, quantity_bound, quantity_errors
+from rotor_mbs.solution.judgement import energy_slack, judge, quantity_bound, quantity_errors
 from rotor_mbs.solution.metrics import Metrics, compare, energy_scale
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
@@ -83,7 +84,7 @@ def _motion_ends(scene: StoredScene) -> bool:
 def _of_run(run: StoredRun, bounds: Bounds, found: Rehydrated, motion_ends: bool) -> Iterator[Verdict]:
     """A run that stops early and says so is complete where nothing more was to be had of it."""
     says_so = found.run is not None and run.status not in ("ok", "inaccurate")
-    excused = says_so and (motion_ends or not is_held(run.method))
+    excused = says_so and (motion_ends or not is_corrected(run.method))
     faults = [] if excused else found.faults
     look = "; ".join(faults) or "every channel, row and number is there"
     if faults and run.status != "ok":
@@ -94,7 +95,7 @@ def _of_run(run: StoredRun, bounds: Bounds, found: Rehydrated, motion_ends: bool
     yield _status(run, bounds, found, found.run)
     if len(found.run.trajectory.time):
         yield from _of_samples(run, bounds, found.scene, found.run)
-        if is_held(run.method) and run.method != REFERENCE:
+        if is_corrected(run.method) and run.method != REFERENCE:
             yield from _of_corrected_model(run, bounds, found, found.run.trajectory)
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.environment import machine, versions
-from rotor_mbs.methods.catalogue import check_names
-from rotor_mbs.methods.ladders import Ladder, ladders
+from rotor_mbs.methods.catalogue import check_names, ladders
+from rotor_mbs.methods.ladders import Ladder
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.bench import read_curves, write_curves

@@ -99,17 +99,16 @@ class _Model:
 
 
 def _models(scene: Scene) -> list[_Model]:
-    from rotor_mbs.methods.catalogue import METHOD_NAMES, find_method
+    from rotor_mbs.methods.catalogue import methods
 
     models: dict[str, _Model] = {}
-    for name in METHOD_NAMES:
-        model = name.split("/")[0]
-        known = models.setdefault(model, _Model(model, []))
-        known.methods.append(name)
+    for method in methods():
+        known = models.setdefault(method.model, _Model(method.model, []))
+        known.methods.append(method.name)
         if known.items:
             continue
         try:
-            known.items, known.refused = find_method(name).items(scene), ""
+            known.items, known.refused = method.items(scene), ""
         except MethodRefusal as exc:
             known.refused = str(exc)
     return list(models.values())

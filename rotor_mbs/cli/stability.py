@@ -10,9 +10,8 @@ from pathlib import Path
 
 from rotor_mbs.analysis.stability import Cell, cells, summary_lines, unreached
 from rotor_mbs.cli.terminal import ProgressLine
-from rotor_mbs.methods.catalogue import METHOD_NAMES
+from rotor_mbs.methods.catalogue import method_names
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.studies.run import able_methods, run_scenes
 from rotor_mbs.studies.stability_records import complete_records
 
@@ -26,7 +25,7 @@ def stability(arguments: argparse.Namespace) -> int:
     """The suite into one file, then its report. 1 where a claim of the suite fails: see `unreached`."""
     start = time.monotonic()
     scenes = find_scenes(arguments.scenes or SUITE)
-    names = [name for name in METHOD_NAMES if is_held(name)]
+    names = method_names(is_corrected=True)
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
     output: Path = arguments.output
     none: dict[str, list[str]] = {name: [] for name in methods}  # references first, which two scenes have no time for

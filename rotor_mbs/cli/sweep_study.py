@@ -16,9 +16,9 @@ import numpy as np
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.execution.meter import Meter
 from rotor_mbs.execution.pool import Finished, TaskPool, run_in
+from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.sweep_layout import SWEEP_STATUSES
 from rotor_mbs.store.sweep_rows import Receipt, Rows
 from rotor_mbs.store.sweep_store import SweepStore, runs_per_file
@@ -113,10 +113,10 @@ def _summarize(store: SweepStore, kept: int, seconds: float, *, as_json: bool) -
 
 def _exit_status(work: Work, store: SweepStore) -> int:
     """1 where a run of a method that claims to be right is not ok."""
-    held = [is_held(method) for method in work.methods]
+    corrected = [is_corrected(method) for method in work.methods]
     runs = np.arange(work.first, work.last)
     failed = runs[store.statuses != SWEEP_STATUSES.index("ok")] // work.rows
-    return int(any(held[method] for method in set(failed.tolist())))
+    return int(any(corrected[method] for method in set(failed.tolist())))
 
 
 def _tell_estimate(work: Work, engine: TaskPool, arguments: argparse.Namespace) -> int:

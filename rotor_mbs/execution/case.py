@@ -46,7 +46,7 @@ class Case:
     @functools.cached_property
     def key(self) -> str:
         """SHA-256, in hexadecimal, of all that the record depends on."""
-        settings = {**find_method(self.method).DEFAULTS, **self.settings}
+        settings = find_method(self.method).settings.of(self.method, self.settings).as_dict()
         content = {
             "scene": [self.scene.name, self.scene_hash],
             "method": [self.method, {name: str(value) for name, value in settings.items()}],

@@ -10,8 +10,9 @@ import platform
 from pathlib import Path
 
 import rotor_mbs
+from rotor_mbs.methods.catalogue import methods
 
-_PACKAGES = ("exudyn", "heyoka", "numpy", "scipy", "h5py")
+_OWN = ("numpy", "h5py")
 _NUMERICS = ("scenario", "solution", "methods", "models")
 
 
@@ -19,7 +20,7 @@ _NUMERICS = ("scenario", "solution", "methods", "models")
 def versions() -> dict[str, str]:
     """Of this package, of the engines and libraries ("not installed" where one is missing), and of Python."""
     found = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
-    for name in _PACKAGES:
+    for name in dict.fromkeys([name for method in methods() for name in method.distributions] + [*_OWN]):
         try:
             found[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:

@@ -1,16 +1,23 @@
-"""What every model offers, and the one loop that builds, times and observes. Knows no particular model."""
+"""What a method is: one object that says all there is to know of it. Knows no particular model, imports no engine."""
 
 from __future__ import annotations
 
-import gc
-import time
-from collections.abc import Mapping
-from typing import Protocol
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import metadata
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, Protocol
 
-from rotor_mbs.methods.time_limit import time_limit
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Integration, Item, Trajectory
-from rotor_mbs.solution.solution import Solution
+from rotor_mbs.methods.ladders import STEP, Ladder, Look
+from rotor_mbs.methods.settings import Settings
+
+if TYPE_CHECKING:  # reading the catalogue needs none of them
+    from rotor_mbs.scenario.bounds import Bound
+    from rotor_mbs.scenario.scene import Scene
+    from rotor_mbs.solution.record import Integration, Item, Trajectory
+
+__all__ = ["Look", "Method", "Settings", "Solver", "stability_polynomial"]
 
 
 class Solver(Protocol):
@@ -23,48 +30,104 @@ class Solver(Protocol):
         """Samples of the last integration, cut before the first row that is not finite."""
 
 
-class Method(Protocol):
-    """A module that implements a method: its default settings, its items, its solver."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Method:
+    """A model with one integrator.
 
-    DEFAULTS: Mapping[str, object]
-
-    def items(self, scene: Scene) -> list[Item]: ...
-
-    def build(self, scene: Scene, settings: Mapping[str, object]) -> Solver:
-        """Raises MethodRefusal where the method cannot represent the scene."""
-
-
-def solve(
-    name: str,
-    method: Method,
-    scene: Scene,
-    settings: Mapping[str, object],
-    repeats: int = 1,
-    budget_s: float = float("inf"),
-    time_limit_s: float = float("inf"),
-) -> Solution:
-    """Build once, integrate up to `repeats` times while within `budget_s` (garbage collector off), observe once.
-
-    The integrations together end themselves after `time_limit_s`; building (a compiler may be at work) does not count.
-    Raises MethodRefusal as `build` does, OutOfTimeError where a method cannot keep what it reached. An engine's failure
-    is in the result, not an exception.
+    name            "model/integrator", as on the command line and in files
+    label, look     how it is called and drawn in tables and figures; label is "model, integrator"
+    build           (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal where the
+                    method cannot represent the scene
+    items           (scene) -> what is built for it; raises MethodRefusal likewise
+    settings        class of its settings, with units, defaults and ranges
+    is_corrected    whether it claims to solve the correct equations, so that any status but "ok" is a failure
+    is_default      whether it belongs to the set that runs where no method is named
+    erratum         "E1" ...: the one erratum of the printed equations it has; "" for others
+    distributions   packages it needs, by the names they are installed by; `hint` says how to get them
+    fallback        name of the method to take where these are not installed; "" for none
+    order           order of convergence; None where it is not fixed
+    fixed_step      whether the step is the setting `step`
+    stability_function   R(z) of one step for y' = λy, z = hλ; None for adaptive and implicit methods
+    ladders         settings it is benched with
+    cost_scaling    settings of the cost scaling study; None: not part of it
+    relative_cost   run time as a multiple of the fastest method's, roughly: expensive methods are started first
+    bounds          accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml
+    solve_many      (scenes, settings) -> block of runs: a vectorized path for sweeps, or None
+    load            imports what it computes with, and prevents the use of compiled code from an earlier process: before
+                    timings, which exclude both
     """
-    chosen = {**method.DEFAULTS, **settings}
-    start = time.perf_counter()
-    solver = method.build(scene, chosen)
-    setup = time.perf_counter() - start
-    run_times: list[float] = []
-    gc_was_on = gc.isenabled()
-    gc.disable()
+
+    name: str
+    label: str
+    look: Look
+    build: Callable[[Scene, Any], Solver]
+    items: Callable[[Scene], list[Item]]
+    settings: type[Settings] = Settings
+    is_corrected: bool = True
+    is_default: bool = False
+    erratum: str = ""
+    distributions: tuple[str, ...] = ()
+    hint: str = ""
+    fallback: str = ""
+    order: float | None = None
+    fixed_step: bool = False
+    stability_function: Callable[[complex], complex] | None = None
+    ladders: tuple[Ladder, ...] = ()
+    cost_scaling: Mapping[str, object] | None = None
+    relative_cost: float = 1.0
+    bounds: tuple[Bound, ...] = ()
+    solve_many: Callable[[Sequence[Scene], Any], Any] | None = None
+    load: Callable[[], object] = lambda: None
+
+    def __post_init__(self) -> None:
+        """Gives the ladders the name, the label, the look and the order of their method."""
+        object.__setattr__(self, "ladders", tuple(map(self._own, self.ladders)))
+
+    def _own(self, ladder: Ladder) -> Ladder:
+        if ladder.method:
+            return ladder
+        label = f"{self.label}, {ladder.label}" if ladder.label else self.label
+        order = self.order if ladder.kind == STEP else None
+        return replace(ladder, method=self.name, label=label, look=ladder.look or self.look, order=order)
+
+    @property
+    def model(self) -> str:
+        """ "lagrange" of "lagrange/taylor"."""
+        return self.name.partition("/")[0]
+
+    @property
+    def model_label(self) -> str:
+        """ "closed form" of "closed form, Taylor"."""
+        return self.label.partition(",")[0]
+
+    @property
+    def defaults(self) -> dict[str, object]:
+        """Its settings where none are given."""
+        return self.settings().as_dict()
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether all packages it needs are there; none is imported."""
+        return all(map(_is_installed, self.distributions))
+
+
+def _is_installed(distribution: str) -> bool:
+    module = distribution.replace("-", "_")
+    if module in sys.modules:
+        return bool(sys.modules[module])
     try:
-        with time_limit(time_limit_s):
-            while not run_times or (len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s):
-                start = time.perf_counter()
-                integration = solver.integrate()
-                run_times.append(time.perf_counter() - start)
-    finally:
-        if gc_was_on:
-            gc.enable()
-    start = time.perf_counter()
-    trajectory = solver.observe()
-    return Solution(scene, name, trajectory, integration, chosen, setup, run_times, time.perf_counter() - start)
+        return find_spec(module) is not None or metadata.distribution(distribution) is not None
+    except metadata.PackageNotFoundError:
+        return False
+
+
+def stability_polynomial(*coefficients: float) -> Callable[[complex], complex]:
+    """R(z) of an explicit Runge-Kutta method, from its coefficients of z⁰ up."""
+
+    def function(z: complex) -> complex:
+        value = 0j
+        for coefficient in reversed(coefficients):
+            value = value * z + coefficient
+        return value
+
+    return function

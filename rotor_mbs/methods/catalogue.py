@@ -1,91 +1,159 @@
-"""Methods by the names used everywhere; a model's code, and its engine, are loaded when first asked for."""
+"""All methods by the names used everywhere: built-in ones, and those of installed packages (entry points).
+
+A model's code is imported when one of its methods is first asked for; its engine, when a solver is built.
+"""
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
-from collections.abc import Sequence
+import difflib
+import functools
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from importlib import import_module, metadata
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Method
-
-_MODULES = {
-    "printed": "rotor_mbs.models.printed.method",
-    "printed_e1": "rotor_mbs.models.printed.method",
-    "printed_e2": "rotor_mbs.models.printed.method",
-    "printed_e3": "rotor_mbs.models.printed.method",
-    "lagrange": "rotor_mbs.models.lagrange.methods",
-    "exudyn_tree": "rotor_mbs.models.exudyn.methods",
-    "exudyn_chain": "rotor_mbs.models.exudyn.methods",
-}
+from rotor_mbs.methods.ladders import Ladder, Look
 
 REFERENCE = "reference"
+GROUP = "rotor_mbs.methods"
 
-# Modules that are a method each.
-_METHODS = {
-    "lagrange/taylor": "rotor_mbs.models.lagrange.taylor",
-    REFERENCE: "rotor_mbs.models.lagrange.reference",
+# By the object that has them: how the names of its methods begin.
+_BUILT_IN: Mapping[str, tuple[str, ...]] = {
+    "rotor_mbs.models.printed.methods:METHODS": ("printed",),
+    "rotor_mbs.models.lagrange.methods:METHODS": ("lagrange", REFERENCE),
+    "rotor_mbs.models.exudyn.methods:METHODS": ("exudyn",),
 }
 
-METHOD_NAMES = (
-    "printed/ode45",
-    "printed_e1/ode45",
-    "printed_e2/ode45",
-    "printed_e3/ode45",
-    "lagrange/taylor",
-    "lagrange/ode45",
-    "lagrange/dop853",
-    "lagrange/radau",
-    "exudyn_tree/rk44",
-    "exudyn_tree/rk67",
-    "exudyn_tree/dopri5",
-    "exudyn_tree/generalized_alpha",
-    "exudyn_chain/generalized_alpha",
-    "exudyn_chain/newmark_index2",
-)
-
-# What a batch runs where nothing is named: the printed equations, and the three right models at their best.
-DEFAULT_METHODS = ("printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha")
-
-# What each erratum alone does to a scene; the reproduction runs these too.
-ERRATA_METHODS = ("printed_e1/ode45", "printed_e2/ode45", "printed_e3/ode45")
-
-# Where heyoka is not to be had.
-_STAND_INS = {"lagrange/taylor": "lagrange/dop853"}
+_UNKNOWN_LOOK = Look("#666666", ":", "D")
+_log = logging.getLogger("rotor_mbs")
 
 
-def available_defaults() -> tuple[str, ...]:
-    """DEFAULT_METHODS, with a stand-in where an engine is not installed."""
-    missing = importlib.util.find_spec("heyoka") is None
-    return tuple(_STAND_INS.get(name, name) if missing else name for name in DEFAULT_METHODS)
+def methods() -> tuple[Method, ...]:
+    """Every method, in the order of tables and legends; plug-ins last; the reference is not one of them."""
+    built_in = (method for place in _BUILT_IN for method in _load(place) if method.name != REFERENCE)
+    return (*built_in, *_plug_ins().values())
+
+
+def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
+    """Names of all methods, or of those that do (True) or do not (False) claim the corrected equations."""
+    return tuple(method.name for method in methods() if is_corrected in (None, method.is_corrected))
+
+
+def look_up(name: str) -> Method | None:
+    """The method called `name`, "reference" included; None where it is not known here (a file from elsewhere)."""
+    for place, beginnings in _BUILT_IN.items():
+        if name.startswith(beginnings):
+            for method in _load(place):
+                if method.name == name:
+                    return method
+    return _plug_ins().get(name)
 
 
 def find_method(name: str) -> Method:
-    """The method called `name` ("model/integrator" or "reference")."""
-    if name in _METHODS:
-        method: Method = importlib.import_module(_METHODS[name])
-        return method
-    table: dict[str, Method] = importlib.import_module(_MODULES[name.split("/")[0]]).METHODS
-    return table[name]
+    """The method called `name` ("model/integrator" or "reference"). Raises InputError for an unknown name."""
+    method = look_up(name)
+    if method is None:
+        raise InputError(_unknown(name))
+    return method
 
 
 def check_names(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, once each, in order. Raises InputError naming every unknown one and what is allowed."""
-    unknown = [name for name in names if name not in METHOD_NAMES]
+    """The names, once each, in order. Raises InputError with a line for every unknown one."""
+    known = method_names() if names else ()
+    unknown = [name for name in names if name not in known]
     if unknown:
-        allowed = ", ".join(METHOD_NAMES)
-        raise InputError([f"unknown method {name!r}; allowed: {allowed}" for name in unknown])
+        raise InputError([_unknown(name) for name in unknown])
     return tuple(dict.fromkeys(names))
 
 
-def load_engine(name: str) -> None:
-    """Imports what the method called `name` computes with, and lets no compiled code of an earlier process be used.
+def _unknown(name: str) -> str:
+    known = method_names()
+    near = difflib.get_close_matches(name, known, 1, 0.0)
+    return f"unknown method {name!r}; nearest: {', '.join(near)}; allowed: {', '.join(known)}"
 
-    For timings: neither an import nor what happens to lie in a cache on disk belongs to a run.
-    """
-    if name == "lagrange/taylor":
-        importlib.import_module("rotor_mbs.models.lagrange.heyoka_adapter").compile_anew()
-    elif name.startswith("exudyn"):
-        importlib.import_module("rotor_mbs.models.exudyn.adapter")
-    else:
-        importlib.import_module("scipy.integrate")
+
+def is_corrected(name: str) -> bool:
+    """Whether the method called `name` claims the corrected equations; one that is not known here is taken to."""
+    method = look_up(name)
+    return method is None or method.is_corrected
+
+
+def default_methods() -> tuple[str, ...]:
+    """Names of the methods that run where none is named; a fallback in place of one that is not installed."""
+    return tuple(_or_fallback(method) for method in methods() if method.is_default)
+
+
+def _or_fallback(method: Method) -> str:
+    return method.fallback if method.fallback and not method.is_installed else method.name
+
+
+def errata_methods() -> dict[str, str]:
+    """Name of the method that has one erratum of the printed equations alone, by erratum ("E1" ...)."""
+    return {method.erratum: method.name for method in methods() if method.erratum}
+
+
+def ladders(names: Sequence[str] = ()) -> tuple[Ladder, ...]:
+    """Ladders of the methods named, of all where none is named. Raises InputError for a method that has none."""
+    with_ladder = [method for method in methods() if method.ladders]
+    allowed = [method.name for method in with_ladder]
+    without = [name for name in names if name not in allowed]
+    if without:
+        raise InputError([f"no ladder for method {name!r}; allowed: {', '.join(allowed)}" for name in without])
+    return tuple(ladder for method in with_ladder if not names or method.name in names for ladder in method.ladders)
+
+
+def label_of(curve: str) -> str:
+    """How a method, or a variant of one by the name of its curve, is called; its name where it is not known here."""
+    found = look_up(curve) or _variant(curve)
+    return found.label if found else curve
+
+
+def look_of(curve: str) -> Look:
+    """How a method, or a variant of one by the name of its curve, is drawn; in grey where it is not known here."""
+    found = look_up(curve) or _variant(curve)
+    return found.look if found and found.look else _UNKNOWN_LOOK
+
+
+def model_label(model: str) -> str:
+    """How a model is called: "closed form" for "lagrange"; its name where it is not known here."""
+    return next((method.model_label for method in methods() if method.model == model), model)
+
+
+def _variant(curve: str) -> Ladder | None:
+    return next((ladder for ladder in ladders() if ladder.curve == curve), None)
+
+
+def _load(place: str) -> tuple[Method, ...]:
+    module, _, name = place.partition(":")
+    return _as_methods(getattr(import_module(module), name))
+
+
+def _as_methods(found: object) -> tuple[Method, ...]:
+    """Of a Method or several. Raises TypeError for anything else."""
+    several = tuple(found) if isinstance(found, Iterable) else (found,)
+    if not several or not all(isinstance(one, Method) for one in several):
+        raise TypeError(f"{found!r:.60} is no Method and no sequence of them")
+    return several
+
+
+@functools.cache
+def _plug_ins() -> dict[str, Method]:
+    """Methods of other packages by name. One that cannot be loaded is left out, with a warning."""
+    taken = {REFERENCE} | {method.name for place in _BUILT_IN for method in _load(place)}
+    found: dict[str, Method] = {}
+    for point in metadata.entry_points(group=GROUP):
+        try:
+            loaded = _as_methods(point.load())
+        except Exception as exc:  # whatever another package raises must not stop this one
+            _log.warning("plug-in %s of %s left out: %s: %s", point.name, point.value, type(exc).__name__, exc)
+            continue
+        package = (point.dist.name,) if point.dist else ()
+        for method in loaded:
+            if method.name in taken:
+                _log.warning("plug-in %s of %s: method %s left out: name taken", point.name, point.value, method.name)
+                continue
+            taken.add(method.name)
+            found[method.name] = replace(method, distributions=tuple(dict.fromkeys((*method.distributions, *package))))
+    return found

@@ -1,14 +1,20 @@
-"""The settings each method is benched with, from useless to its round-off floor. Knows names and numbers, no engine."""
+"""A method's ladder of settings for the bench: from useless to its round-off floor. Knows numbers, no method."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-
-from rotor_mbs.errors import InputError
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 STEP, TOLERANCE = "step", "tolerance"
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a curve is drawn: colour ("#0072b2"), line ("-", "--", "-.", ":") and marker, in matplotlib's notation."""
+
+    colour: str
+    line: str
+    marker: str
 
 
 @dataclass(frozen=True)
@@ -23,21 +29,29 @@ class Rung:
 class Ladder:
     """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance.
 
-    curve     "model/integrator", with the choices behind it where they are not the default ones
     kind      STEP or TOLERANCE
-    order     expected order of convergence, where the step is fixed
-    choices   settings that stay the same along the ladder
     values    steps as shares of the sample interval, or tolerances; coarse to fine
     fill      the settings that go with one value
+    choices   settings that stay the same along the ladder
+    variant   what follows the method's name in the curve's name; "" where the choices are the default ones
+    label, look     of the variant; the method's where they are left out
+    method, order   name and expected order (None: adaptive step) of the method; filled in by the `Method`
     """
 
-    curve: str
-    method: str
     kind: str
     values: tuple[float, ...]
     fill: Callable[[float], Mapping[str, object]]
-    order: float | None
-    choices: Mapping[str, object]
+    choices: Mapping[str, object] = field(default_factory=dict)
+    variant: str = ""
+    label: str = ""
+    look: Look | None = None
+    method: str = ""
+    order: float | None = None
+
+    @property
+    def curve(self) -> str:
+        """Name of the curve: "model/integrator", and the variant."""
+        return self.method + self.variant
 
     def rungs(self, interval: float) -> tuple[Rung, ...]:
         """The ladder on a scene whose samples are `interval` s apart."""
@@ -45,67 +59,23 @@ class Ladder:
         return tuple(Rung(setting, {**self.choices, **self.fill(setting)}) for setting in settings)
 
 
-def ladders(methods: Sequence[str] = ()) -> tuple[Ladder, ...]:
-    """The ladders of the methods named, of all where none is named. Raises InputError for one that has none."""
-    without = [name for name in methods if name not in _METHODS]
-    if without:
-        raise InputError([f"no ladder for method {name!r}; allowed: {', '.join(_METHODS)}" for name in without])
-    return tuple(ladder for ladder in _LADDERS if not methods or ladder.method in methods)
+def step_ladder(
+    count: int,
+    choices: Mapping[str, object] | None = None,
+    variant: str = "",
+    label: str = "",
+    look: Look | None = None,
+) -> Ladder:
+    """`count` values of the setting `step`, from the sample interval down by halves."""
+    values = tuple(0.5**k for k in range(count))
+    return Ladder(STEP, values, lambda step: {"step": step}, choices or {}, variant, label, look)
 
 
-def _halvings(count: int) -> tuple[float, ...]:
-    return tuple(0.5**k for k in range(count))
+def tolerance_ladder(fill: Callable[[float], Mapping[str, object]], *tolerances: float) -> Ladder:
+    """The settings that `fill` gives for each tolerance, coarse to fine."""
+    return Ladder(TOLERANCE, tolerances, fill)
 
 
-def _step(step: float) -> Mapping[str, object]:
-    return {"step": step}
-
-
-def _pair(tolerance: float) -> Mapping[str, object]:
+def tolerance_pair(tolerance: float) -> Mapping[str, object]:
     """Angles and rates of order one: a hundredth of the relative tolerance is nowhere the larger of the two."""
     return {"relative_tolerance": tolerance, "absolute_tolerance": 0.01 * tolerance}
-
-
-def _fixed_step(method: str, order: float, count: int, **choices: object) -> Ladder:
-    names = [_SHORT.get((name, value), f"{value}") for name, value in choices.items()]
-    curve = "_".join([method, *filter(None, names)])
-    return Ladder(curve, method, STEP, _halvings(count), _step, order, choices)
-
-
-def _adaptive(method: str, fill: Callable[[float], Mapping[str, object]], *tolerances: float) -> Ladder:
-    return Ladder(method, method, TOLERANCE, tolerances, fill, None, {})
-
-
-# A choice in the name of a curve; the default ones leave no trace there.
-_SHORT: Mapping[tuple[str, object], str] = {
-    ("spectral_radius", 0.7): "rho0.7",
-    ("spectral_radius", 0.9): "",
-    ("spectral_radius", 1.0): "rho1.0",
-    ("node", "euler_parameters"): "",
-}
-_RADII = (0.9, 0.7, 1.0)
-_NODES = ("euler_parameters", "rotation_vector")
-
-_LADDERS = (
-    _adaptive(
-        "lagrange/taylor", lambda tol: {"tolerance": tol},
-        1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11, 1e-13, 2.0**-52,
-    ),
-    _adaptive("lagrange/ode45", _pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),
-    _adaptive("lagrange/dop853", _pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14),
-    _adaptive("lagrange/radau", _pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13),
-    _fixed_step("exudyn_tree/rk44", 4, 10),
-    _fixed_step("exudyn_tree/rk67", 6, 8),
-    _adaptive(
-        "exudyn_tree/dopri5", lambda tol: {"relative_tolerance": 0.0, "absolute_tolerance": tol},
-        1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14,
-    ),
-    *(_fixed_step("exudyn_tree/generalized_alpha", 2, 8, spectral_radius=radius) for radius in _RADII),
-    *(
-        _fixed_step("exudyn_chain/generalized_alpha", 2, 7, spectral_radius=radius, node=node)
-        for node, radius in itertools.product(_NODES, _RADII)
-    ),
-    *(_fixed_step("exudyn_chain/newmark_index2", 2, 7, node=node) for node in _NODES),
-)  # fmt: skip
-
-_METHODS = tuple(dict.fromkeys(ladder.method for ladder in _LADDERS))

@@ -34,7 +34,7 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> Choice:
     reason = singular_reason(scene)
     if reason:
         raise MethodRefusal(f"{scene.name}: refused: {reason}; name a method with -m to see what it makes of it")
-    closed_form = next((name for name in defaults if name.startswith("lagrange")), "lagrange/dop853")
+    closed_form = next((name for name in defaults if name.partition("/")[0] == "lagrange"), "lagrange/dop853")
     swing, decay = fastest_rates(scene)
     if decay * scene.duration > _DECAYS and decay > 10.0 * swing:
         return Choice(

@@ -18,6 +18,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.methods.settings import Settings, number
+
 Array = NDArray[np.float64]
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
@@ -104,6 +106,12 @@ class Ode45Result:
         state = self.at(time)
         state[::points] = self.state
         return time, state
+
+
+@dataclass(frozen=True)
+class Ode45Settings(Settings):
+    relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
+    absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
 
 
 def ode45(

@@ -12,6 +12,7 @@ from rotor_mbs.analysis import methods, published
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
+from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report import paper_figures
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, write_pages
@@ -91,7 +92,7 @@ def _prepared(opened: Results) -> tuple[Context, dict[str, str], tuple[str, ...]
 
 
 def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
-    printed = (methods.PRINTED, *methods.ALONE.values())
+    printed = (methods.PRINTED, *errata_methods().values())
     return any(name in scene.methods for scene in scenes.values() for name in printed)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rotor_mbs.analysis import methods
+from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look
 from rotor_mbs.store.read import StoredRun, StoredScene
 
@@ -66,12 +67,12 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """The scene's runs by the keys of HEADINGS, those that have samples of angles and rates."""
     exudyn = [
         run for name, run in methods.right_runs(scene).items()
-        if methods.model_of(name).startswith("exudyn") and methods.has_samples(run)
+        if (method := look_up(name)) and "exudyn" in method.distributions and methods.has_samples(run)
     ]  # fmt: skip
     runs = {
         "printed": methods.printed_run(scene),
         "corrected": methods.right_run(scene),
-        "exudyn": next(iter(sorted(exudyn, key=lambda run: not run.method.startswith("exudyn_tree"))), None),
+        "exudyn": next(iter(exudyn), None),
     }
     found: dict[str, StoredRun] = {}
     for key, run in runs.items():
@@ -133,4 +134,4 @@ def legend(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple
     labels = next(iter(runs.values())).labels if runs else []
     if figure.kind == MOTION:
         return [(label, coordinate_look(i)) for i, label in enumerate(labels)]
-    return [(f"blade {i}", coordinate_look(i)._replace(line="-")) for i in range(1, len(labels))]
+    return [(f"blade {i}", replace(coordinate_look(i), line="-")) for i in range(1, len(labels))]

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import Solver
-from rotor_mbs.methods.catalogue import find_method, load_engine
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import Metrics
@@ -112,7 +112,7 @@ class TimingProcess:
 
     def _prepare(self, point: Point) -> Prepared:
         method = find_method(point.method)
-        settings = {**method.DEFAULTS, **dict(point.settings)}
+        settings = method.settings.of(point.method, dict(point.settings))
         scene, _ = self._scene_of(point)
         setups = []
         for _ in range(2):
@@ -175,7 +175,7 @@ class MakeTimingProcess:
 def only_time(methods: Iterable[str]) -> None:
     """Makes this process one that does nothing but time them: engines loaded, collector off."""
     for method in methods:
-        load_engine(method)
+        find_method(method).load()
     gc.disable()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,11 +13,10 @@ from rotor_mbs.analysis.verdicts import Verdict, verdicts
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import OnProgress, Outcome, compute, ignore_progress
-from rotor_mbs.methods.catalogue import METHOD_NAMES, REFERENCE, available_defaults
+from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.digests import touched
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.check_probes import Measured, perform_probe, probes, speed_probes
@@ -43,9 +41,9 @@ class DefaultSet:
 def default_set() -> DefaultSet:
     """Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method."""
     paper, own = find_scenes(["paper"]), find_scenes(["check"])
-    corrected = [name for name in METHOD_NAMES if is_held(name) and is_available(name)]
+    corrected = [name for name in method_names(is_corrected=True) if is_available(name)]
     methods = {
-        scene.name: [name for name in available_defaults() if name != _CHAIN or scene.name in _CHAIN_SCENES]
+        scene.name: [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
         for scene in paper
     }
     methods |= {scene.name: corrected for scene in own}
@@ -141,7 +139,7 @@ def judge_frozen(bounds: Bounds) -> list[Verdict]:
 
 def is_available(method: str) -> bool:
     """Whether the engine of `method` is installed."""
-    return method != "lagrange/taylor" or importlib.util.find_spec("heyoka") is not None
+    return find_method(method).is_installed
 
 
 def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Verdict]:

@@ -12,12 +12,11 @@ import numpy as np
 
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, Result
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import METHOD_NAMES, REFERENCE, find_method
+from rotor_mbs.methods.catalogue import REFERENCE, method_names
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.studies.check_printed import differences
@@ -87,7 +86,7 @@ def _scene(case: Case, duration: float) -> Scene:
 
 
 def _run(case: Case, scene: Scene, **settings: object) -> Trajectory | None:
-    run = solve(case.method, find_method(case.method), scene, settings)
+    run = solve(case.method, scene, settings)
     return run.trajectory if len(run.trajectory.time) == scene.samples else None
 
 
@@ -141,7 +140,7 @@ def _reference(case: Case) -> list[Measured]:
     """Computed now against frozen; a stand-in is worth its own uncertainty and is held to that."""
     scene = case.scene
     frozen = load_frozen(case.scene.name)
-    found = solve(REFERENCE, find_method(REFERENCE), scene, {}).trajectory
+    found = solve(REFERENCE, scene, {}).trajectory
     look = "the closed form, its coefficients, or a touched file under reference/"
     if len(found.time) != scene.samples or found.angle_uncertainty is None or found.error_growth is None:
         return [Measured("reference", case.scene.name, REFERENCE, "recomputed", math.nan, "rad", look)]
@@ -165,8 +164,7 @@ def _printed(case: Case) -> Iterator[Measured]:
 
 def _rules(case: Case) -> Iterator[Measured]:
     """One number for each hand-made run: 1 where it is called what it is not."""
-    held = tuple(name for name in METHOD_NAMES if is_held(name))
-    for run in known_runs(load_bounds(), held):
+    for run in known_runs(load_bounds(), method_names(is_corrected=True)):
         fault = run.faults()
         look = fault or "called what it is"
         yield Measured("rules", case.scene.name, run.method, run.name, float(bool(fault)), "faults", look)
@@ -185,11 +183,10 @@ def _speed(case: Case) -> list[Measured]:
     The median over fifteen runs: what else the machine does hits both, or one run and not the others.
     """
     scene = _scene(case, 10.0)
-    method = find_method(case.method)
-    solve(case.method, method, scene, {})
+    solve(case.method, scene, {})
     ratios, before = [], _calibration()
     for _ in range(_SPEED_RUNS):
-        run = solve(case.method, method, scene, {}, repeats=3)
+        run = solve(case.method, scene, {}, repeats=3)
         after = _calibration()
         ratios.append(min(run.run_times_s) / (0.5 * (before + after)))
         before = after

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.analysis import conservation as kept
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import energy_scale
@@ -71,7 +70,7 @@ def drift_record(name: str, task: ConservationTask, starts: int = STARTS, durati
 
 
 def _run(scene: Scene, method: str) -> Trajectory:
-    return solve(method, find_method(method), scene, {}).trajectory
+    return solve(method, scene, {}).trajectory
 
 
 def _symmetry(scene: Scene, method: str) -> dict[str, float]:

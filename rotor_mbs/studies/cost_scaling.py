@@ -14,6 +14,7 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import growth_exponent
 from rotor_mbs.execution.servant import Servant, last_core
+from rotor_mbs.methods import catalogue
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Trajectory
@@ -23,20 +24,6 @@ from rotor_mbs.studies.bench_work import Point, TimingProcess, only_time
 
 BLADES = (1, 2, 3, 6, 12, 24, 48)
 DURATIONS = (1.0, 10.0, 60.0, 600.0, 3600.0)
-
-# Settings of medium accuracy, so that the largest sizes are within reach.
-_SETTINGS: Mapping[str, Mapping[str, object]] = {
-    "lagrange/taylor": {"tolerance": 1e-9},
-    "lagrange/ode45": {"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
-    "lagrange/dop853": {"relative_tolerance": 1e-9, "absolute_tolerance": 1e-11},
-    "lagrange/radau": {"relative_tolerance": 1e-5, "absolute_tolerance": 1e-7},
-    "exudyn_tree/rk44": {"step": 5e-3},
-    "exudyn_tree/rk67": {"step": 1e-2},
-    "exudyn_tree/dopri5": {"relative_tolerance": 0.0, "absolute_tolerance": 1e-7},
-    "exudyn_tree/generalized_alpha": {"step": 1e-2},
-    "exudyn_chain/generalized_alpha": {"step": 1e-2, "node": "rotation_vector"},
-    "exudyn_chain/newmark_index2": {"step": 1e-2, "node": "rotation_vector"},
-}
 
 
 @dataclass(frozen=True)
@@ -90,10 +77,14 @@ class _MakeProcess:
 
 def measure_growth(study: Study, methods: Sequence[str], repeats: int, budget_s: float) -> list[Curve]:
     """A curve per method over the sizes: run times, and energy drift as its measure of error."""
-    chosen = [name for name in _SETTINGS if not methods or name in methods]
+    chosen = {
+        method.name: method.cost_scaling
+        for method in catalogue.methods()
+        if method.cost_scaling is not None and (not methods or method.name in methods)
+    }
     points = [
-        [Point(name, name, i, size, tuple(sorted(_SETTINGS[name].items()))) for i, size in enumerate(study.scenes)]
-        for name in chosen
+        [Point(name, name, i, size, tuple(sorted(settings.items()))) for i, size in enumerate(study.scenes)]
+        for name, settings in chosen.items()
     ]
     found = Findings()
     with Servant(_MakeProcess(study, tuple(chosen)), last_core()) as servant:
@@ -101,18 +92,20 @@ def measure_growth(study: Study, methods: Sequence[str], repeats: int, budget_s:
         judge_all(servant, timings, found, budget_s)
     started = time.strftime("%Y-%m-%dT%H:%M:%S")
     return [
-        _curve(study, name, rows(of_method, timings, found), started)
-        for name, of_method in zip(chosen, points, strict=True)
+        _curve(study, name, settings, rows(of_method, timings, found), started)
+        for (name, settings), of_method in zip(chosen.items(), points, strict=True)
     ]
 
 
-def _curve(study: Study, name: str, found: Sequence[Mapping[str, Any]], started: str) -> Curve:
+def _curve(
+    study: Study, name: str, settings: Mapping[str, object], found: Sequence[Mapping[str, Any]], started: str
+) -> Curve:
     arrays = {key: np.array([row[key] for row in found]) for key in found[0] if key != "message"}
     arrays["simulated_s"] = np.array([study.scenes[size].duration for size in arrays["setting"]])
     attributes: dict[str, Any] = {
         "method": name,
         "setting_kind": study.kind,
-        "settings": str(dict(_SETTINGS[name])),
+        "settings": str(dict(settings)),
         "messages": [str(row["message"]) for row in found],
         "started": started,
     }

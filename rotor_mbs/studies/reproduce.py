@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rotor_mbs.execution.environment import numerics_fingerprint
 from rotor_mbs.execution.execute import OnProgress, ignore_progress
-from rotor_mbs.methods.catalogue import ERRATA_METHODS, available_defaults
+from rotor_mbs.methods.catalogue import default_methods, errata_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.errata import errata_fingerprint, write_errata
 from rotor_mbs.store.read import open_results
@@ -18,7 +18,7 @@ from rotor_mbs.studies.run import RunReport, able_methods, run_scenes
 def reproduce(output: Path, *, workers: int, timeout_s: float, on_progress: OnProgress = ignore_progress) -> RunReport:
     """Into the results file `output`; what it has already is kept. Raises InputError, StoreError."""
     scenes = find_scenes(["paper"])
-    names = (*available_defaults(), *ERRATA_METHODS)
+    names = (*default_methods(), *errata_methods().values())
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
     report = run_scenes(scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress)
     _complete_errata(output)

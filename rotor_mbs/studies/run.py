@@ -12,12 +12,12 @@ from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.execution.pool import one_line
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import REFERENCE, available_defaults, find_method
+from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, is_corrected
 from rotor_mbs.methods.selection import choose
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import is_held, judge
+from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import open_results
@@ -28,7 +28,6 @@ from rotor_mbs.studies.frozen import digest, frozen_file, frozen_solution, load_
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
-_SLOW_MODELS = ("exudyn_chain", "printed", "exudyn_tree")
 
 
 @dataclass(frozen=True)
@@ -41,12 +40,12 @@ class RunReport:
     @property
     def failures(self) -> list[Outcome]:
         """Runs that should have succeeded and did not. How far the printed equations get is data, not a failure."""
-        return [one for one in self._with_record() if is_held(one.case.method)]
+        return [one for one in self._with_record() if is_corrected(one.case.method)]
 
     @property
     def broken_off(self) -> list[Outcome]:
         """Runs of the printed equations that did not reach the end."""
-        return [one for one in self._with_record() if not is_held(one.case.method)]
+        return [one for one in self._with_record() if not is_corrected(one.case.method)]
 
     @property
     def not_computed(self) -> list[Outcome]:
@@ -98,17 +97,10 @@ def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
 
 
 def run_cases(scene: Scene, methods: Iterable[str], reference: Case, settings: Mapping[str, object]) -> list[Case]:
-    """A run of the scene by each method. Raises InputError for a setting that a method does not have."""
+    """A run of the scene by each method. Raises InputError for an unknown setting or a value out of range."""
     for name in methods:
-        _refuse_unknown_settings(name, settings)
+        find_method(name).settings.of(name, settings)
     return [Case(scene, name, settings, reference=reference.key) for name in methods]
-
-
-def _refuse_unknown_settings(method: str, settings: Mapping[str, object]) -> None:
-    known = find_method(method).DEFAULTS
-    unknown = [name for name in settings if name not in known]
-    if unknown:
-        raise InputError([f"{method} has no setting {name!r}; allowed: {', '.join(known)}" for name in unknown])
 
 
 def perform_run(job: Job) -> Result:
@@ -117,9 +109,9 @@ def perform_run(job: Job) -> Result:
     if case.method == REFERENCE and "frozen" in case.options:
         run, attributes = frozen_solution(case.scene, case.scene_hash)
     else:
-        method, attributes = find_method(case.method), {}
+        attributes = {}
         try:
-            run = solve(case.method, method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
+            run = solve(case.method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return store_failure(job, "timed_out", str(exc))
         except RotorError as exc:
@@ -157,10 +149,9 @@ def _store_time_out(job: Job, message: str) -> Result:
     return store_failure(job, "timed_out", message)
 
 
-def _slowest_first(case: Case) -> int:
+def _slowest_first(case: Case) -> float:
     """So that no long run starts last and keeps one process busy while the others wait."""
-    model = case.method.split("/")[0]
-    return _SLOW_MODELS.index(model) if model in _SLOW_MODELS else len(_SLOW_MODELS)
+    return -find_method(case.method).relative_cost
 
 
 def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
@@ -190,7 +181,7 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
     reasons: list[str] = []
     for scene in scenes:
         try:
-            choice = choose(scene, available_defaults())
+            choice = choose(scene, default_methods())
         except MethodRefusal as exc:
             methods[scene.name] = []
             reasons.append(str(exc))

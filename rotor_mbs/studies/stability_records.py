@@ -22,7 +22,7 @@ from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.stability import Record, read_records, write_records
 from rotor_mbs.studies.conservation import ConservationTask, perform_conservation
-from rotor_mbs.studies.step_limits import FIXED_STEP, StepTask, has_limit, perform_steps
+from rotor_mbs.studies.step_limits import StepTask, has_limit, perform_steps
 
 Task = StepTask | ConservationTask
 
@@ -78,7 +78,7 @@ def _step_tasks(scenes: Sequence[Scene], found: Sequence[Cell], results: Path) -
     tasks = []
     for cell in found:
         scene = by_name.get(cell.scene)
-        if scene is None or cell.method not in FIXED_STEP or not cell.has_reference:
+        if scene is None or not find_method(cell.method).fixed_step or not cell.has_reference:
             continue
         if cell.is_stiff_or_light or cell.status in ("inaccurate", "diverged", "solver_failed"):
             tasks.append(StepTask("steps", scene, cell.method, results))
@@ -97,7 +97,7 @@ def _conservation_tasks(scenes: Sequence[Scene], methods: Mapping[str, Sequence[
 
 
 def _key(task: Task, references: Mapping[str, str]) -> str:
-    settings = {name: str(value) for name, value in find_method(task.method).DEFAULTS.items()}
+    settings = {name: str(value) for name, value in find_method(task.method).defaults.items()}
     number, reference = scene_hash(task.scene), references.get(task.scene.name, "")
     content = [task.kind, number, task.method, settings, reference, versions(), fingerprint(*_NUMERICS)]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.analysis.step_limits import STABILITY_FUNCTIONS, largest_stable_step, oscillator_modes
-from rotor_mbs.methods.base import solve
+from rotor_mbs.analysis.step_limits import largest_stable_step, oscillator_modes
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import Judgement, judge
@@ -18,13 +18,6 @@ from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.store.stability import STATUSES, Record
 from rotor_mbs.studies.frozen import load_reference
 
-FIXED_STEP = (
-    "exudyn_tree/rk44",
-    "exudyn_tree/rk67",
-    "exudyn_tree/generalized_alpha",
-    "exudyn_chain/generalized_alpha",
-    "exudyn_chain/newmark_index2",
-)
 TARGET = 1e-6  # rad
 
 # A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to take this long.
@@ -56,7 +49,8 @@ def perform_steps(task: StepTask) -> Record:
 
 def has_limit(scene: Scene, method: str) -> bool:
     """Whether theory gives a limit: an explicit method, and a spring in every bearing."""
-    return method in STABILITY_FUNCTIONS and bool(scene.bearing_stiffness) and min(scene.bearing_stiffness) >= 1e6
+    has_function = find_method(method).stability_function is not None
+    return has_function and bool(scene.bearing_stiffness) and min(scene.bearing_stiffness) >= 1e6
 
 
 def _ladder(task: StepTask) -> Record:
@@ -105,7 +99,7 @@ def _judged(task: StepTask, settings: Mapping[str, object], reference: Trajector
     """The verdict and the run time in s; a run over twice the longest one ends itself."""
     try:
         with time_limit(2.0 * _LONGEST_RUN_S):
-            run = solve(task.method, find_method(task.method), task.scene, settings)
+            run = solve(task.method, task.scene, settings)
     except OutOfTimeError as exc:
         return Judgement("timed_out", str(exc), False, {}), 2.0 * _LONGEST_RUN_S
     return judge(task.scene, run, reference), run.run_times_s[0]
@@ -117,7 +111,9 @@ def _limit(task: StepTask) -> Record:
     modes = [mode for i in range(len(scene.blades)) for mode in _modes(scene, i)]
     window = _WINDOW_RADIANS / max(abs(mode) for mode in modes)
     short = replace(scene, duration=window, samples=_INTERVALS + 1, outputs=("angles", "rates"))
-    theory = largest_stable_step(task.method, modes, window, _GROWTH)
+    function = find_method(task.method).stability_function
+    assert function is not None  # see has_limit
+    theory = largest_stable_step(function, modes, window, _GROWTH)
     low = max(1, int(0.5 * window / theory / _INTERVALS))  # steps per interval: too few, enough
     high = 4 * low + 1
     if not _stays(short, task.method, high) or _stays(short, task.method, low):
@@ -148,7 +144,7 @@ def _stays(scene: Scene, method: str, steps: int) -> bool:
     """Whether every pitch keeps within `_GROWTH` times the largest one at the start, to the end."""
     step = scene.duration / (_INTERVALS * steps)
     with time_limit(20.0):
-        run = solve(method, find_method(method), scene, {"step": step})
+        run = solve(method, scene, {"step": step})
     pitches = np.abs(run.trajectory.angles[:, 1:])
     complete = len(pitches) == scene.samples
     return complete and float(pitches.max()) <= _GROWTH * max(map(abs, scene.initial_angles[1:]))

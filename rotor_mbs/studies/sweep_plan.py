@@ -91,7 +91,7 @@ class Work:
                     first, left = end, left - (end - first)
 
     def _chunk(self, variants: Variants, method: str, row: np.dtype[np.void], start: int, end: int) -> Chunk:
-        known = find_method(method).DEFAULTS
+        known = find_method(method).defaults
         settings = {key: value for key, value in self.sweep.settings.items() if key in known}
         return Chunk(variants, method, settings, row, start, self.values(start, end), self.time_limit_s)
 
@@ -164,7 +164,7 @@ def _chosen(sweep: Sweep, methods: Sequence[str]) -> tuple[str, ...]:
 def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> Work:
     """The runs of part k of n (1, 1 for all). Raises InputError, MethodRefusal where a method cannot do them."""
     chosen = _chosen(sweep, methods)
-    known = {key for method in chosen for key in find_method(method).DEFAULTS}
+    known = {key for method in chosen for key in find_method(method).defaults}
     unknown = [key for key in sweep.settings if key not in known]
     if unknown:
         words = f"is no setting of {', '.join(chosen)}; allowed: {', '.join(sorted(known)) or 'none'}"

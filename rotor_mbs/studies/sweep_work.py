@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.base import solve
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.scenario.scene import Scene
@@ -108,7 +108,7 @@ def _solved(chunk: Chunk, scene: Scene) -> Solution | str:
     """The run, or why there is none."""
     try:
         with time_limit(chunk.time_limit_s):
-            return solve(chunk.method, find_method(chunk.method), scene, chunk.settings)
+            return solve(chunk.method, scene, chunk.settings)
     except OutOfTimeError as exc:
         return str(exc)
 
@@ -148,11 +148,10 @@ def _put_extremes(rows: Rows, runs: slice, angles: Array, rates: Array) -> None:
 
 
 def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
-    from rotor_mbs.models.lagrange import taylor
-    from rotor_mbs.models.lagrange.ensemble import solve_many
-
-    settings = {**taylor.DEFAULTS, **chunk.settings}
-    block = solve_many(scenes, float(str(settings["tolerance"])))
+    method = find_method(chunk.method)
+    assert method.solve_many is not None
+    settings = method.settings.of(chunk.method, chunk.settings)
+    block = method.solve_many(scenes, settings)
     assert block.kinetic_energy is not None  # a sweep's scenes ask for the energy
     assert block.potential_energy is not None
     assert block.work is not None
@@ -170,7 +169,6 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for i, word in enumerate(block.words):
         _put_words(rows, i, word, word.time_reached)
     for i in np.flatnonzero(~ok).tolist():
-        _put_verdict(
-            rows, i, scenes[i], Solution(scenes[i], chunk.method, block.trajectory(i), block.words[i], settings)
-        )
+        run = Solution(scenes[i], chunk.method, block.trajectory(i), block.words[i], settings.as_dict())
+        _put_verdict(rows, i, scenes[i], run)
     return rows

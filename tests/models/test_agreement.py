@@ -11,8 +11,7 @@ from support import references
 from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.exact import exact_rotor_angle
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples, running_growth
@@ -32,7 +31,7 @@ def reference(name: str) -> Trajectory:
 def run(scene: Scene, method: str) -> Solution:
     if method == "lagrange/taylor":
         pytest.importorskip("heyoka")
-    return solve(method, find_method(method), scene, {})
+    return solve(method, scene, {})
 
 
 def cut(name: str, growth: float) -> tuple[Scene, Trajectory]:
@@ -111,9 +110,7 @@ def test_the_chain_extrapolated_to_step_zero_follows_the_exact_solution(name: st
     """
     scene = paper(name, outputs=("angles", "rates"))
     newton = {"newton_relative_tolerance": 1e-12, "newton_absolute_tolerance": 1e-13}
-    coarse, fine = (
-        solve(CHAIN, find_method(CHAIN), scene, {"step": step, **newton}).trajectory for step in (1e-3, 5e-4)
-    )
+    coarse, fine = (solve(CHAIN, scene, {"step": step, **newton}).trajectory for step in (1e-3, 5e-4))
     exact = exact_rotor_angle(scene, fine.time)
     assert exact is not None
     assert np.abs((4 * fine.angles[:, 0] - coarse.angles[:, 0]) / 3 - exact[1]).max() <= 1e-10

@@ -7,10 +7,8 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
-from support.exudyn_runs import CHAIN, EXPLICIT, TREE, energy_error, run
+from support.exudyn_runs import CHAIN, EXPLICIT, METHODS, TREE, energy_error, run
 from support.rotors import AXIAL, PAPER, C, D, make_scene, pendulum
-
-from rotor_mbs.models.exudyn.methods import METHODS
 
 # Explicit schemes resolve these slow motions to round-off; order 2 at 2.5e-4 to 5e-4 s leaves h² times the fourth
 # derivative, some 1e-8, and the constraints of the chain their Newton tolerance.

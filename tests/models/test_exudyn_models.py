@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from support.exudyn_runs import CHAIN, EXPLICIT, TREE, energy_error, run
+from support.exudyn_runs import CHAIN, EXPLICIT, METHODS, TREE, energy_error, run
 from support.rotors import (
     FIG08,
     FIG11,
@@ -24,8 +24,7 @@ from support.rotors import (
 from support.scenes import paper
 
 from rotor_mbs.analysis.exact import exact_rotor_angle
-from rotor_mbs.methods.base import solve
-from rotor_mbs.models.exudyn.methods import METHODS
+from rotor_mbs.methods.solve import solve
 
 SHORT = replace(FIG11, duration=1.0, samples=101)
 HEIGHT = 3 * 15000 * 9.8 * D  # J, the energy scale of the paper's rotor
@@ -182,11 +181,11 @@ def test_dopri5_treats_both_signs_alike() -> None:
     scene = make_scene([0.3, 0.5, 0.9], [0.2, 1.0, 0.4], duration=1.0)
     mirrored = replace(scene, initial_angles=(0.3, -0.5, -0.9), initial_rates=(0.2, -1.0, -0.4))
     method = METHODS["exudyn_tree/dopri5"]
-    one, other = (solve("dopri5", method, each, {}) for each in (scene, mirrored))
+    one, other = (solve(method, each, {}) for each in (scene, mirrored))
     assert one.integration.steps == other.integration.steps
     assert np.array_equal(one.trajectory.angles * [1, -1, -1], other.trajectory.angles)
     # the engine's relative tolerance does not: the reason why the default is 0
-    one, other = (solve("dopri5", method, each, {"relative_tolerance": 1e-9}) for each in (scene, mirrored))
+    one, other = (solve(method, each, {"relative_tolerance": 1e-9}) for each in (scene, mirrored))
     assert one.integration.steps != other.integration.steps
 
 
@@ -206,7 +205,7 @@ def test_long_runs_lose_no_sample(step) -> None:
 @pytest.mark.parametrize("name", METHODS)
 def test_repeats_are_bit_identical(name) -> None:
     scene = replace(MIXED, duration=0.2, samples=21, rotor_torque=((0.0, 0.0), (0.0737, 500.0), (0.1, 100.0)))
-    solver = METHODS[name].build(scene, METHODS[name].DEFAULTS)
+    solver = METHODS[name].build(scene, METHODS[name].settings())
     first_word, first = solver.integrate(), solver.observe()
     second_word, second = solver.integrate(), solver.observe()
     assert first_word == second_word

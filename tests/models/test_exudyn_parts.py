@@ -11,12 +11,12 @@ from math import pi
 
 import numpy as np
 import pytest
+from support.exudyn_runs import METHODS
 from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import energy, geometry, observe, timetable
-from rotor_mbs.models.exudyn.methods import METHODS
 
 KINDS = ("node", "object", "marker", "load", "sensor")
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
@@ -45,7 +45,7 @@ def listed(name, scene):
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("name", [TREE, CHAIN])
 def test_the_list_is_what_the_engine_holds(name, scene) -> None:
-    solver = METHODS[name].build(SCENES[scene], METHODS[name].DEFAULTS)
+    solver = METHODS[name].build(SCENES[scene], METHODS[name].settings())
     assert solver.system.counts() == listed(name, SCENES[scene])
 
 
@@ -98,7 +98,7 @@ def test_a_pitch_without_inertia_is_left_out() -> None:
 
 def test_outputs_not_asked_for_are_not_there() -> None:
     for name in (TREE, CHAIN):
-        got = solve(name, METHODS[name], replace(BARE, duration=0.1, samples=11), {}).trajectory
+        got = solve(name, replace(BARE, duration=0.1, samples=11), {}).trajectory
         assert got.tip is None
         assert got.work is None
         assert got.kinetic_energy is None
@@ -111,19 +111,19 @@ def test_outputs_not_asked_for_are_not_there() -> None:
         (TREE, {"step": float("nan")}, "step"),
         (TREE, {"step": True}, "step"),
         (TREE, {"step": 1e-12}, "steps"),
-        (TREE, {"stride": 1.0}, "allowed: step"),
-        (CHAIN, {"node": "tait_bryan"}, "euler_parameters, rotation_vector"),
-        (CHAIN, {"spectral_radius": 1.5}, "0 to 1"),
+        (TREE, {"stride": 1.0}, "no setting 'stride'.*allowed: step"),
+        (CHAIN, {"node": "tait_bryan"}, "euler_parameters or rotation_vector"),
+        (CHAIN, {"spectral_radius": 1.5}, "at least 0 and at most 1"),
     ],
 )
 def test_a_wrong_setting_is_told_with_what_is_allowed(name, settings, said) -> None:
     with pytest.raises(InputError, match=said):
-        METHODS[name].build(FIG08, {**METHODS[name].DEFAULTS, **settings})
+        solve(name, FIG08, settings)
 
 
 def test_samples_the_engine_cannot_tell_apart_are_refused() -> None:
     with pytest.raises(MethodRefusal, match="1e-08 s apart"):
-        METHODS[TREE].build(replace(FIG08, duration=1e-9), {})
+        solve(TREE, replace(FIG08, duration=1e-9), {})
 
 
 # One blade runs into θ = π/2, where nothing holds the rotor: the rates go to infinity at about 0.06 s.
@@ -131,7 +131,7 @@ SINGULAR = make_scene([0.3, 1.2], [0.5, 3.0], duration=1.0)
 
 
 def test_success_with_a_state_that_is_not_finite_is_cut_and_not_hidden() -> None:
-    run = solve("rk44", METHODS["exudyn_tree/rk44"], SINGULAR, {})
+    run = solve("exudyn_tree/rk44", SINGULAR, {})
     assert run.integration.success  # the engine's word
     assert 0 < len(run.trajectory.time) < SINGULAR.samples
     assert np.isfinite(run.trajectory.angles).all()
@@ -141,7 +141,7 @@ def test_success_with_a_state_that_is_not_finite_is_cut_and_not_hidden() -> None
 @pytest.mark.parametrize("name", ["exudyn_tree/dopri5", *(n for n in METHODS if "chain" in n)])
 def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None:
     start = time.perf_counter()
-    run = solve(name, METHODS[name], SINGULAR, {})
+    run = solve(name, SINGULAR, {})
     assert time.perf_counter() - start < 5.0
     assert not run.integration.success
     assert run.integration.message
@@ -154,14 +154,14 @@ def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None
 
 def test_a_failed_solve_leaves_the_next_alone() -> None:
     good = replace(FIG11, duration=0.1, samples=11)
-    before = solve(CHAIN, METHODS[CHAIN], good, {}).trajectory
-    assert not solve(CHAIN, METHODS[CHAIN], SINGULAR, {}).integration.success
-    assert np.array_equal(solve(CHAIN, METHODS[CHAIN], good, {}).trajectory.angles, before.angles)
+    before = solve(CHAIN, good, {}).trajectory
+    assert not solve(CHAIN, SINGULAR, {}).integration.success
+    assert np.array_equal(solve(CHAIN, good, {}).trajectory.angles, before.angles)
 
 
 def test_samples_stand_exactly_at_their_times() -> None:
     scene = replace(FIG11, duration=7.3, samples=334)
-    solver = METHODS[TREE].build(scene, METHODS[TREE].DEFAULTS)
+    solver = METHODS[TREE].build(scene, METHODS[TREE].settings())
     solver.integrate()
     # index times step, not a sum of 12000 steps, which would be off by 1e-12 s
     assert np.abs(solver.system.rows("angles")[:, 0] - np.linspace(0.0, 7.3, 334)).max() < 1e-14
@@ -169,12 +169,12 @@ def test_samples_stand_exactly_at_their_times() -> None:
 
 def test_counts_of_steps_and_evaluations() -> None:
     scene = replace(FIG11, duration=0.1, samples=11)
-    rk44 = solve("", METHODS["exudyn_tree/rk44"], scene, {"step": 3e-3}).integration
+    rk44 = solve("exudyn_tree/rk44", scene, {"step": 3e-3}).integration
     assert (rk44.steps, rk44.rhs_evaluations) == (40, 160)  # four steps of at most 3 ms in each 10 ms
-    alpha = solve("", METHODS[CHAIN], scene, {"step": 1e-3}).integration
+    alpha = solve(CHAIN, scene, {"step": 1e-3}).integration
     assert alpha.steps == 100
     assert alpha.rhs_evaluations >= 200
-    dopri5 = solve("", METHODS["exudyn_tree/dopri5"], scene, {}).integration
+    dopri5 = solve("exudyn_tree/dopri5", scene, {}).integration
     assert dopri5.rhs_evaluations % 7 == 0
     assert dopri5.rhs_evaluations >= 7 * dopri5.steps
 
@@ -182,7 +182,7 @@ def test_counts_of_steps_and_evaluations() -> None:
 def test_ctrl_c_inside_a_solve_is_an_interrupt() -> None:
     scene = replace(FIG11, duration=2.0, samples=201)
     with pytest.raises(KeyboardInterrupt), subprocess.Popen(["sh", "-c", f"sleep 0.5; kill -INT {os.getpid()}"]):
-        solve(CHAIN, METHODS[CHAIN], scene, {"step": 1e-4})
+        solve(CHAIN, scene, {"step": 1e-4})
 
 
 def python(program: str) -> subprocess.CompletedProcess[str]:
@@ -194,12 +194,12 @@ def test_the_tree_runs_without_scipy_heyoka_h5py_and_the_other_models() -> None:
 import sys
 for name in ("scipy", "heyoka", "h5py", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"):
     sys.modules[name] = None
-from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn.methods import METHODS
 from rotor_mbs.scenario.scene import Blade, Scene
 blade = Blade(1.0, (0.1, 0.0, 1.0), (0.0,) * 6, (0.1, 0.0, 2.0))
 scene = Scene("s", "s", (), 9.8, 0.1, 11, ("angles", "rates", "tip", "energy"), (blade,), 1.0, (0.1, 0.2), (0.0, 0.0))
-run = solve("t", METHODS["exudyn_tree/rk67"], scene, {})
+run = solve("exudyn_tree/rk67", scene, {})
 assert run.integration.success and len(run.trajectory.time) == 11
 """
     done = python(program)
@@ -215,7 +215,7 @@ from rotor_mbs.models.exudyn.methods import METHODS
 from rotor_mbs.scenario.scene import Blade, Scene
 blade = Blade(1.0, (0.1, 0.0, 1.0), (0.0,) * 6, (0.1, 0.0, 2.0))
 scene = Scene("s", "s", (), 9.8, 0.1, 11, ("angles", "rates"), (blade,), 1.0, (0.1, 0.2), (0.0, 0.0))
-assert all(method.items(scene) for method in METHODS.values())
+assert all(method.items(scene) for method in METHODS)
 """
     done = python(program)
     assert done.returncode == 0, done.stderr

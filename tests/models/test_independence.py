@@ -14,10 +14,10 @@ for name in {blocked!r}:
     sys.modules[name] = None
 sys.path.insert(0, {tests!r})
 from support.scenes import paper
-from rotor_mbs.methods.base import solve
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.catalogue import find_method
 scene = paper("fig08", duration=0.5, samples=11)
-run = solve({method!r}, find_method({method!r}), scene, {{}})
+run = solve({method!r}, scene, {{}})
 assert run.integration.success and len(run.trajectory.time) == 11
 assert not any(name.split(".")[0] in {blocked!r} and sys.modules[name] for name in sys.modules)
 {more}

@@ -11,8 +11,7 @@ import pytest
 from scipy.special import ellipj, ellipk
 from support.scenes import ARM, GRAVITY, MASS, OFFSET, general, paper
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -30,7 +29,7 @@ TWO = {"initial_angles": (0.1, 0.3, -0.2), "initial_rates": (0.2, 0.1, 0.4)}
 
 @functools.cache
 def run(scene: Scene, method: str = "lagrange/taylor", **settings: float) -> Trajectory:
-    result = solve(method, find_method(method), scene, settings)
+    result = solve(method, scene, settings)
     assert result.integration.success, result.integration.message
     assert len(result.trajectory.time) == scene.samples
     return result.trajectory
@@ -225,13 +224,13 @@ def test_error_growth_is_that_of_neighbouring_runs() -> None:
     assert (growth <= largest * math.sqrt(8) * 1.001).all()  # eight columns: at most √8 of the largest
 
 
-def test_the_stand_in_reference_says_what_it_is_worth() -> None:
-    from rotor_mbs.models.lagrange.fallback_reference import StandInReference
+def test_the_fallback_reference_states_its_uncertainty() -> None:
+    from rotor_mbs.models.lagrange.fallback_reference import FallbackReference
 
     scene = paper("fig11", duration=7.0, samples=701)
-    stand_in = StandInReference(scene)
-    stand_in.integrate()
-    found, true = stand_in.observe(), run(scene, "reference")
+    fallback = FallbackReference(scene)
+    fallback.integrate()
+    found, true = fallback.observe(), run(scene, "reference")
     assert found.angle_uncertainty is not None
     assert found.error_growth is not None
     assert true.error_growth is not None
@@ -269,4 +268,4 @@ def test_ode45_on_the_right_equations_converges_in_its_tolerance() -> None:
 def test_rates_whose_squares_overflow_end_in_words_and_not_in_warnings(method: str) -> None:
     """Warnings are errors here: a run that cannot be followed says so in its result, not on the terminal."""
     scene = find_scenes(["extreme/rate-1e200"])[0]
-    assert judge(scene, solve(method, find_method(method), scene, {}, time_limit_s=5.0), None).status != "ok"
+    assert judge(scene, solve(method, scene, {}, time_limit_s=5.0), None).status != "ok"

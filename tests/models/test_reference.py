@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from support.scenes import PAPER, paper
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.store.read import open_results
@@ -34,7 +33,7 @@ def test_recomputed_is_frozen(name: str) -> None:
     """Quad precision leaves nothing to the machine in a double's digits: equal but for the last bit."""
     pytest.importorskip("heyoka")
     scene = paper(name)
-    found = solve("reference", find_method("reference"), scene, {}).trajectory
+    found = solve("reference", scene, {}).trajectory
     assert found.error_growth is not None
     with open_results(FROZEN) as results:
         reference = results.scenes[scene.name].reference

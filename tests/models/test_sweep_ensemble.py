@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from support.scenes import general, paper
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.models.lagrange import taylor
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.variants import Variants
@@ -90,7 +89,7 @@ def _many_blades(blades: int, count: int) -> list[Scene]:
 def test_runs_side_by_side_are_the_runs_one_by_one(scenes: list[Scene]) -> None:
     block = solve_many(scenes, _EPS)
     for i, scene in enumerate(scenes):
-        single = solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+        single = solve("lagrange/taylor", scene, {"tolerance": _EPS})
         assert block.words[i].success
         assert block.words[i].steps == pytest.approx(single.integration.steps, abs=2)
         for name in _NAMES:
@@ -122,7 +121,7 @@ def test_what_is_not_asked_for_is_not_made(outputs: tuple[str, ...]) -> None:
 
 def test_many_samples_are_evaluated_in_pieces() -> None:
     scene = paper("fig11", duration=1.0, samples=2501)
-    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", scene, {"tolerance": _EPS})
     assert block.tip is not None
     np.testing.assert_allclose(block.tip[0], single.trajectory.tip, rtol=0.0, atol=1e-10)
 
@@ -175,7 +174,7 @@ def test_a_run_that_fails_at_once_has_its_start() -> None:
     scene = replace(
         paper("fig03", duration=1.0, samples=11), initial_angles=(1.0, -np.pi / 2), initial_rates=(0.0, 3.0)
     )
-    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", taylor, scene, {"tolerance": _EPS})
+    block, single = solve_many([scene], _EPS), solve("lagrange/taylor", scene, {"tolerance": _EPS})
     assert block.samples == [1] == [len(single.trajectory.time)]
     np.testing.assert_array_equal(block.angles[0, 0], scene.initial_angles)
 
@@ -200,7 +199,7 @@ def test_a_run_that_breaks_off_ends_alone(gravity: float) -> None:
         for name in _NAMES:
             assert np.isnan(getattr(block, name)[i, n:]).all(), name
         assert block.words[i].time_reached == pytest.approx(3.0 * (n - 1) / 300)
-        single = solve("lagrange/taylor", taylor, scenes[i], {"tolerance": _EPS}).trajectory
+        single = solve("lagrange/taylor", scenes[i], {"tolerance": _EPS}).trajectory
         assert abs(len(single.time) - n) <= 1
 
 

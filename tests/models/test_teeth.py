@@ -13,8 +13,7 @@ import pytest
 from support.references import reference
 from support.scenes import paper
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import Judgement, judge
@@ -36,7 +35,7 @@ def judged(scene: Scene, name: str = "fig09", method: str = "lagrange/dop853") -
     rows = 151
     parts = {part: getattr(exact, part)[:rows] for part in ("time", "angles", "rates", "tip", "error_growth")}
     short = replace(scene, duration=float(exact.time[rows - 1]), samples=rows)
-    return judge(short, solve(method, find_method(method), short, {}), type(exact)(**parts))
+    return judge(short, solve(method, short, {}), type(exact)(**parts))
 
 
 def test_without_a_fault_all_is_well() -> None:
@@ -78,7 +77,7 @@ def test_two_blades_with_their_phases_swapped_are_caught(method: str) -> None:
 
 def test_a_missing_sample_and_a_claim_of_success_are_caught() -> None:
     scene = paper("fig09", duration=1.5, samples=151)
-    run = solve("lagrange/dop853", find_method("lagrange/dop853"), scene, {})
+    run = solve("lagrange/dop853", scene, {})
     for part in ("time", "angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
         setattr(run.trajectory, part, getattr(run.trajectory, part)[:-1])
     verdict = judge(scene, run, None)

@@ -13,8 +13,8 @@ import pytest
 from support.references import reference, run, scene
 from support.scenes import paper
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import METHOD_NAMES, find_method
+from rotor_mbs.methods.catalogue import find_method, method_names
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
 from rotor_mbs.models.exudyn import adapter, chain, readings
 from rotor_mbs.models.exudyn.schemes import Scheme
@@ -23,7 +23,7 @@ from rotor_mbs.models.exudyn.timetable import RotorTorque
 from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution import judgement
-from rotor_mbs.solution.judgement import Judgement, energy_conditioning, is_held, judge
+from rotor_mbs.solution.judgement import Judgement, energy_conditioning, judge
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 
@@ -64,7 +64,7 @@ def made(
 
 
 def test_every_held_method_has_its_bounds_here() -> None:
-    assert set(BOUNDS) == {name for name in METHOD_NAMES if is_held(name)}
+    assert set(BOUNDS) == set(method_names(is_corrected=True))
 
 
 @pytest.mark.parametrize("method", BOUNDS)
@@ -101,7 +101,7 @@ def test_an_unstable_step_is_caught() -> None:
 
 def wrong(one: Scene, method: str, exact: Trajectory | None = None, **settings: object) -> Judgement:
     """The engine reports success; the judgement must not."""
-    return caught(one, solve(method, find_method(method), one, settings), exact)
+    return caught(one, solve(method, one, settings), exact)
 
 
 def caught(one: Scene, found: Solution, exact: Trajectory | None = None) -> Judgement:
@@ -148,7 +148,7 @@ def test_a_solver_stopped_by_its_own_time_out(method: str, monkeypatch: pytest.M
     """It returns True before the end: what counts is the last sample."""
     monkeypatch.setattr(adapter.exudyn.special.solver, "timeout", 0.05)
     one = paper("fig08", duration=1000.0, samples=10_001)
-    found = solve(method, find_method(method), one, {})
+    found = solve(method, one, {})
     assert len(found.trajectory.time) < one.samples
     verdict = caught(one, found)
     assert verdict.status == "diverged"
@@ -205,7 +205,7 @@ def test_ten_steps_a_second_end_without_a_number() -> None:
 def test_ten_steps_a_second_are_told_apart_from_nonsense() -> None:
     """On Fig. 11 they cost RK44 digits (energy off by less than a percent): inaccurate, but a motion like it."""
     one = paper("fig11", samples=101)
-    verdict = judge(one, solve("exudyn_tree/rk44", find_method("exudyn_tree/rk44"), one, {"step": 0.1}), None)
+    verdict = judge(one, solve("exudyn_tree/rk44", one, {"step": 0.1}), None)
     assert (verdict.status, verdict.false_success) == ("inaccurate", False)
 
 
@@ -213,7 +213,7 @@ def test_ten_steps_a_second_are_told_apart_from_nonsense() -> None:
 def test_one_step_of_ten_seconds(method: str) -> None:
     """True with angles of thousands or millions of radians."""
     one = paper("fig11", samples=2)
-    found = solve(method, find_method(method), one, {"step": 10.0})
+    found = solve(method, one, {"step": 10.0})
     assert np.abs(found.trajectory.angles).max() > 1e3
     caught(one, found)
 
@@ -233,7 +233,7 @@ def test_a_run_that_hangs_is_ended_with_what_it_reached() -> None:
 def test_a_long_run_keeps_its_samples_when_ended(method: str) -> None:
     one = replace(scene("extreme/pendulum-million"), duration=5e5, samples=200_001)
     found_method = find_method(method)
-    solver = found_method.build(one, found_method.DEFAULTS)
+    solver = found_method.build(one, found_method.settings())
     with time_limit(1.0):
         integration = solver.integrate()
     assert integration.out_of_time
@@ -266,7 +266,7 @@ def test_a_bound_of_the_classification_widened_tenfold_is_told(bound: Bound, mon
     """What this file requires of the shipped numbers does not hold with one of them widened."""
     wide = [replace(one, value=10.0 * one.value) if one == bound else one for one in load_bounds().entries]
     told = test_an_open_joint_is_caught if bound.check == "gap" else test_the_bounds_are_where_they_are_said_to_be
-    methods = [name for name in METHOD_NAMES if is_held(name) and load_bounds().find(bound.check, name) == bound]
+    methods = [name for name in method_names(is_corrected=True) if load_bounds().find(bound.check, name) == bound]
     assert methods
     judgement.allowed_of.cache_clear()
     for method in methods:

@@ -12,8 +12,7 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.merge import merge
@@ -24,7 +23,7 @@ SCENE = paper("fig08", duration=1.0, samples=51)
 
 
 def made(scene: Scene = SCENE, method: str = "lagrange/dop853") -> Solution:
-    return solve(method, find_method(method), scene, {})
+    return solve(method, scene, {})
 
 
 def stored(path: Path, scene: Scene = SCENE, method: str = "lagrange/dop853", **attributes: object) -> Solution:

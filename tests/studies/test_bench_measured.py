@@ -17,10 +17,10 @@ from support.scenes import paper
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, fitted_order, time_to_reach
 from rotor_mbs.cli import main
 from rotor_mbs.execution.timing import Warm, conduct, statistics
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import METHOD_NAMES, find_method
-from rotor_mbs.methods.ladders import ladders
+from rotor_mbs.methods.catalogue import find_method, ladders, method_names
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.solution.metrics import angle_error
 from rotor_mbs.store.bench import Curve, read_curves
 from rotor_mbs.studies.bench_work import Judged, Point, Prepared, Request, TimingProcess, thinned, thinned_reference
@@ -29,7 +29,7 @@ from rotor_mbs.studies.bench_work import Judged, Point, Prepared, Request, Timin
 def errors_of(method: str, settings: Mapping[str, object], name: str = "fig08", intervals: int = 100) -> float:
     """Largest over the whole run: on fig08 the models keep the resting pitches at exact zero, so no error grows."""
     scene = paper(name, samples=intervals + 1)
-    run = solve(method, find_method(method), scene, settings)
+    run = solve(method, scene, settings)
     exact = thinned_reference(reference(f"paper/{name}"), 1000 // intervals)
     return float(angle_error(run.trajectory, exact).max())
 
@@ -54,7 +54,7 @@ def test_fixed_steps_converge_with_their_order(
     steps = 0.1 * 0.5 ** np.arange(halvings)
     errors = []
     for step in steps:
-        run = solve(method, find_method(method), scene, {"step": float(step), **choices})
+        run = solve(method, scene, {"step": float(step), **choices})
         errors.append(float(angle_error(run.trajectory, exact).max()))
     fitted = fitted_order(steps, np.array(errors))
     assert fitted is not None
@@ -72,13 +72,13 @@ def test_dormand_and_princes_pair_converges_with_order_five() -> None:
 
 def test_every_method_but_the_printed_ones_has_a_ladder_of_six_rungs_or_more() -> None:
     found = ladders()
-    assert {one.method for one in found} == {name for name in METHOD_NAMES if not name.startswith("printed")}
+    assert {one.method for one in found} == set(method_names(is_corrected=True))
     for one in found:
         rungs = one.rungs(0.1)
         assert len(rungs) >= 6
         assert all(a.setting > b.setting for a, b in itertools.pairwise(rungs))
-        known = find_method(one.method).DEFAULTS
-        assert all(set(rung.settings) <= set(known) for rung in rungs)
+        settings = find_method(one.method).settings
+        assert all(settings.of(one.method, rung.settings) for rung in rungs)
     assert len({one.curve for one in found}) == len(found)
 
 
@@ -118,7 +118,6 @@ def test_a_wrong_sign_moves_the_point_to_the_left(monkeypatch: pytest.MonkeyPatc
 
 def test_a_method_made_twice_slower_moves_up_by_two(monkeypatch: pytest.MonkeyPatch) -> None:
     """By a clock that ticks with every evaluation of the equations: no machine's mood in it."""
-    from rotor_mbs.models.lagrange.ode_solvers import PlainSolver
 
     ticks, honest = itertools.count(), closed_form.accelerations
     now = [0]
@@ -133,9 +132,9 @@ def test_a_method_made_twice_slower_moves_up_by_two(monkeypatch: pytest.MonkeyPa
         lambda _: (scene, thinned_reference(reference(f"paper/{'fig09'}"), k)), clock=lambda: float(now[0])
     )
     timing(Request("prepare", DOP853))
-    once = PlainSolver.integrate
+    once = OdeSolver.integrate
     fast = timing(Request("repeat", DOP853))
-    monkeypatch.setattr(PlainSolver, "integrate", lambda solver: (once(solver), once(solver))[1])
+    monkeypatch.setattr(OdeSolver, "integrate", lambda solver: (once(solver), once(solver))[1])
     slow = timing(Request("repeat", DOP853))
     assert isinstance(fast, float)
     assert isinstance(slow, float)
@@ -269,8 +268,8 @@ def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
 
     def product(method: str, key: str) -> Runner:
         def make(setting: float) -> tuple[Callable[[], object], Callable[[], float]]:
-            known = find_method(method).DEFAULTS
-            solver = find_method(method).build(scene, {**known, key: setting})
+            found = find_method(method)
+            solver = found.build(scene, found.settings.of(method, {key: setting}))
             return solver.integrate, lambda: float(angle_error(solver.observe(), exact)[:before].max())
 
         return make

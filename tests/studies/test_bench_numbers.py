@@ -198,8 +198,8 @@ def test_the_overview_names_the_fastest_and_the_next_and_says_so_in_words() -> N
     assert len(words) == 3
     assert words[1] == (
         "To 10⁻⁶ rad the fastest is closed form, Taylor in 1 of 2 scenes (2.0 ms) and Exudyn tree, RK67 in 1 of 2 "
-        "scenes (10 ms); the best of Exudyn's tree takes 5.0 times as long (1 of 2); the best of the closed form takes "
-        "2.0 times as long (1 of 2)."
+        "scenes (10 ms); the best Exudyn tree method takes 5.0 times as long (1 of 2); the best closed form method "
+        "takes 2.0 times as long (1 of 2)."
     )
 
 

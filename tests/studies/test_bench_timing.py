@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from support.scenes import paper
 
 from rotor_mbs.execution.servant import NoAnswerError, Servant
 from rotor_mbs.execution.timing import Timings, Warm, allot, conduct, statistics
+from rotor_mbs.methods.base import Settings
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Integration, Item, Trajectory
 from rotor_mbs.studies import bench_work
@@ -39,12 +40,12 @@ class FakeMethod:
     error: float = 0.0
     success: bool = True
     rows: int = SCENE.samples
-    DEFAULTS: Mapping[str, object] = field(default_factory=dict)
+    settings: type[Settings] = Settings
 
     def items(self, _scene: Scene) -> list[Item]:
         return []
 
-    def build(self, scene: Scene, _settings: Mapping[str, object]) -> FakeMethod:
+    def build(self, scene: Scene, _settings: Settings) -> FakeMethod:
         self.clock.now += 10.0
         self.scene = scene
         return self

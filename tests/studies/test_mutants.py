@@ -19,8 +19,7 @@ from typing import Any
 import pytest
 from support.checking import add_run, failed, judged, results_file, shipped
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 
 # Mutants that neither a verdict nor a test can tell from the original, by module.scope and what is changed, and why.
@@ -162,7 +161,7 @@ def test_every_number_of_a_scene_counts(method: str, share: float, every: int, t
     path = results_file(tmp_path / "numbers.h5", [scene.name], [])
     survivors, count = [], 0
     for name, wrong in list(wrong_scenes(scene, share))[::every]:
-        add_run(path, scene, solve(method, find_method(method), wrong, {}))
+        add_run(path, scene, solve(method, wrong, {}))
         count += 1
         if not failed(judged(path)):
             survivors.append(name)

@@ -29,8 +29,8 @@ from support.scenes import paper
 
 from rotor_mbs.cli import main
 from rotor_mbs.execution.engines import open_engine
-from rotor_mbs.methods.base import solve
-from rotor_mbs.models.lagrange import ensemble, ensemble_samples, taylor
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import ensemble, ensemble_samples
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.system import build_system
 from rotor_mbs.scenario.scene import Scene
@@ -100,10 +100,10 @@ def _bare_loop(folder: Path, samples: int, count: int, *more: str) -> tuple[floa
 def _own_loop(samples: int, count: int) -> tuple[float]:
     """s a run of this package's single runs: with tips, energies and work, nothing stored."""
     scenes = _scenes(samples, count)
-    solve("lagrange/taylor", taylor, scenes[0], {"tolerance": 1e-15})
+    solve("lagrange/taylor", scenes[0], {"tolerance": 1e-15})
     start = time.perf_counter()
     for scene in scenes:
-        solve("lagrange/taylor", taylor, scene, {"tolerance": 1e-15})
+        solve("lagrange/taylor", scene, {"tolerance": 1e-15})
     return ((time.perf_counter() - start) / count,)
 
 

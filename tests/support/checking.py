@@ -10,8 +10,7 @@ from unittest import mock
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.verdicts import Verdict
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
 from rotor_mbs.scenario.bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -101,8 +100,8 @@ def faulty_run(check_name: str, scene: Scene, method: str, share: float) -> Solu
     """The run of a model that has the fault. For the energy balance: its energies do not have it."""
     if check_name == "gap":
         with _wrong_seat(share):
-            return solve(method, find_method(method), scene, {})
-    run = solve(method, find_method(method), WRONG[check_name](scene, share), {})
+            return solve(method, scene, {})
+    run = solve(method, WRONG[check_name](scene, share), {})
     if check_name == "energy":
         motion = run.trajectory
         motion.kinetic_energy = kinematics.kinetic_energy(scene, motion.angles, motion.rates)

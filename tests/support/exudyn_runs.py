@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.models.exudyn.methods import METHODS
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.exudyn import methods
 
+METHODS = {method.name: method for method in methods.METHODS}
 TREE = [name for name in METHODS if name.startswith("exudyn_tree")]
 CHAIN = [name for name in METHODS if name.startswith("exudyn_chain")]
 EXPLICIT = TREE[:3]
 
 
 def run(name, scene, **settings):
-    result = solve(name, METHODS[name], scene, settings)
+    result = solve(name, scene, settings)
     assert result.integration.success, result.integration.message
     assert len(result.trajectory.time) == scene.samples
     return result.trajectory

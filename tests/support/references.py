@@ -6,8 +6,7 @@ import functools
 
 import pytest
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.scenario.scene import Scene
@@ -35,4 +34,4 @@ def reference(name: str) -> Trajectory:
 def run(one: Scene, method: str = TAYLOR, **settings: object) -> Solution:
     if method == TAYLOR:
         pytest.importorskip("heyoka")
-    return solve(method, find_method(method), one, settings)
+    return solve(method, one, settings)

@@ -1,15 +1,20 @@
-"""The six methods of this package: two models, each with its integrators, under the names used everywhere.
+"""The six methods of this package: two models, each with its integrators.
 
 Listing what a method builds needs no engine; the engine is loaded when a system is built.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from itertools import product
+from typing import Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import Method, Solver
+from rotor_mbs.methods.base import Look, Method, Solver, stability_polynomial
+from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
+from rotor_mbs.methods.settings import Settings, choice
 from rotor_mbs.models.exudyn import blueprint, chain, readings, schemes, tree
 from rotor_mbs.models.exudyn.energy import work_needs_rows
 from rotor_mbs.models.exudyn.timetable import RotorTorque
@@ -20,83 +25,149 @@ from rotor_mbs.solution.record import Item
 _SHORTEST_INTERVAL = 1e-8
 _MOST_STEPS = 1e9
 
+MakeScheme = Callable[[Any], schemes.Scheme]
 
-@dataclass
-class TreeMethod:
-    """The kinematic tree with one integrator."""
 
-    scheme: Callable[[schemes.Settings], schemes.Scheme]
-    DEFAULTS: Mapping[str, object] = field(default_factory=dict)
+@dataclass(frozen=True)
+class ChainAlphaSettings(schemes.AlphaSettings):
+    step: float = schemes.step(5e-4)
+    node: str = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
 
-    def items(self, scene: Scene) -> list[Item]:
-        return blueprint.items(tree.parts(scene, RotorTorque(scene)))
 
-    def build(self, scene: Scene, settings: Mapping[str, object]) -> Solver:
+@dataclass(frozen=True)
+class ChainNewmarkSettings(schemes.NewtonSettings):
+    node: str = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
+
+
+def _tree_items(scene: Scene) -> list[Item]:
+    return blueprint.items(tree.parts(scene, RotorTorque(scene)))
+
+
+def _chain_items(scene: Scene) -> list[Item]:
+    return blueprint.items(chain.parts(scene, RotorTorque(scene), chain.NODES[0]))
+
+
+def _tree(make: MakeScheme) -> Callable[[Scene, Settings], Solver]:
+    """Builds the kinematic tree with one integrator."""
+
+    def build(scene: Scene, settings: Settings) -> Solver:
         from rotor_mbs.models.exudyn.solver import MultibodySolver
 
-        scheme = _checked(self.scheme, self.DEFAULTS, scene, settings)
+        scheme = _scheme(make, scene, settings)
         torque = RotorTorque(scene)
         between = scene.wants("energy") and work_needs_rows(scene)
         parts = tree.parts(scene, torque)
         return MultibodySolver(scene, parts, torque, scheme, readings.tree_trajectory, between)
 
+    return build
 
-@dataclass
-class ChainMethod:
-    """The chain of rigid bodies with one integrator."""
 
-    scheme: Callable[[schemes.Settings], schemes.Scheme]
-    DEFAULTS: Mapping[str, object] = field(default_factory=dict)
+def _chain(make: MakeScheme) -> Callable[[Scene, Any], Solver]:
+    """Builds the chain of rigid bodies with one integrator."""
 
-    def items(self, scene: Scene) -> list[Item]:
-        return blueprint.items(chain.parts(scene, RotorTorque(scene), str(self.DEFAULTS["node"])))
-
-    def build(self, scene: Scene, settings: Mapping[str, object]) -> Solver:
+    def build(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
         from rotor_mbs.models.exudyn.solver import MultibodySolver
 
-        scheme = _checked(self.scheme, self.DEFAULTS, scene, settings)
-        node = {**self.DEFAULTS, **settings}["node"]
-        if node not in chain.NODES:
-            raise InputError(f"setting node: {node!r} is not known; allowed: {', '.join(chain.NODES)}")
+        scheme = _scheme(make, scene, settings)
         torque = RotorTorque(scene)
-        parts = chain.parts(scene, torque, str(node))
+        parts = chain.parts(scene, torque, settings.node)
         # Its angles are unwrapped from row to row, so rows are kept between samples.
         return MultibodySolver(scene, parts, torque, scheme, readings.chain_trajectory, rows_between=True)
 
+    return build
 
-def _checked(
-    make: Callable[[schemes.Settings], schemes.Scheme],
-    defaults: Mapping[str, object],
-    scene: Scene,
-    settings: Mapping[str, object],
-) -> schemes.Scheme:
-    """The scheme. Raises InputError for a wrong setting, MethodRefusal for a scene the engine cannot sample."""
-    unknown = [name for name in settings if name not in defaults]
-    if unknown:
-        raise InputError([f"setting {name}: not known here; allowed: {', '.join(defaults)}" for name in unknown])
+
+def _scheme(make: MakeScheme, scene: Scene, settings: Settings) -> schemes.Scheme:
+    """Raises InputError for too short a step, MethodRefusal for a scene the engine cannot sample."""
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
-        raise MethodRefusal(f"Exudyn cannot tell samples less than {_SHORTEST_INTERVAL:g} s apart")
-    scheme = make({**defaults, **settings})
+        raise MethodRefusal(f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart")
+    scheme = make(settings)
     if scheme.step is not None and scene.duration / scheme.step > _MOST_STEPS:
         raise InputError(f"setting step: {scheme.step:g} s makes more than {_MOST_STEPS:g} steps")
     return scheme
 
 
-_NEWTON = {"newton_relative_tolerance": 1e-8, "newton_absolute_tolerance": 1e-10}
+def _method(model: str, integrator: str, label: str, build: Callable[[Scene, Any], Solver], **facts: Any) -> Method:
+    """What all six have in common."""
+    in_tree = model == "exudyn_tree"
+    return Method(
+        name=f"{model}/{integrator}",
+        label=f"Exudyn {'tree' if in_tree else 'chain'}, {label}",
+        build=build,
+        items=_tree_items if in_tree else _chain_items,
+        distributions=("exudyn",),
+        hint="pip install exudyn",
+        relative_cost=10.0 if in_tree else 100.0,
+        load=lambda: import_module("rotor_mbs.models.exudyn.adapter"),
+        **facts,
+    )
 
-METHODS: dict[str, Method] = {
-    "exudyn_tree/rk44": TreeMethod(schemes.rk44, {"step": 2.5e-4}),
-    "exudyn_tree/rk67": TreeMethod(schemes.rk67, {"step": 6.7e-4}),
-    "exudyn_tree/dopri5": TreeMethod(
-        schemes.dopri5, {"relative_tolerance": 0.0, "absolute_tolerance": 1e-11, "trial_steps": 10_000}
+
+_ORANGE, _YELLOW, _GREEN, _PURPLE = "#d55e00", "#e69f00", "#009e73", "#cc79a7"
+
+# Of a spectral radius: what the names of its curves have, and the line, of tree and of chain. 0.9 is the default.
+_RADII = {0.9: ("", "", "-", "-."), 0.7: ("_rho0.7", "ρ∞ 0.7", "--", "--"), 1.0: ("_rho1.0", "ρ∞ 1", ":", ":")}
+# Of a kind of node: the same, and the marker of generalized-α.
+_NODES = {"euler_parameters": ("", "", "^"), "rotation_vector": ("_rotation_vector", "rotation vector", ">")}
+
+_TREE_ALPHA_LADDERS = tuple(
+    step_ladder(8, {"spectral_radius": radius}, variant, label, Look(_YELLOW, line, "^"))
+    for radius, (variant, label, line, _) in _RADII.items()
+)
+_CHAIN_ALPHA_LADDERS = tuple(
+    step_ladder(
+        7,
+        {"spectral_radius": radius, "node": node},
+        of_radius[0] + of_node[0],
+        ", ".join(filter(None, (of_radius[1], of_node[1]))),
+        Look(_GREEN, of_radius[3], of_node[2]),
+    )
+    for (node, of_node), (radius, of_radius) in product(_NODES.items(), _RADII.items())
+)
+_NEWMARK_LADDERS = (
+    step_ladder(7, {"node": "euler_parameters"}),
+    step_ladder(7, {"node": "rotation_vector"}, "_rotation_vector", "rotation vector", Look(_PURPLE, ":", "p")),
+)
+
+METHODS = (
+    _method(
+        "exudyn_tree", "rk44", "RK44", _tree(schemes.rk44),
+        look=Look(_YELLOW, "-.", "P"), settings=schemes.Rk44Settings, order=4, fixed_step=True,
+        stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
+        ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
     ),
-    "exudyn_tree/generalized_alpha": TreeMethod(
-        schemes.generalized_alpha, {"step": 2.5e-4, "spectral_radius": 0.9, **_NEWTON}
+    _method(
+        "exudyn_tree", "rk67", "RK67", _tree(schemes.rk67),
+        look=Look(_ORANGE, "--", "s"), settings=schemes.Rk67Settings, order=6, fixed_step=True, is_default=True,
+        # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
+        # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
+        stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
+        ladders=(step_ladder(8),), cost_scaling={"step": 1e-2},
     ),
-    "exudyn_chain/generalized_alpha": ChainMethod(
-        schemes.generalized_alpha, {"step": 5e-4, "spectral_radius": 0.9, "node": "euler_parameters", **_NEWTON}
+    _method(
+        "exudyn_tree", "dopri5", "DOPRI5", _tree(schemes.dopri5),
+        look=Look(_ORANGE, "-", "<"), settings=schemes.Dopri5Settings,
+        ladders=(
+            tolerance_ladder(
+                lambda tol: {"relative_tolerance": 0.0, "absolute_tolerance": tol},
+                1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14,
+            ),
+        ),
+        cost_scaling={"relative_tolerance": 0.0, "absolute_tolerance": 1e-7},
     ),
-    "exudyn_chain/newmark_index2": ChainMethod(
-        schemes.newmark_index2, {"step": 2.5e-4, "node": "euler_parameters", **_NEWTON}
+    _method(
+        "exudyn_tree", "generalized_alpha", "generalized-α", _tree(schemes.generalized_alpha),
+        look=Look(_YELLOW, "-", "^"), settings=schemes.AlphaSettings, order=2, fixed_step=True,
+        ladders=_TREE_ALPHA_LADDERS, cost_scaling={"step": 1e-2},
     ),
-}
+    _method(
+        "exudyn_chain", "generalized_alpha", "generalized-α", _chain(schemes.generalized_alpha),
+        look=Look(_GREEN, "-.", "^"), settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
+        ladders=_CHAIN_ALPHA_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
+    ),
+    _method(
+        "exudyn_chain", "newmark_index2", "Newmark index 2", _chain(schemes.newmark_index2),
+        look=Look(_PURPLE, "-", "D"), settings=ChainNewmarkSettings, order=2, fixed_step=True,
+        ladders=_NEWMARK_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
+    ),
+)  # fmt: skip

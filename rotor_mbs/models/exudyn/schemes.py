@@ -5,13 +5,11 @@ Knows no engine and no model.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from rotor_mbs.errors import InputError
-
-Settings = Mapping[str, object]
+from rotor_mbs.methods.settings import Settings, number
 
 
 @dataclass(frozen=True)
@@ -19,7 +17,7 @@ class Scheme:
     """A time integration: the engine's name of the solver, its stages (0: implicit), its options by dotted path.
 
     step is the largest step in s, or None where the scheme chooses its own; it is then given up after `trial_steps`
-    trials within one leg (the engine itself repeats a rejected smallest step for ever).
+    trials within one integration interval (the engine itself repeats a rejected smallest step for ever).
     """
 
     solver: str
@@ -29,21 +27,57 @@ class Scheme:
     trial_steps: int = 0
 
 
+def step(default: float) -> Any:
+    """The setting `step`, s."""
+    return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
+
+
+@dataclass(frozen=True)
+class Rk44Settings(Settings):
+    step: float = step(2.5e-4)
+
+
+@dataclass(frozen=True)
+class Rk67Settings(Settings):
+    step: float = step(6.7e-4)
+
+
+@dataclass(frozen=True)
+class Dopri5Settings(Settings):
+    relative_tolerance: float = number(0.0, at_least=0.0, doc="of the local error")
+    absolute_tolerance: float = number(1e-11, above=0.0, doc="of the local error, rad and rad/s")
+    trial_steps: int = number(10_000, at_least=1, doc="trial steps between two samples after which a run is given up")
+
+
+@dataclass(frozen=True)
+class NewtonSettings(Settings):
+    """Of an implicit scheme."""
+
+    step: float = step(2.5e-4)
+    newton_relative_tolerance: float = number(1e-8, above=0.0, doc="of Newton's residual")
+    newton_absolute_tolerance: float = number(1e-10, above=0.0, doc="of Newton's residual")
+
+
+@dataclass(frozen=True)
+class AlphaSettings(NewtonSettings):
+    spectral_radius: float = number(0.9, at_least=0.0, at_most=1.0, doc="damping of high frequencies: 1 is none")
+
+
 # Stage evaluations are all that is needed: one more at the end of a step would only serve to print accelerations.
 _EXPLICIT = {"explicit.computeEndOfStepAccelerations": False, "explicit.useLieGroupIntegration": False}
 
 
-def rk44(settings: Settings) -> Scheme:
+def rk44(settings: Rk44Settings) -> Scheme:
     """Classical Runge-Kutta, order 4."""
-    return Scheme("RK44", 4, _EXPLICIT, _number(settings, "step"))
+    return Scheme("RK44", 4, _EXPLICIT, settings.step)
 
 
-def rk67(settings: Settings) -> Scheme:
+def rk67(settings: Rk67Settings) -> Scheme:
     """Butcher's seven stages, order 6."""
-    return Scheme("RK67", 7, _EXPLICIT, _number(settings, "step"))
+    return Scheme("RK67", 7, _EXPLICIT, settings.step)
 
 
-def dopri5(settings: Settings) -> Scheme:
+def dopri5(settings: Dopri5Settings) -> Scheme:
     """Dormand-Prince 5(4) with the engine's step control.
 
     The engine scales the error by absolute + relative · max(x, x_new) and takes no magnitude of x: the scale vanishes
@@ -53,47 +87,34 @@ def dopri5(settings: Settings) -> Scheme:
     options = {
         **_EXPLICIT,
         "automaticStepSize": True,
-        "relativeTolerance": _number(settings, "relative_tolerance", zero_allowed=True),
-        "absoluteTolerance": _number(settings, "absolute_tolerance"),
+        "relativeTolerance": settings.relative_tolerance,
+        "absoluteTolerance": settings.absolute_tolerance,
         "minimumStepSize": 1e-14,
         "stepSizeMaxIncrease": 5.0,
     }
-    return Scheme("DOPRI5", 7, options, None, round(_number(settings, "trial_steps")))
+    return Scheme("DOPRI5", 7, options, None, settings.trial_steps)
 
 
-def generalized_alpha(settings: Settings) -> Scheme:
+def generalized_alpha(settings: AlphaSettings) -> Scheme:
     """Generalized-alpha, constraints at position level (index 3), order 2."""
-    radius = _number(settings, "spectral_radius", zero_allowed=True)
-    if radius > 1.0:
-        raise InputError(f"setting spectral_radius: {radius!r} is above 1; allowed: 0 to 1")
-    options = {**_newton(settings), "generalizedAlpha.spectralRadius": radius}
-    return Scheme("GeneralizedAlpha", 0, options, _number(settings, "step"))
+    options = {**_newton(settings), "generalizedAlpha.spectralRadius": settings.spectral_radius}
+    return Scheme("GeneralizedAlpha", 0, options, settings.step)
 
 
-def newmark_index2(settings: Settings) -> Scheme:
+def newmark_index2(settings: NewtonSettings) -> Scheme:
     """The trapezoidal rule, constraints at velocity level (index 2), order 2."""
     options = {
         **_newton(settings),
         "generalizedAlpha.useNewmark": True,
         "generalizedAlpha.useIndex2Constraints": True,
     }
-    return Scheme("GeneralizedAlpha", 0, options, _number(settings, "step"))
+    return Scheme("GeneralizedAlpha", 0, options, settings.step)
 
 
-def _newton(settings: Settings) -> dict[str, object]:
+def _newton(settings: NewtonSettings) -> dict[str, object]:
     """Newton's tolerances; one Jacobian in each step costs less than the iterations that an old one takes."""
     return {
-        "newton.relativeTolerance": _number(settings, "newton_relative_tolerance"),
-        "newton.absoluteTolerance": _number(settings, "newton_absolute_tolerance"),
+        "newton.relativeTolerance": settings.newton_relative_tolerance,
+        "newton.absoluteTolerance": settings.newton_absolute_tolerance,
         "newton.modifiedNewtonJacUpdatePerStep": True,
     }
-
-
-def _number(settings: Settings, name: str, *, zero_allowed: bool = False) -> float:
-    value = settings[name]
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
-        number = float(value)
-        if number > 0.0 or (zero_allowed and number == 0.0):
-            return number
-    allowed = "a finite number, 0 or above" if zero_allowed else "a finite number above 0"
-    raise InputError(f"setting {name}: {value!r} is not allowed; allowed: {allowed}")

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.methods.base import solve
-from rotor_mbs.models.lagrange import ensemble_samples, taylor
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import ensemble_samples
 from rotor_mbs.models.lagrange.compile_lock import one_at_a_time
 from rotor_mbs.models.lagrange.ensemble_samples import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
@@ -128,7 +128,7 @@ def _groups(machines: Sequence[_Machine]) -> Iterator[list[int]]:
 
 def _single(scene: Scene, tolerance: float) -> Any:
     """A torque that changes is integrated piece by piece, which runs in one batch would do at different times."""
-    return solve("lagrange/taylor", taylor, scene, {"tolerance": tolerance})
+    return solve("lagrange/taylor", scene, {"tolerance": tolerance})
 
 
 def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:

@@ -1,4 +1,4 @@
-"""A reference where heyoka is not to be had: DOP853 at its tightest, with the larger uncertainty that it has."""
+"""A reference where heyoka is not installed: DOP853 at its tightest, with the larger uncertainty that it has."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.models.lagrange.integrators import scipy_integrator
-from rotor_mbs.models.lagrange.ode_solvers import PlainSolver
+from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.models.lagrange.rate_units import rate_units
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
@@ -20,14 +20,12 @@ _LOOSER = (2.3e-12, 1e-14)
 _PERTURBATION = 1e-9
 
 
-class StandInReference:
+class FallbackReference:
     """Two DOP853 runs, and one more for each initial value, perturbed, to see how errors grow."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._runs = [
-            PlainSolver(scene, scipy_integrator("DOP853", *tolerances)) for tolerances in (_TIGHTEST, _LOOSER)
-        ]
+        self._runs = [OdeSolver(scene, scipy_integrator("DOP853", *tolerances)) for tolerances in (_TIGHTEST, _LOOSER)]
 
     def integrate(self) -> Integration:
         best, _ = (run.integrate() for run in self._runs)
@@ -52,7 +50,7 @@ class StandInReference:
         by_column = np.stack([np.ones(len(moving)), moving], axis=1).ravel()  # the neighbours' order
         columns = []
         for neighbour in _neighbours(self._scene):
-            solver = PlainSolver(neighbour, scipy_integrator("DOP853", *_TIGHTEST))
+            solver = OdeSolver(neighbour, scipy_integrator("DOP853", *_TIGHTEST))
             solver.integrate()
             near = solver.observe()
             column = np.full_like(state, np.inf)

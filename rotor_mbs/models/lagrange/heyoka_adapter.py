@@ -16,16 +16,16 @@ from rotor_mbs.errors import MethodRefusal
 LEAST_LANES = 2
 
 
+HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge elsewhere"
+
+
 @functools.cache
 def heyoka() -> ModuleType:
     """The engine, imported when first asked for. Raises MethodRefusal with the way to get it."""
     try:
         import heyoka as engine
     except ImportError as exc:
-        raise MethodRefusal(
-            "heyoka is not installed: it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge "
-            "elsewhere; lagrange/dop853 needs SciPy only"
-        ) from exc
+        raise MethodRefusal(f"heyoka is not installed: {HINT}; lagrange/dop853 needs SciPy only") from exc
     return engine  # type: ignore[no-any-return]
 
 

@@ -1,15 +1,135 @@
-"""The closed form on plain floats, by method. Importing this does not load SciPy."""
+"""The methods of the closed form. Importing this loads neither heyoka nor SciPy."""
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
-from rotor_mbs.methods.base import Method
+import numpy as np
+
+from rotor_mbs.methods.base import Look, Method
+from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
+from rotor_mbs.methods.settings import Settings, number
+from rotor_mbs.models.lagrange import heyoka_adapter, reference, samples, taylor
 from rotor_mbs.models.lagrange.integrators import ode45_integrator, scipy_integrator
-from rotor_mbs.models.lagrange.ode_solvers import PlainMethod
+from rotor_mbs.models.lagrange.ode_solvers import Integrator, OdeSolver
+from rotor_mbs.models.ode45 import Ode45Settings
+from rotor_mbs.scenario.scene import Scene
 
-METHODS: dict[str, Method] = {
-    "lagrange/ode45": PlainMethod(ode45_integrator, 1e-6, 1e-9),
-    "lagrange/dop853": PlainMethod(partial(scipy_integrator, "DOP853"), 3e-14, 1e-16),
-    "lagrange/radau": PlainMethod(partial(scipy_integrator, "Radau"), 1e-8, 1e-11),
-}
+_EPS = float(np.finfo(float).eps)
+_BLUE, _LIGHT_BLUE = "#0072b2", "#56b4e9"
+
+
+@dataclass(frozen=True)
+class TaylorSettings(Settings):
+    tolerance: float = number(_EPS, above=0.0, doc="of the local error, absolute and relative")
+
+
+@dataclass(frozen=True)
+class ReferenceSettings(Settings):
+    tolerance: float = number(1e-33, above=0.0, doc="of the run that is kept")
+    check_tolerance: float = number(1e-30, above=0.0, doc="of the run whose distance is the uncertainty")
+
+
+def _relative(default: float) -> Any:
+    # SciPy raises a smaller one to this value.
+    return number(default, at_least=100.0 * _EPS, doc="relative tolerance of the local error")
+
+
+def _absolute(default: float) -> Any:
+    return number(default, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
+
+
+@dataclass(frozen=True)
+class Dop853Settings(Settings):
+    relative_tolerance: float = _relative(3e-14)
+    absolute_tolerance: float = _absolute(1e-16)
+
+
+@dataclass(frozen=True)
+class RadauSettings(Settings):
+    relative_tolerance: float = _relative(1e-8)
+    absolute_tolerance: float = _absolute(1e-11)
+
+
+def _taylor_many(scenes: Sequence[Scene], settings: TaylorSettings) -> Any:
+    from rotor_mbs.models.lagrange.ensemble import solve_many
+
+    return solve_many(scenes, settings.tolerance)
+
+
+def _ode_solver(make: Callable[[float, float], Integrator]) -> Callable[[Scene, Any], OdeSolver]:
+    def build(scene: Scene, settings: Any) -> OdeSolver:
+        return OdeSolver(scene, make(settings.relative_tolerance, settings.absolute_tolerance))
+
+    return build
+
+
+def _scipy_method(solver: str, look: Look, settings: type[Settings], ladder: Ladder, medium: float) -> Method:
+    """SciPy's solver of that name; medium: relative tolerance of the cost scaling study."""
+    return Method(
+        name=f"lagrange/{solver.lower()}",
+        label=f"closed form, {solver}",
+        look=look,
+        settings=settings,
+        build=_ode_solver(lambda relative, absolute: scipy_integrator(solver, relative, absolute)),
+        items=samples.items,
+        distributions=("scipy",),
+        hint="pip install scipy",
+        ladders=(ladder,),
+        cost_scaling={"relative_tolerance": medium, "absolute_tolerance": 0.01 * medium},
+        load=lambda: import_module("scipy.integrate"),
+    )
+
+
+METHODS = (
+    Method(
+        name="lagrange/taylor",
+        label="closed form, Taylor",
+        look=Look(_BLUE, "-", "o"),
+        settings=TaylorSettings,
+        build=taylor.build,
+        items=taylor.items,
+        solve_many=_taylor_many,
+        load=heyoka_adapter.compile_anew,
+        distributions=("heyoka",),
+        hint=heyoka_adapter.HINT,
+        fallback="lagrange/dop853",
+        is_default=True,
+        ladders=(
+            tolerance_ladder(
+                lambda tol: {"tolerance": tol},
+                1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11, 1e-13, 2.0**-52,
+            ),
+        ),
+        cost_scaling={"tolerance": 1e-9},
+    ),
+    Method(
+        name="lagrange/ode45",
+        label="closed form, Dormand-Prince 5(4)",
+        look=Look(_LIGHT_BLUE, "-", "v"),
+        settings=Ode45Settings,
+        build=_ode_solver(ode45_integrator),
+        items=samples.items,
+        ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
+        cost_scaling={"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
+    ),
+    _scipy_method(
+        "DOP853", Look(_BLUE, "--", "D"), Dop853Settings,
+        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14), 1e-9,
+    ),
+    _scipy_method(
+        "Radau", Look(_LIGHT_BLUE, "--", "*"), RadauSettings,
+        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13), 1e-5,
+    ),
+    Method(
+        name="reference",
+        label="reference, quad precision",
+        look=Look("#666666", "-", "*"),
+        settings=ReferenceSettings,
+        build=reference.build,
+        items=samples.items,
+    ),
+)  # fmt: skip

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
 from rotor_mbs.models.lagrange.torque import Stretch, stretches
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
@@ -36,7 +35,7 @@ class Advance(NamedTuple):
 Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
-class PlainSolver:
+class OdeSolver:
     """Any integrator over the scene, one call per stretch of the torque."""
 
     def __init__(self, scene: Scene, integrator: Integrator) -> None:
@@ -92,22 +91,3 @@ def right_hand_side(form: RotorForm, piece: Stretch, *, with_work: bool) -> Righ
         return [*rates, *found, *work]
 
     return derivative
-
-
-class PlainMethod:
-    """An integrator as a method; `make` gives it for a relative and an absolute tolerance."""
-
-    def __init__(
-        self, make: Callable[[float, float], Integrator], relative_tolerance: float, absolute_tolerance: float
-    ) -> None:
-        self._make = make
-        self.DEFAULTS: Mapping[str, object] = MappingProxyType(
-            {"relative_tolerance": relative_tolerance, "absolute_tolerance": absolute_tolerance}
-        )
-
-    def items(self, scene: Scene) -> list[Item]:
-        return samples.items(scene)
-
-    def build(self, scene: Scene, settings: Mapping[str, object]) -> PlainSolver:
-        relative, absolute = (float(str(settings[key])) for key in ("relative_tolerance", "absolute_tolerance"))
-        return PlainSolver(scene, self._make(relative, absolute))

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from rotor_mbs.models.lagrange import samples
-from rotor_mbs.models.lagrange.fallback_reference import StandInReference
+from rotor_mbs.models.lagrange.fallback_reference import FallbackReference
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of, heyoka, is_available
 from rotor_mbs.models.lagrange.rate_units import rate_units
 from rotor_mbs.models.lagrange.system import Propagation, System, build_system, compiled, initial_state, set_parameters
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
-
-# The second run's tolerance is a thousandth of the first one's: their distance bounds the first one's error, and the
-# second one, a thousand times better or at quad round-off, is kept.
-DEFAULTS: Mapping[str, object] = MappingProxyType({"tolerance": 1e-33, "check_tolerance": 1e-30})
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 
 class ReferenceSolver:
-    """Two quad runs and the double precision variational equations over the scene's sample times."""
+    """Two quad runs and the double precision variational equations over the scene's sample times.
+
+    The tolerance of the run that is kept is a thousandth of the other's: their distance bounds the error of the other,
+    and the one that is kept is a thousand times better, or at quad round-off.
+    """
 
     def __init__(self, scene: Scene, tolerance: float, check_tolerance: float) -> None:
         self._scene = scene
@@ -45,15 +44,11 @@ class ReferenceSolver:
         return result
 
 
-def items(scene: Scene) -> list[Item]:
-    return samples.items(scene)
-
-
-def build(scene: Scene, settings: Mapping[str, object]) -> ReferenceSolver | StandInReference:
-    """In quad precision with heyoka; without it the stand-in, whose uncertainty is larger by many orders."""
+def build(scene: Scene, settings: Any) -> ReferenceSolver | FallbackReference:
+    """In quad precision with heyoka; without it the fallback, whose uncertainty is larger by many orders."""
     if not is_available():
-        return StandInReference(scene)
-    return ReferenceSolver(scene, float(str(settings["tolerance"])), float(str(settings["check_tolerance"])))
+        return FallbackReference(scene)
+    return ReferenceSolver(scene, settings.tolerance, settings.check_tolerance)
 
 
 def _quad_propagation(scene: Scene, system: System, tolerance: float) -> Propagation:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +11,6 @@ from rotor_mbs.models.lagrange.heyoka_adapter import array_of, heyoka
 from rotor_mbs.models.lagrange.system import Propagation, build_system, compiled, initial_state, set_parameters
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Integration, Item, Trajectory
-
-DEFAULTS: Mapping[str, object] = MappingProxyType({"tolerance": float(np.finfo(float).eps)})
 
 # Unrolled code is twice as fast as compact code, but its compile time grows with the number of blades.
 _UNROLLED_BLADES = 4
@@ -54,6 +51,6 @@ def items(scene: Scene) -> list[Item]:
     return samples.items(scene)
 
 
-def build(scene: Scene, settings: Mapping[str, object]) -> TaylorSolver:
+def build(scene: Scene, settings: Any) -> TaylorSolver:
     """Raises MethodRefusal where heyoka is not installed."""
-    return TaylorSolver(scene, float(str(settings["tolerance"])))
+    return TaylorSolver(scene, settings.tolerance)

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from rotor_mbs.report.names import COLOURS, GREY, LOOKS, NAMES, Look
+from rotor_mbs.methods.catalogue import label_of, look_of
+from rotor_mbs.methods.ladders import Look
 
 __all__ = ["COLOURS", "GREY", "Look", "coordinate_look", "label_of", "look_of", "with_capital"]
 
-
-def label_of(method: str) -> str:
-    """The method's label, such as "closed form, Taylor"; its name where the method is not in the catalogue."""
-    return NAMES.get(method, method)
+# Okabe & Ito's colours, distinguishable with colour blindness; without the yellow, which does not show on white.
+COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+GREY = "#666666"
 
 
 def with_capital(text: str) -> str:
     """`text` with a capital first letter; the others stay as they are."""
     return text[:1].upper() + text[1:]
-
-
-def look_of(curve: str) -> Look:
-    """Look of a method, or of a curve of a bench (a method with fixed settings); grey where it is not known."""
-    return LOOKS.get(curve, Look(GREY, ":", "D"))
 
 
 def coordinate_look(index: int) -> Look:

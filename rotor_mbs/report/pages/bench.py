@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, by_scene, fastest, left_out
 from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import model_label
 from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry, mark_entry
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import INDEX, page_names, write_pages
@@ -25,7 +26,6 @@ from rotor_mbs.store.bench import GROWTH, Curve, read_curves
 from rotor_mbs.store.read import open_results
 
 Curves = Sequence[Curve]
-_MODELS = {"lagrange": "the closed form", "exudyn_tree": "Exudyn's tree", "exudyn_chain": "Exudyn's chain"}
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def _overview(scenes: Sequence[Curves], target: float) -> str:
         for label, seconds in sorted(wins.items(), key=lambda item: -len(item[1]))
     ]
     slower = [
-        f"the best of {_MODELS.get(model, model)} takes {_range(found, number)} times as long "
+        f"the best {model_label(model)} method takes {_range(found, number)} times as long "
         f"({len(found)} of {len(scenes)})"
         for model, found in ratios.items()
     ]

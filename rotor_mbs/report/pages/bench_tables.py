@@ -35,14 +35,9 @@ _CSV_COLUMNS = (
 )  # fmt: skip
 
 
-_FIXED_SETTINGS = {"rho0.7": "ρ∞ 0.7", "rho1.0": "ρ∞ 1", "rotation_vector": "rotation vector"}
-
-
 def curve_label(curve: Curve) -> str:
     """The method's label, and its fixed settings where they are not the default ones."""
-    method = str(curve.attributes["method"])
-    rest = curve.name.removeprefix(method)
-    return ", ".join([label_of(method), *(text for short, text in _FIXED_SETTINGS.items() if short in rest)])
+    return label_of(curve.name)
 
 
 def target_text(target: float) -> str:

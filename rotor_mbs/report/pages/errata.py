@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rotor_mbs.analysis.errata import CheckedEntry, Effect, effects
-from rotor_mbs.analysis.methods import ALONE
 from rotor_mbs.analysis.published import Erratum
+from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core.elements import PageTable, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages.scene_tables import status_text
@@ -63,7 +63,7 @@ def _agreeing_table(entries: Sequence[CheckedEntry]) -> PageTable:
 
 def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
     head = ["Scene"]
-    for erratum in ALONE:
+    for erratum in errata_methods():
         head += [
             f"{erratum}: {what}" for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain")
         ]
@@ -71,7 +71,7 @@ def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) 
     for name, scene in scenes.items():
         found = effects(scene)
         if found:
-            cells = [cell for erratum in ALONE for cell in _effect_cells(found.get(erratum))]
+            cells = [cell for erratum in errata_methods() for cell in _effect_cells(found.get(erratum))]
             rows.append([TableCell(name, href=files[name], note=scene.title), *cells])
     return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
 

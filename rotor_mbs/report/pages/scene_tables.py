@@ -8,10 +8,10 @@ import numpy as np
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.escape_rate import escape_rate
+from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.report.core.elements import PageTable, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, quantity
-from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
@@ -24,7 +24,7 @@ def status_text(status: str) -> str:
 def status_cell(run: StoredRun) -> TableCell:
     """The status; "runs to the end" of an "ok" run of equations that are not claimed to be correct."""
     if run.status == "ok":
-        return TableCell("ok", tone="good") if is_held(run.method) else TableCell("runs to the end")
+        return TableCell("ok", tone="good") if is_corrected(run.method) else TableCell("runs to the end")
     return TableCell(status_text(run.status), tone="bad")
 
 
@@ -75,7 +75,7 @@ def _zero_pitch(run: StoredRun) -> str:
 def metrics_notes(scene: StoredScene) -> list[str]:
     """What the columns mean, as far as it depends on the runs."""
     notes = []
-    if any(run.status == "ok" and not is_held(run.method) for run in scene.runs.values()):
+    if any(run.status == "ok" and not is_corrected(run.method) for run in scene.runs.values()):
         notes.append(
             "The printed equations are not judged against the reference or by their energy: that they depart from both "
             "is the finding. A run of theirs that reaches its end is not thereby correct."

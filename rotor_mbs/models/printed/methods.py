@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from types import MappingProxyType
 
 import numpy as np
 
-from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.models.ode45 import Ode45Result, RightHandSide, ode45
+from rotor_mbs.methods.base import Look, Method
+from rotor_mbs.models.ode45 import Ode45Result, Ode45Settings, RightHandSide, ode45
 from rotor_mbs.models.printed import literal, observables
 from rotor_mbs.models.printed.blades import PointMassRotor, point_mass_rotor
 from rotor_mbs.models.printed.derivation import DerivedRotor
@@ -79,10 +78,8 @@ class PrintedSolver:
         return angles, rates
 
 
-class PrintedMethod:
+class PrintedModel:
     """The literal equations, or the paper's derivation with chosen errata."""
-
-    DEFAULTS: Mapping[str, object] = MappingProxyType({"relative_tolerance": 1e-6, "absolute_tolerance": 1e-9})
 
     def __init__(self, name: str, errata: Errata | None = None) -> None:
         self._name = name
@@ -112,16 +109,11 @@ class PrintedMethod:
             return "(33), rotor row", "(33), pitch row"
         return "(42)-(45), (52); of (56) the sum it stands for, (32)", "(46)-(51), (53)-(56)"
 
-    def build(self, scene: Scene, settings: Mapping[str, object]) -> PrintedSolver:
+    def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
         rotor = self._rotor(scene)
-        return PrintedSolver(
-            scene,
-            rotor,
-            self._accelerations(rotor),
-            self._tolerance(settings, "relative_tolerance"),
-            self._tolerance(settings, "absolute_tolerance"),
-        )
+        tolerances = settings.relative_tolerance, settings.absolute_tolerance
+        return PrintedSolver(scene, rotor, self._accelerations(rotor), *tolerances)
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
         return point_mass_rotor(self._name, scene, blade_counts=() if self._errata else (1, 3))
@@ -137,12 +129,6 @@ class PrintedMethod:
         if len(rotor.phases) == 1:
             return lambda torque, state: literal.one_blade_accelerations(m, c, d, g, torque, state)
         return lambda torque, state: literal.three_blade_accelerations(m, c, d, g, torque, state)
-
-    def _tolerance(self, settings: Mapping[str, object], key: str) -> float:
-        value = float(str(settings[key]))
-        if not (math.isfinite(value) and value > 0.0):
-            raise MethodRefusal(f"{self._name}: {key} must be a positive number, not {settings[key]}")
-        return value
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
@@ -160,11 +146,26 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
     return f
 
 
-METHODS: Mapping[str, PrintedMethod] = MappingProxyType(
-    {
-        "printed/ode45": PrintedMethod("printed/ode45"),
-        "printed_e1/ode45": PrintedMethod("printed_e1/ode45", Errata(e1=True, e2=False, e3=False)),
-        "printed_e2/ode45": PrintedMethod("printed_e2/ode45", Errata(e1=False, e2=True, e3=False)),
-        "printed_e3/ode45": PrintedMethod("printed_e3/ode45", Errata(e1=False, e2=False, e3=True)),
-    }
+def _method(name: str, label: str, look: Look, errata: Errata | None = None, erratum: str = "") -> Method:
+    model = PrintedModel(name, errata)
+    return Method(
+        name=name,
+        label=label,
+        look=look,
+        build=model.build,
+        items=model.items,
+        settings=Ode45Settings,
+        is_corrected=False,
+        is_default=not erratum,
+        erratum=erratum,
+        relative_cost=30.0,
+    )
+
+
+_BLACK = "#000000"
+METHODS = (
+    _method("printed/ode45", "as printed, ode45", Look(_BLACK, "-", "x")),
+    _method("printed_e1/ode45", "E1 alone, ode45", Look(_BLACK, "--", "<"), Errata(e1=True, e2=False, e3=False), "E1"),
+    _method("printed_e2/ode45", "E2 alone, ode45", Look(_BLACK, "-.", ">"), Errata(e1=False, e2=True, e3=False), "E2"),
+    _method("printed_e3/ode45", "E3 alone, ode45", Look(_BLACK, ":", "p"), Errata(e1=False, e2=False, e3=True), "E3"),
 )

@@ -1,0 +1,137 @@
+"""Settings of a method: name, unit, default and allowed values of each, declared once, checked on every use."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from numbers import Real
+from typing import Any, Self
+
+from rotor_mbs.errors import InputError
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What a setting may be: one of `options`, or a finite number within the limits.
+
+    unit       SI unit of a number, "" where it has none
+    above      exclusive lower limit
+    at_least, at_most   inclusive limits
+    whole      whole numbers only
+    options    the allowed values of a choice; () for a number
+    doc        one line on what the setting does
+    """
+
+    unit: str = ""
+    above: float = -math.inf
+    at_least: float = -math.inf
+    at_most: float = math.inf
+    whole: bool = False
+    options: tuple[object, ...] = ()
+    doc: str = ""
+
+    def convert(self, value: object) -> object:
+        """The value as it is stored. Raises ValueError where it is not allowed."""
+        if self.options:
+            if value not in self.options or isinstance(value, bool) != isinstance(self.options[0], bool):
+                raise ValueError
+            return value
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise ValueError
+        number = float(value)
+        if not (math.isfinite(number) and number > self.above and self.at_least <= number <= self.at_most):
+            raise ValueError
+        if self.whole and number != int(number):
+            raise ValueError
+        return int(number) if self.whole else number
+
+    def __str__(self) -> str:
+        """ "a number above 0, in s"."""
+        if self.options:
+            return " or ".join(map(str, self.options))
+        limits = [
+            f"above {self.above:g}" if math.isfinite(self.above) else "",
+            f"at least {self.at_least:g}" if math.isfinite(self.at_least) else "",
+            f"at most {self.at_most:g}" if math.isfinite(self.at_most) else "",
+        ]
+        kind = "a whole number" if self.whole else "a number"
+        text = " ".join([kind, " and ".join(filter(None, limits))]).strip()
+        return f"{text}, in {self.unit}" if self.unit else text
+
+
+def number(
+    default: float,
+    *,
+    unit: str = "",
+    above: float = -math.inf,
+    at_least: float = -math.inf,
+    at_most: float = math.inf,
+    doc: str = "",
+) -> Any:
+    """A field of a `Settings` class that is a finite number; whole where `default` is an int."""
+    allowed = Allowed(unit, above, at_least, at_most, isinstance(default, int), (), doc)
+    return field(default=default, metadata={"allowed": allowed})
+
+
+def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
+    """A field of a `Settings` class that is one of `options`."""
+    return field(default=default, metadata={"allowed": Allowed(options=tuple(options), doc=doc)})
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Base of the settings of a method, and the settings of a method that has none.
+
+    A method's own class is a frozen dataclass whose fields are declared by `number` and `choice`:
+
+    >>> @dataclass(frozen=True)
+    ... class Euler(Settings):
+    ...     step: float = number(1e-3, unit="s", above=0.0, doc="time step")
+    >>> Euler.of("mine/euler", {"step": 1})
+    Euler(step=1.0)
+    """
+
+    @classmethod
+    def of(cls, method: str, given: Mapping[str, object] | Settings) -> Self:
+        """The settings of `method` with the `given` values in place of defaults.
+
+        Raises InputError, in one line that lists all settings, for an unknown name, a wrong type, a number that is
+        not finite, or one out of range.
+        """
+        if isinstance(given, Settings):
+            given = given.as_dict()
+        known, values, problems = cls.allowed(), {}, []
+        for name, value in given.items():
+            if name not in known:
+                near = difflib.get_close_matches(name, known, 1, 0.3)
+                problems.append(f"no setting {name!r}" + (f" (nearest: {near[0]})" if near else ""))
+                continue
+            try:
+                values[name] = known[name].convert(value)
+            except ValueError:
+                problems.append(f"{name} = {_shown(value)} is not allowed")
+        if problems:
+            raise InputError(f"{method}: {'; '.join(problems)}; allowed: {cls.describe()}")
+        return cls(**values)
+
+    @classmethod
+    def allowed(cls) -> dict[str, Allowed]:
+        """What each setting may be, by its name."""
+        return {one.name: one.metadata.get("allowed", Allowed()) for one in fields(cls)}
+
+    @classmethod
+    def describe(cls) -> str:
+        """All settings with ranges and defaults, in one line."""
+        defaults = cls().as_dict()
+        return ", ".join(f"{name} ({text}; default {defaults[name]})" for name, text in cls.allowed().items()) or "none"
+
+    def as_dict(self) -> dict[str, object]:
+        """Name and value of every setting, as stored with a run."""
+        return asdict(self)
+
+
+def _shown(value: object) -> str:
+    text = ascii(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
