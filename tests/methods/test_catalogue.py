@@ -1,0 +1,138 @@
+"""The catalogue of methods: unknown names, facts of the built-in methods, and methods of other packages."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods import catalogue
+from rotor_mbs.methods.catalogue import find_method, look_of, methods
+
+MADE_UP = """
+from dataclasses import dataclass
+import numpy as np
+from rotor_mbs.methods.base import Look, Method, Settings
+from rotor_mbs.methods.settings import number
+from rotor_mbs.solution.record import Integration, Item, Trajectory
+
+@dataclass(frozen=True)
+class OwnSettings(Settings):
+    rate: float = number(1.0, unit="rad/s", doc="rate of every angle")
+
+class OwnSolver:
+    def __init__(self, scene, settings):
+        self.scene, self.rate = scene, settings.rate
+    def integrate(self):
+        return Integration(True, steps=1)
+    def observe(self):
+        time = np.linspace(0.0, self.scene.duration, self.scene.samples)
+        rates = np.full((len(time), 1 + len(self.scene.blades)), self.rate)
+        return Trajectory(time, rates * time[:, None] + self.scene.initial_angles, rates)
+
+METHOD = Method(name="made_up/turning", label="made up, turning", look=Look("#123456", "-", "o"),
+                build=OwnSolver, items=lambda scene: [Item("term", "turning")], settings=OwnSettings)
+TAKEN = Method(name="lagrange/taylor", label="x", look=METHOD.look, build=OwnSolver, items=METHOD.items)
+"""
+
+
+def install(folder: Path, name: str, entry_points: dict[str, str], source: str = "") -> None:
+    """A package as an installer leaves it, on a folder of sys.path."""
+    (folder / f"{name}.py").write_text(source)
+    about = folder / f"{name}-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    lines = "\n".join(f"{key} = {value}" for key, value in entry_points.items())
+    (about / "entry_points.txt").write_text(f"[rotor_mbs.methods]\n{lines}\n")
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH", "")]))
+    return subprocess.run(
+        [sys.executable, "-W", "error", *arguments],
+        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "nearest"), [("lagrange/tailor", "lagrange/taylor"), ("exudyn/rk67", "exudyn_tree/rk67"), ("foo/bar", "")]
+)
+def test_an_unknown_name_is_refused_with_the_nearest_one(name: str, nearest: str) -> None:
+    with pytest.raises(InputError) as caught:
+        find_method(name)
+    (line,) = caught.value.problems
+    assert line.startswith(f"unknown method {name!r}; nearest: {nearest}")
+    assert line.endswith("allowed: " + ", ".join(method.name for method in methods()))
+    with pytest.raises(InputError, match="unknown method 'reference'"):
+        catalogue.check_names(["reference"])  # it is computed for every scene, and not asked for by name
+
+
+def test_a_method_not_in_the_catalogue_has_its_name_and_a_grey_look() -> None:
+    assert catalogue.look_up("foreign/method") is None
+    assert catalogue.label_of("foreign/method") == "foreign/method"
+    assert look_of("foreign/method").colour == look_of("reference").colour
+
+
+def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
+    assert len({method.name for method in methods()}) == len(methods())
+    for method in methods():
+        assert (method.order is not None) == method.fixed_step == ("step" in method.defaults)
+        assert method.is_corrected == bool(method.ladders) == (method.cost_scaling is not None)
+        assert not (method.erratum and (method.is_corrected or method.is_default))
+        assert not method.fallback or find_method(method.fallback).is_corrected
+        if method.stability_function and method.order:
+            # R(z) approximates the exponential to the method's order.
+            z = 0.1j
+            assert abs(method.stability_function(z) - complex(0.9950041652780258, 0.09983341664682815)) < abs(z) ** 5
+    assert [ladder.curve for ladder in catalogue.ladders(["exudyn_tree/generalized_alpha"])] == [
+        "exudyn_tree/generalized_alpha", "exudyn_tree/generalized_alpha_rho0.7", "exudyn_tree/generalized_alpha_rho1.0",
+    ]  # fmt: skip
+
+
+def test_a_method_of_another_package_is_found_listed_and_run(tmp_path: Path) -> None:
+    install(tmp_path, "made_up", {"own": "made_up:METHOD"}, MADE_UP)
+    shown = run(tmp_path, "-m", "rotor_mbs", "show", "paper/fig03")
+    assert shown.returncode == 0, shown.stderr
+    assert "made_up/turning" in shown.stdout
+    assert not shown.stderr
+    results = tmp_path / "r.h5"
+    done = run(tmp_path, "-m", "rotor_mbs", "run", "paper/fig03", "-m", "made_up/turning", "-o", str(results))
+    assert "Traceback" not in done.stderr
+    assert "energy drift" in done.stderr or done.returncode == 0
+    code = (
+        "import pathlib, sys\n"
+        "from rotor_mbs.store.read import open_results\n"
+        "with open_results(pathlib.Path(sys.argv[1])) as results:\n"
+        "    stored = results.scenes['paper/fig03'].runs['made_up/turning']\n"
+        "    print(stored.settings, stored.array('rates')[-1, 0], results.attributes['made_up'])\n"
+    )
+    stored = run(tmp_path, "-c", code, str(results))
+    assert stored.stdout.strip() == "{'rate': 1.0} 1.0 1.0", stored.stderr
+
+
+def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(tmp_path: Path) -> None:
+    entry_points = {"a": "no_such_module:METHOD", "b": "made_up:MISSING", "c": "made_up:Look", "d": "made_up:TAKEN"}
+    install(tmp_path, "made_up", {**entry_points, "e": "made_up:METHOD"}, MADE_UP)
+    shown = run(tmp_path, "-m", "rotor_mbs", "show", "paper/fig03")
+    assert shown.returncode == 0, shown.stderr
+    assert "made_up/turning" in shown.stdout
+    lines = shown.stderr.splitlines()
+    assert [line.partition(" left out")[0] for line in lines] == [
+        "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:Look",
+        "plug-in d of made_up:TAKEN: method lagrange/taylor",
+    ]  # fmt: skip
+
+
+def test_reading_a_built_in_method_imports_no_plug_in_and_no_engine(tmp_path: Path) -> None:
+    install(tmp_path, "made_up", {"own": "made_up:METHOD"}, "raise SystemExit('imported')")
+    code = (
+        "import sys\n"
+        "from rotor_mbs.methods.catalogue import find_method\n"
+        "assert find_method('exudyn_tree/rk67').label\n"
+        "print(sorted({'exudyn', 'heyoka', 'scipy', 'h5py', 'made_up'} & set(sys.modules)))\n"
+    )
+    assert run(tmp_path, "-c", code).stdout.strip() == "[]"
