@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
-from rotor_mbs.store.stability import Record, read_records
+from rotor_mbs.store.records import Record, read_records
 
 TARGET = 1e-6  # rad: what "right" means on the map
 
@@ -98,12 +98,12 @@ _FAMILIES = {
 
 def cells(path: Path) -> list[Cell]:
     """Every run of a results file, in its order. Raises StoreError."""
-    ladders = {record.name: record for record in read_records(path) if record.kind == "steps"}
+    ladders = {(record.scene, record.name): record for record in read_records(path, "steps")}
     found = []
     with open_results(path) as results:
         for scene in results.scenes.values():
             for name, run in scene.methods.items():
-                found.append(_cell(scene, run, ladders.get(f"{scene.name}/{name}")))
+                found.append(_cell(scene, run, ladders.get((scene.name, name))))
     return found
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.store.bench import Curve
+from rotor_mbs.store.records import Record
 
 Array = NDArray[np.float64]
 
@@ -35,26 +35,26 @@ class Reach:
     ratio: float
 
 
-def succeeded(curve: Curve) -> NDArray[np.bool_]:
+def succeeded(curve: Record) -> NDArray[np.bool_]:
     """(settings,) Which points stand on the curve: run to the end, and not useless."""
     ok = np.array([status == "ok" for status in curve.statuses])
     known: NDArray[np.bool_] = np.isfinite(curve.arrays["angle_error_max"]) & np.isfinite(curve.arrays["run_time_s"])
     return ok & known
 
 
-def failed(curve: Curve) -> NDArray[np.bool_]:
+def failed(curve: Record) -> NDArray[np.bool_]:
     """(settings,) Which points are failures: run, and neither on the curve nor left out by the budget."""
     failures: NDArray[np.bool_] = ~succeeded(curve)
     failures[[status == "left_out" for status in curve.statuses]] = False
     return failures
 
 
-def left_out(curve: Curve) -> int:
+def left_out(curve: Record) -> int:
     """How many rungs of its ladder, the finest ones, the budget left out: what it does not reach they might."""
     return curve.statuses.count("left_out")
 
 
-def points(curve: Curve, *, with_setup: bool = False) -> tuple[Array, Array]:
+def points(curve: Record, *, with_setup: bool = False) -> tuple[Array, Array]:
     """(errors in rad, times in s) of the points on the curve; with_setup: what one run costs, building included."""
     chosen = succeeded(curve)
     seconds = curve.arrays["run_time_s"][chosen]
@@ -85,7 +85,7 @@ def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
     return float(np.exp(np.interp(-math.log(target), -e, t)))
 
 
-def reaches(curves: Sequence[Curve], *, with_setup: bool = False) -> dict[str, dict[float, Reach | None]]:
+def reaches(curves: Sequence[Record], *, with_setup: bool = False) -> dict[str, dict[float, Reach | None]]:
     """By curve and target."""
     found: dict[str, dict[float, Reach | None]] = {curve.name: {} for curve in curves}
     for target in TARGETS_RAD:
@@ -96,7 +96,7 @@ def reaches(curves: Sequence[Curve], *, with_setup: bool = False) -> dict[str, d
     return found
 
 
-def fastest(curves: Sequence[Curve], target: float) -> list[tuple[Curve, Reach]]:
+def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach]]:
     """Those that reach the target, the fastest first."""
     found = reaches(curves)
     able = [(curve, reach) for curve in curves if (reach := found[curve.name][target]) is not None]
@@ -134,9 +134,9 @@ def growth_exponent(sizes: Array, seconds: Array) -> float | None:
     return float(np.polyfit(np.log(sizes[start:]), np.log(seconds[start:]), 1)[0])
 
 
-def by_scene(curves: Sequence[Curve]) -> Mapping[str, list[Curve]]:
+def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:
     """The curves of each scene, in order."""
-    found: dict[str, list[Curve]] = {}
+    found: dict[str, list[Record]] = {}
     for curve in curves:
         found.setdefault(curve.scene, []).append(curve)
     return found

@@ -17,8 +17,8 @@ from rotor_mbs.methods.catalogue import check_names, ladders
 from rotor_mbs.methods.ladders import Ladder
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.bench import read_curves, write_curves
 from rotor_mbs.store.merge import merge
+from rotor_mbs.store.records import read_records, write_records
 from rotor_mbs.studies.bench_points import Plan, bench_hash, measure
 from rotor_mbs.studies.bench_work import able, prepared_scene
 from rotor_mbs.studies.run import run_scenes
@@ -47,7 +47,7 @@ def bench(arguments: argparse.Namespace) -> int:
     output: Path = arguments.output
     _collect(output)
     _references(scenes, output)
-    there = {(curve.scene, curve.name): curve.attributes.get("bench_hash") for curve in read_curves(output)}
+    there = {(curve.scene, curve.name): curve.key for curve in read_records(output, "bench")}
     works = [_work(scene, chosen, there, arguments.repeats, arguments.budget) for scene in scenes]
     missing = [work for work in works if work.ladders]
     for work in missing:  # refused before the first is measured
@@ -106,7 +106,7 @@ def _measure_growth(output: Path, arguments: argparse.Namespace) -> None:
     for study in studies():
         budget = _GROWTH_BUDGETS * arguments.budget
         found = measure_growth(study, arguments.method or (), arguments.repeats, budget)
-        write_curves(_pieces(output) / f"growth-{study.kind}.h5", found)
+        write_records(_pieces(output) / f"growth-{study.kind}.h5", found)
         print(f"growth with {study.kind} measured", file=sys.stderr, flush=True)
 
 
@@ -116,7 +116,7 @@ def _measure_all(works: Sequence[_Work], output: Path, arguments: argparse.Names
     for number, work in enumerate(works, 1):
         plan = Plan(work.scene, work.ladders, output, arguments.repeats, arguments.budget)
         curves = measure(plan)
-        write_curves(_pieces(output) / f"{work.scene.name.replace('/', '-')}.h5", curves)
+        write_records(_pieces(output) / f"{work.scene.name.replace('/', '-')}.h5", curves)
         spent = time.monotonic() - start
         left = spent / number * (len(works) - number)
         failures = sum(status not in ("ok", "left_out") for curve in curves for status in curve.statuses)

@@ -12,8 +12,8 @@ from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.files import INDEX
 from rotor_mbs.report.pages.bench import write_bench_report
 from rotor_mbs.scenario.resources import reference_folder
-from rotor_mbs.store.bench import read_curves
 from rotor_mbs.store.hdf5 import replace_file
+from rotor_mbs.store.records import read_records
 
 _STAMP = ".made-from"
 
@@ -21,7 +21,7 @@ _STAMP = ".made-from"
 def report(arguments: argparse.Namespace) -> int:
     """Pages from `arguments.file` into `arguments.output`."""
     print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
-    if read_curves(arguments.file):
+    if read_records(arguments.file, "bench"):
         print(write_bench_report(arguments.file, arguments.output / "bench"))
     return 0
 

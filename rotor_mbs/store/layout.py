@@ -9,12 +9,17 @@ Each run's group contains its own dimension scales beside its data.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 FORMAT = "rotor_mbs"
 FORMAT_VERSION = 1
 CONVENTIONS = "CF-1.11"
 REFERENCE = "reference"
+
+# The attribute with the content hash of a run or a record; then its names in files of earlier versions.
+KEY = "run_hash"
+_KEY_NAMES = (KEY, "bench_hash", "record_hash")
 
 
 class Column(NamedTuple):
@@ -23,3 +28,8 @@ class Column(NamedTuple):
     dimensions: tuple[str, ...]
     units: str
     long_name: str
+
+
+def key_of(attributes: Mapping[str, Any]) -> str:
+    """The content hash of what decides a run or a record; "" where it has none."""
+    return str(next((attributes[name] for name in _KEY_NAMES if name in attributes), ""))

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rotor_mbs.execution.environment import machine, versions
-from rotor_mbs.store.bench import read_curves
-from rotor_mbs.store.merge import merge, refuse_other_kinds
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.stability import read_records
+from rotor_mbs.store.merge import merge, refuse_other_kinds, stored_keys
 
 
 @dataclass(frozen=True)
@@ -22,13 +19,7 @@ class ResultsFile:
     def stored_keys(self) -> set[str]:
         """Keys of all runs, bench curves and stability records. Raises StoreError."""
         refuse_other_kinds(self.path)
-        if not self.path.exists():
-            return set()
-        with open_results(self.path) as results:
-            facts = [run.attributes for scene in results.scenes.values() for run in scene.runs.values()]
-        facts += [dict(curve.attributes) for curve in read_curves(self.path)]
-        facts += [dict(record.attributes) for record in read_records(self.path)]
-        return {str(one["run_hash"]) for one in facts if "run_hash" in one}
+        return stored_keys(self.path)
 
     def merge(self, parts: Sequence[Path]) -> None:
         """The records of `parts` into the file, atomically. Raises StoreError."""

@@ -21,7 +21,8 @@ from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.store.bench import STATUSES, Curve
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.records import Record
 from rotor_mbs.studies.bench_work import Judged, MakeTimingProcess, Point, Prepared, Request, prepared_scene
 
 # A run longer than this is ended: a hanging engine must not eat the budget of the others.
@@ -49,7 +50,7 @@ class Findings:
     unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
 
 
-def measure(plan: Plan) -> list[Curve]:
+def measure(plan: Plan) -> list[Record]:
     """Times, judges and collects every point of the plan."""
     load_before = os.getloadavg()[0]
     number = scene_hash(plan.scene)
@@ -144,7 +145,7 @@ def _curve(
     timings: Timings[Point],
     found: Findings,
     shared: dict[str, object],
-) -> Curve:
+) -> Record:
     values = rows(points, timings, found)
     arrays = {name: np.array([row[name] for row in values]) for name in values[0] if name != "message"}
     attributes: dict[str, Any] = {
@@ -152,7 +153,7 @@ def _curve(
         "method": ladder.method,
         "choices": json.dumps(dict(ladder.choices), sort_keys=True),
         "setting_kind": ladder.kind,
-        "bench_hash": bench_hash(plan.scene, ladder, plan.repeats, plan.budget_s),
+        "run_hash": bench_hash(plan.scene, ladder, plan.repeats, plan.budget_s),
         "messages": [str(row["message"]) for row in values],
         "repeatable": all(found.judged[point].same for point in points if point in found.judged),
     }
@@ -162,7 +163,7 @@ def _curve(
     errors = np.maximum(arrays["angle_error_max"][ok], SMALLEST_ERROR)
     if ladder.kind == STEP and (order := fitted_order(arrays["setting"][ok], errors)) is not None:
         attributes["order"] = order
-    return Curve(plan.scene.name, ladder.curve, arrays, attributes)
+    return Record("bench", plan.scene.name, ladder.curve, attributes, arrays)
 
 
 def _row(point: Point, timings: Timings[Point], found: Findings) -> dict[str, Any]:

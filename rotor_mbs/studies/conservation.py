@@ -14,7 +14,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import energy_scale
 from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.store.stability import Record
+from rotor_mbs.store.records import Record
 
 _LIMIT_S = 30.0
 # Enough starts for an exponent to ±0.05, on a motion long enough for round-off to walk.
@@ -38,20 +38,19 @@ class ConservationTask:
 
 
 def perform_conservation(task: ConservationTask) -> Record:
-    """What a right run keeps, as a record: relative, or in rad; where a run fails, its words."""
-    name = f"{task.scene.name}/{task.method}"
+    """What an exact run keeps, as a record: relative, or in rad; where a run fails, its message."""
     try:
         with time_limit(_LIMIT_S):
             symmetry = _symmetry(task.scene, task.method)
             if task.kind != "drift":
-                return Record("conservation", name, symmetry)
-            drift = drift_record(name, task)
+                return Record("conservation", task.scene.name, task.method, symmetry)
+            drift = drift_record(task)
             return replace(drift, attributes={**symmetry, **drift.attributes})
     except OutOfTimeError as exc:
-        return Record("conservation", name, {"message": str(exc)})
+        return Record("conservation", task.scene.name, task.method, {"message": str(exc)})
 
 
-def drift_record(name: str, task: ConservationTask, starts: int = STARTS, duration: float = _LONG_S) -> Record:
+def drift_record(task: ConservationTask, starts: int = STARTS, duration: float = _LONG_S) -> Record:
     """Root mean square of the relative energy error over perturbed starts, over time, and its growth exponent."""
     generator = np.random.default_rng(_SEED)
     scene = replace(task.scene, duration=duration, samples=401, outputs=("angles", "rates", "energy"))
@@ -66,7 +65,7 @@ def drift_record(name: str, task: ConservationTask, starts: int = STARTS, durati
         time = run.time
     rms = np.sqrt(squares / starts)
     attributes = {"exponent": kept.growth_exponent(time, rms), "starts": starts, "largest": float(rms.max())}
-    return Record("conservation", name, attributes, {"time": time, "energy_drift_rms": rms})
+    return Record("conservation", task.scene.name, task.method, attributes, {"time": time, "energy_drift_rms": rms})
 
 
 def _run(scene: Scene, method: str) -> Trajectory:

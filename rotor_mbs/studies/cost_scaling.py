@@ -18,7 +18,8 @@ from rotor_mbs.methods import catalogue
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.store.bench import GROWTH, STATUSES, Curve
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.records import COST_SCALING, Record
 from rotor_mbs.studies.bench_points import Findings, judge_all, rows, time_points
 from rotor_mbs.studies.bench_work import Point, TimingProcess, only_time
 
@@ -75,7 +76,7 @@ class _MakeProcess:
         return self.study.scenes[point.setting], None
 
 
-def measure_growth(study: Study, methods: Sequence[str], repeats: int, budget_s: float) -> list[Curve]:
+def measure_growth(study: Study, methods: Sequence[str], repeats: int, budget_s: float) -> list[Record]:
     """A curve per method over the sizes: run times, and energy drift as its measure of error."""
     chosen = {
         method.name: method.cost_scaling
@@ -99,7 +100,7 @@ def measure_growth(study: Study, methods: Sequence[str], repeats: int, budget_s:
 
 def _curve(
     study: Study, name: str, settings: Mapping[str, object], found: Sequence[Mapping[str, Any]], started: str
-) -> Curve:
+) -> Record:
     arrays = {key: np.array([row[key] for row in found]) for key in found[0] if key != "message"}
     arrays["simulated_s"] = np.array([study.scenes[size].duration for size in arrays["setting"]])
     attributes: dict[str, Any] = {
@@ -113,4 +114,4 @@ def _curve(
     rate = arrays["run_time_s"] / arrays["simulated_s"]
     if (exponent := growth_exponent(arrays["setting"][ok], rate[ok])) is not None:
         attributes["exponent"] = exponent
-    return Curve(f"{GROWTH}/{study.kind}", name, arrays, attributes)
+    return Record("bench", f"{COST_SCALING}/{study.kind}", name, attributes, arrays)

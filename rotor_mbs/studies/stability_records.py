@@ -20,7 +20,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
-from rotor_mbs.store.stability import Record, read_records, write_records
+from rotor_mbs.store.records import Record, read_records, write_records
 from rotor_mbs.studies.conservation import ConservationTask, perform_conservation
 from rotor_mbs.studies.step_limits import StepTask, has_limit, perform_steps
 
@@ -31,6 +31,7 @@ _TASK_LIMIT_S = 60.0
 # Scenes on which conservation is looked at: one without gravity, one regular with it.
 _SYMMETRY_SCENES = ("extreme/zero-gravity", "extreme/light-1e-2")
 _DRIFT = ("extreme/zero-gravity", "lagrange/taylor")
+_KINDS = ("steps", "limits", "conservation")
 # Whose text decides a record, besides what decides a run.
 _NUMERICS = ("scenario", "solution", "methods", "models", "analysis", "studies")
 
@@ -47,10 +48,10 @@ def complete_records(
     folder = output.with_name(f"{output.name}.records")
     references = _reference_hashes(output)
     pieces = {_key(task, references): task for task in tasks}
-    stored = read_records(output)
+    stored = read_records(output, *_KINDS)
     names = {scene.name for scene in scenes}
-    kept = [record for record in stored if record.scene not in names or _key_of(record) in pieces]
-    there = {_key_of(record) for record in kept}
+    kept = [record for record in stored if record.scene not in names or record.key in pieces]
+    there = {record.key for record in kept}
     missing: list[Task] = [
         replace(task, piece=folder / f"{key}.h5")
         for key, task in pieces.items()
@@ -60,8 +61,9 @@ def complete_records(
         pass
     made = [record for key in pieces for record in _piece_records(folder / f"{key}.h5")]
     if made or len(kept) < len(stored):
-        write_records(folder / "all.h5", sorted([*kept, *made], key=lambda record: (record.kind, record.name)))
-        merge(output, [output, folder / "all.h5"], {**versions(), **machine()})
+        write_records(folder / "all.h5", made)
+        stale = {record.key for record in stored} - there
+        merge(output, [output, folder / "all.h5"], {**versions(), **machine()}, stale)
     shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -69,7 +71,7 @@ def perform(task: Task) -> None:
     """Makes a task's record and stores it as its piece, atomically, in a worker process."""
     record = perform_steps(task) if isinstance(task, StepTask) else perform_conservation(task)
     assert task.piece is not None  # its maker names it
-    write_records(task.piece, [replace(record, attributes={**record.attributes, "record_hash": task.piece.stem})])
+    write_records(task.piece, [replace(record, attributes={**record.attributes, "run_hash": task.piece.stem})])
 
 
 def _step_tasks(scenes: Sequence[Scene], found: Sequence[Cell], results: Path) -> list[StepTask]:
@@ -101,10 +103,6 @@ def _key(task: Task, references: Mapping[str, str]) -> str:
     number, reference = scene_hash(task.scene), references.get(task.scene.name, "")
     content = [task.kind, number, task.method, settings, reference, versions(), fingerprint(*_NUMERICS)]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
-
-
-def _key_of(record: Record) -> str:
-    return str(record.attributes.get("record_hash", ""))
 
 
 def _reference_hashes(output: Path) -> dict[str, str]:

@@ -15,7 +15,8 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.store.stability import STATUSES, Record
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.records import Record
 from rotor_mbs.studies.frozen import load_reference
 
 TARGET = 1e-6  # rad
@@ -80,7 +81,7 @@ def _ladder(task: StepTask) -> Record:
     needed = step_for(TARGET, arrays["step"], arrays["angle_error_max"])
     if needed is not None:
         attributes["step_for_target_s"] = needed
-    return Record("steps", f"{task.scene.name}/{task.method}", attributes, arrays)
+    return Record("steps", task.scene.name, task.method, attributes, arrays)
 
 
 def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | None:
@@ -129,7 +130,7 @@ def _limit(task: StepTask) -> Record:
         "fastest_mode_per_s": max(abs(mode) for mode in modes),
         "mode_damping_ratio": min(1.0, *(abs(mode.real) / abs(mode) for mode in modes)),
     }
-    return Record("limits", f"{scene.name}/{task.method}", attributes)
+    return Record("limits", scene.name, task.method, attributes)
 
 
 def _modes(scene: Scene, blade: int) -> tuple[complex, complex]:

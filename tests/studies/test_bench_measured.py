@@ -22,7 +22,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.solution.metrics import angle_error
-from rotor_mbs.store.bench import Curve, read_curves
+from rotor_mbs.store.records import Record, read_records
 from rotor_mbs.studies.bench_work import Judged, Point, Prepared, Request, TimingProcess, thinned, thinned_reference
 
 
@@ -149,8 +149,8 @@ def bench(tmp_path: Path, *arguments: str, name: str = "b.h5") -> int:
     return main(["bench", *arguments, "-o", str(tmp_path / name)])
 
 
-def curves(tmp_path: Path, name: str = "b.h5") -> dict[str, Curve]:
-    return {curve.name: curve for curve in read_curves(tmp_path / name)}
+def curves(tmp_path: Path, name: str = "b.h5") -> dict[str, Record]:
+    return {curve.name: curve for curve in read_records(tmp_path / name, "bench")}
 
 
 def test_a_bench_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -29,13 +29,14 @@ from rotor_mbs.report.pages.bench_tables import (
     reach_table,
 )
 from rotor_mbs.report.plots.work_precision import diagram
-from rotor_mbs.store.bench import STATUSES, Curve, read_curves, write_curves
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.merge import merge
+from rotor_mbs.store.records import Record, read_records, write_records
 
 
 def curve(
     name: str, errors: list[float], seconds: list[float], statuses: list[str] | None = None, **attributes: object
-) -> Curve:
+) -> Record:
     n = len(errors)
     statuses = statuses or ["ok"] * n
     arrays: dict[str, NDArray[np.generic]] = {
@@ -57,7 +58,7 @@ def curve(
         "method": name, "setting_kind": "step", "horizon_s": 6.0, "duration_s": 10.0, "uncertainty_rad": 1e-15,
         "samples": 101, "budget_s": 28.0, "load_before": 0.1, "pinned_core": 1, "messages": [""] * n, "scene_hash": "1",
     }  # fmt: skip
-    return Curve("paper/fig09", name, arrays, {**facts, **attributes})
+    return Record("bench", "paper/fig09", name, {**facts, **attributes}, arrays)
 
 
 FAST = curve("lagrange/taylor", [1e-2, 1e-6, 1e-10], [1e-3, 2e-3, 4e-3])
@@ -211,12 +212,12 @@ def test_csv_has_every_point_unrounded() -> None:
 
 
 def test_curves_survive_storing_and_merging_bit_by_bit(tmp_path: Path) -> None:
-    write_curves(tmp_path / "a.h5", [FAST, SLOW])
+    write_records(tmp_path / "a.h5", [FAST, SLOW])
     newer = curve("exudyn_tree/rk67", [1e-3], [5.0])
-    write_curves(tmp_path / "b.h5", [newer])
+    write_records(tmp_path / "b.h5", [newer])
     merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
     merge(tmp_path / "all.h5", [tmp_path / "all.h5"], {})
-    found = {one.name: one for one in read_curves(tmp_path / "all.h5")}
+    found = {one.name: one for one in read_records(tmp_path / "all.h5", "bench")}
     assert set(found) == {"lagrange/taylor", "exudyn_tree/rk67"}
     for name, values in FAST.arrays.items():
         np.testing.assert_array_equal(found["lagrange/taylor"].arrays[name], values)
@@ -229,14 +230,14 @@ def test_curves_survive_storing_and_merging_bit_by_bit(tmp_path: Path) -> None:
 
 
 def test_curves_of_a_scene_with_other_numbers_are_dropped(tmp_path: Path) -> None:
-    write_curves(tmp_path / "a.h5", [FAST, SLOW])
-    write_curves(tmp_path / "b.h5", [curve("exudyn_tree/rk67", [1e-3], [5.0], scene_hash="2")])
+    write_records(tmp_path / "a.h5", [FAST, SLOW])
+    write_records(tmp_path / "b.h5", [curve("exudyn_tree/rk67", [1e-3], [5.0], scene_hash="2")])
     merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
-    assert [one.name for one in read_curves(tmp_path / "all.h5")] == ["exudyn_tree/rk67"]
+    assert [one.name for one in read_records(tmp_path / "all.h5", "bench")] == ["exudyn_tree/rk67"]
 
 
 def test_pages_and_csv_are_written(tmp_path: Path) -> None:
-    write_curves(tmp_path / "a.h5", [FAST, SLOW])
+    write_records(tmp_path / "a.h5", [FAST, SLOW])
     index = write_bench_report(tmp_path / "a.h5", tmp_path / "report")
     names = {path.name for path in index.parent.iterdir()}
     assert names == {"index.html", "paper-fig09.html", "paper-fig09.csv", "bench.csv"}

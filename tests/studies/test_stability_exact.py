@@ -148,7 +148,7 @@ def test_symmetry_momentum_and_the_way_back(method: str) -> None:
 def test_energy_drifts_like_a_random_walk() -> None:
     pytest.importorskip("heyoka")
     task = ConservationTask("drift", scene("extreme/zero-gravity"), TAYLOR)
-    record = drift_record("drift", task)
+    record = drift_record(task)
     assert 0.3 <= record.attributes["exponent"] <= 0.6
     assert record.attributes["largest"] <= 1e-13
 

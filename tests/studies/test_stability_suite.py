@@ -16,7 +16,7 @@ from rotor_mbs.cli import main
 from rotor_mbs.execution.pool import Finished
 from rotor_mbs.report.pages.stability import NOT_COMPARED, write_stability_report
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.stability import Record, read_records, write_records
+from rotor_mbs.store.records import Record, read_records, write_records
 from rotor_mbs.studies import stability_records
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stability_records import complete_records
@@ -92,7 +92,9 @@ def test_a_run_held_by_its_energy_alone_says_so(tmp_path: Path) -> None:
 
 def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    record = Record("steps", "stiff/x/exudyn_tree/rk44", {"step_for_target_s": 0.25}, {"step": np.array([0.5, 0.25])})
+    record = Record(
+        "steps", "stiff/x", "exudyn_tree/rk44", {"step_for_target_s": 0.25}, {"step": np.array([0.5, 0.25])}
+    )
     write_records(path, [record])
     write_records(path, read_records(path))
     (back,) = read_records(path)

@@ -22,10 +22,10 @@ from rotor_mbs.report.pages.bench_tables import curve_label, target_text
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
 from rotor_mbs.scenario.names import natural_order
-from rotor_mbs.store.bench import GROWTH, Curve, read_curves
 from rotor_mbs.store.read import open_results
+from rotor_mbs.store.records import COST_SCALING, Record, read_records
 
-Curves = Sequence[Curve]
+Curves = Sequence[Record]
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,12 @@ def write_bench_report(results: Path, output: Path) -> Path:
 
     Raises StoreError where the file cannot be read or has no bench, or where the folder cannot be written.
     """
-    grouped = by_scene(read_curves(results))
+    grouped = by_scene(read_records(results, "bench"))
     if not grouped:
         raise StoreError(f"{results}: no bench in it, nothing to report")
     with open_results(results) as opened:
         made_with = versions(opened)
-    scaling = {name: curves for name, curves in grouped.items() if name.startswith(f"{GROWTH}/")}
+    scaling = {name: curves for name, curves in grouped.items() if name.startswith(f"{COST_SCALING}/")}
     scenes = {name: grouped[name] for name in natural_order(grouped) if name not in scaling}
     files = page_names(scenes)
     pages = {INDEX: render("bench", _index(scenes, scaling, files, made_with))}

@@ -22,7 +22,7 @@ from rotor_mbs.report.core.elements import PageTable, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, quantity
 from rotor_mbs.report.pages.scene_tables import status_text
-from rotor_mbs.store.bench import Curve
+from rotor_mbs.store.records import Record
 
 _POINT_COLUMNS = (
     "method", "setting", "angle error (rad)", "at the end (rad)", "tip error (m)", "energy drift", "median",
@@ -35,7 +35,7 @@ _CSV_COLUMNS = (
 )  # fmt: skip
 
 
-def curve_label(curve: Curve) -> str:
+def curve_label(curve: Record) -> str:
     """The method's label, and its fixed settings where they are not the default ones."""
     return label_of(curve.name)
 
@@ -45,7 +45,7 @@ def target_text(target: float) -> str:
     return f"{power(round(math.log10(target)))} rad"
 
 
-def csv_text(curves: Sequence[Curve]) -> str:
+def csv_text(curves: Sequence[Record]) -> str:
     """Every point, unrounded, with a heading line; units are those of the results file (s, rad, m)."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -57,7 +57,7 @@ def csv_text(curves: Sequence[Curve]) -> str:
     return stream.getvalue()
 
 
-def reach_table(curves: Sequence[Curve]) -> PageTable:
+def reach_table(curves: Sequence[Record]) -> PageTable:
     """A row per curve: time and ratio for each target."""
     found = reaches(curves)
     head = ["method", *(target_text(target) for target in TARGETS_RAD)]
@@ -80,7 +80,7 @@ def _reached(reach: Reach) -> TableCell:
     return TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
 
 
-def _unreached(curve: Curve) -> TableCell:
+def _unreached(curve: Record) -> TableCell:
     """Whether the method cannot, or was not asked to."""
     count = left_out(curve)
     if count:
@@ -90,7 +90,7 @@ def _unreached(curve: Curve) -> TableCell:
     return TableCell(NOTHING, note=best)
 
 
-def overview_table(scenes: Mapping[str, Sequence[Curve]], files: Mapping[str, str]) -> PageTable:
+def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, str]) -> PageTable:
     """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
     head = ["scene", *(target_text(target) for target in TARGETS_RAD)]
     rows = [
@@ -102,7 +102,7 @@ def overview_table(scenes: Mapping[str, Sequence[Curve]], files: Mapping[str, st
     )
 
 
-def _fastest_cell(curves: Sequence[Curve], target: float) -> TableCell:
+def _fastest_cell(curves: Sequence[Record], target: float) -> TableCell:
     found, is_cut = fastest(curves, target), any(map(left_out, curves))
     if not found:
         return TableCell("not measured" if is_cut else NOTHING)
@@ -114,7 +114,7 @@ def _fastest_cell(curves: Sequence[Curve], target: float) -> TableCell:
     return TableCell(f"{curve_label(first)}: {prefixed(reach.seconds, 's', 2)}", note=next_one)
 
 
-def order_table(curves: Sequence[Curve]) -> PageTable:
+def order_table(curves: Sequence[Record]) -> PageTable:
     """A row per fixed-step curve."""
     rows = [
         [
@@ -130,13 +130,13 @@ def order_table(curves: Sequence[Curve]) -> PageTable:
     )
 
 
-def point_table(curves: Sequence[Curve]) -> PageTable:
+def point_table(curves: Sequence[Record]) -> PageTable:
     """A row per point that was run."""
     rows = [row for curve in curves for row in _point_rows(curve)]
     return PageTable("Every setting measured.", _POINT_COLUMNS, rows, numeric=range(1, 14))
 
 
-def _point_rows(curve: Curve) -> Iterator[list[TableCell]]:
+def _point_rows(curve: Record) -> Iterator[list[TableCell]]:
     a = curve.arrays
     for i, status in enumerate(curve.statuses):
         if status == "left_out":
@@ -157,7 +157,7 @@ def _point_rows(curve: Curve) -> Iterator[list[TableCell]]:
         ]
 
 
-def failure_table(curves: Sequence[Curve]) -> PageTable:
+def failure_table(curves: Sequence[Record]) -> PageTable:
     """Every point that is not on a curve, with the reason."""
     rows = [
         [
@@ -178,7 +178,7 @@ def failure_table(curves: Sequence[Curve]) -> PageTable:
     )
 
 
-def scaling_table(curves: Sequence[Curve]) -> PageTable:
+def scaling_table(curves: Sequence[Record]) -> PageTable:
     """A row per method over the sizes of a study (blades, or s of duration): run time per simulated second."""
     sizes = sorted({float(size) for curve in curves for size in curve.arrays["setting"]})
     kind = str(curves[0].attributes["setting_kind"])
@@ -199,7 +199,7 @@ def scaling_table(curves: Sequence[Curve]) -> PageTable:
     )
 
 
-def _setting(curve: Curve, i: int) -> str:
+def _setting(curve: Record, i: int) -> str:
     value = float(curve.arrays["setting"][i])
     return prefixed(value, "s", 3) if curve.attributes["setting_kind"] == "step" else number(value, 2)
 

@@ -31,7 +31,7 @@ from rotor_mbs.report.pages.scene import motion_of, opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
-from rotor_mbs.store.stability import Record, read_records
+from rotor_mbs.store.records import Record, read_records
 
 NOT_COMPARED = "horizon before the second sample"
 _FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
@@ -104,7 +104,7 @@ def write_stability_report(results: Path, output: Path) -> Path:
 
     Raises StoreError where the file cannot be read or the folder cannot be written.
     """
-    found, records = cells(results), read_records(results)
+    found, records = cells(results), read_records(results, "steps", "limits", "conservation")
     with open_results(results) as opened:
         names = list(dict.fromkeys(cell.scene for cell in found))
         files = page_names(names)

@@ -16,7 +16,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.looks import GREY, Look, look_of
 from rotor_mbs.report.core.numbers import power
-from rotor_mbs.store.bench import Curve
+from rotor_mbs.store.records import Record
 
 FRONT_COLOUR = "#c8c8c8"
 _LOWEST_ERROR, _RAIL_START, _RAIL, _RAIL_END = 1e-16, 3.0, 20.0, 120.0
@@ -27,7 +27,7 @@ class _Drawn(NamedTuple):
     seconds: Any
 
 
-def diagram(curves: Sequence[Curve], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
+def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
     """All curves of a scene; `small` for one of many side by side: front and curves alone."""
     picture = canvas.panels((height,), "largest angle error up to the horizon (rad)")
     axes = picture.axes[0]
@@ -47,12 +47,12 @@ def diagram(curves: Sequence[Curve], *, with_setup: bool = False, height: float 
     return picture
 
 
-def has_visible_uncertainty(curves: Sequence[Curve]) -> bool:
+def has_visible_uncertainty(curves: Sequence[Record]) -> bool:
     """Whether the reference's uncertainty lies within the diagram: in quad precision it is far beyond its edge."""
     return _uncertainty(curves) > _LOWEST_ERROR
 
 
-def _uncertainty(curves: Sequence[Curve]) -> float:
+def _uncertainty(curves: Sequence[Record]) -> float:
     return max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
 
 
@@ -64,14 +64,14 @@ def _front(axes: Any, drawn: Sequence[_Drawn]) -> None:
     axes.plot(best, seconds[chosen], color=FRONT_COLOUR, linewidth=6.0, solid_capstyle="round", zorder=0.5)
 
 
-def _whiskers(axes: Any, curve: Curve, style: Look) -> None:
+def _whiskers(axes: Any, curve: Record, style: Look) -> None:
     chosen = succeeded(curve)
     errors = np.maximum(curve.arrays["angle_error_max"][chosen], _LOWEST_ERROR)
     low, high = curve.arrays["run_time_q1_s"][chosen], curve.arrays["run_time_q3_s"][chosen]
     axes.vlines(errors, low, high, color=style.colour, linewidth=2.2, alpha=0.6)
 
 
-def _rail(axes: Any, curve: Curve, style: Look, with_setup: bool) -> None:
+def _rail(axes: Any, curve: Record, style: Look, with_setup: bool) -> None:
     chosen = failed(curve)
     seconds = curve.arrays["run_time_s"][chosen]
     if with_setup:
@@ -79,7 +79,7 @@ def _rail(axes: Any, curve: Curve, style: Look, with_setup: bool) -> None:
     axes.plot(np.full(len(seconds), _RAIL), seconds, linestyle="none", marker="x", markersize=4.0, color=style.colour)
 
 
-def _axes(axes: Any, drawn: Sequence[_Drawn], curves: Sequence[Curve]) -> None:
+def _axes(axes: Any, drawn: Sequence[_Drawn], curves: Sequence[Record]) -> None:
     if has_visible_uncertainty(curves):
         axes.axvspan(_LOWEST_ERROR / 10.0, _uncertainty(curves), color=GREY, alpha=0.2, linewidth=0)
     axes.axvspan(_RAIL_START, _RAIL_END, color="#f2e3de", linewidth=0, zorder=0)

@@ -1,0 +1,165 @@
+"""Records beside the runs of a results file: arrays over one dimension, and attributes, in a group of their own.
+
+    /bench/<scene>/<method>                  error against run time over `setting`
+    /stability/<kind>/<scene>/<method>       step ladders, stability limits and conservation over `row`
+    /errata                                  the check of the printed entries over `row`
+Writes and reads them; judges nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.solution.status import STATUSES, flags, recode
+from rotor_mbs.store import hdf5
+from rotor_mbs.store.layout import Column, key_of
+from rotor_mbs.store.read import open_results
+
+# The scene's place in a record of how cost scales with blades or duration.
+COST_SCALING = "growth"
+
+_FOLDERS = {
+    "bench": "bench",
+    "steps": "stability/steps",
+    "limits": "stability/limits",
+    "conservation": "stability/conservation",
+    "errata": "errata",
+}
+_DIMENSIONS = {"bench": "setting"}  # of the others: row
+_SETTING_UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
+_INTEGERS = ("repeats", "steps", "status", "false_success")
+
+# Units and long name of every array that a record may have.
+_COLUMNS = {
+    "angle_error_max": ("rad", "largest angle error up to the horizon"),
+    "angle_error_end": ("rad", "angle error at the last sample"),
+    "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
+    "energy_drift_max": ("1", "largest energy error over the run, of the energy scale"),
+    "run_time_s": ("s", "median run time of the integration alone"),
+    "run_time_min_s": ("s", "shortest run time"),
+    "run_time_q1_s": ("s", "lower quartile of the run times"),
+    "run_time_q3_s": ("s", "upper quartile of the run times"),
+    "setup_time_s": ("s", "building the model, everything compiled anew"),
+    "setup_again_time_s": ("s", "building the model a second time"),
+    "output_time_s": ("s", "reading out and computing the samples"),
+    "simulated_s": ("s", "duration of the scene"),
+    "repeats": ("1", "timed runs"),
+    "steps": ("1", "steps of one run"),
+    "status": ("1", "how the run ended, from its state"),
+    "false_success": ("1", "1 where the engine reported success and the state says otherwise"),
+    "step": ("s", "fixed step"),
+    "time": ("s", "time"),
+    "energy_drift_rms": ("1", "energy error over perturbed starts, root mean square, of its scale"),
+    "difference": ("1", "largest relative difference of a printed entry from the derivative"),
+    "agrees": ("1", "1 where the printed entry is the derivative"),
+}
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a study stores beside runs.
+
+    Attributes
+    ----------
+    kind : "bench", "steps", "limits", "conservation" or "errata".
+    scene : "paper/fig05"; "" where the record belongs to no scene.
+    name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
+    attributes : plain values; `run_hash` stands for all that decides the numbers.
+    arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
+    """
+
+    kind: str
+    scene: str
+    name: str
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    @property
+    def path(self) -> str:
+        """The group in a results file."""
+        return "/".join(part for part in (_FOLDERS[self.kind], self.scene, self.name) if part)
+
+    @property
+    def method(self) -> str:
+        return str(self.attributes.get("method", self.name))
+
+    @property
+    def key(self) -> str:
+        """The content hash of what decides the record; "" where it has none."""
+        return key_of(self.attributes)
+
+    @property
+    def statuses(self) -> list[str]:
+        return [STATUSES[int(code)] for code in self.arrays["status"]]
+
+    @property
+    def messages(self) -> list[str]:
+        """One for each row."""
+        return [str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))]
+
+
+def write_records(path: Path, records: Sequence[Record]) -> None:
+    """A results file with these records alone, atomically. Raises StoreError."""
+    with hdf5.new_file(path) as file:
+        for record in records:
+            put_record(file, record)
+
+
+def put_record(file: Any, record: Record) -> None:
+    """A record into a file that is being written."""
+    group = hdf5.new_group(file, record.path)
+    hdf5.put_attributes(group, {"record": 1, **record.attributes})
+    dimension = _DIMENSIONS.get(record.kind, "row")
+    if dimension == "setting":
+        kind = str(record.attributes["setting_kind"])
+        scale = Column((dimension,), _SETTING_UNITS[kind], kind)
+        hdf5.put_attributes(hdf5.put(group, dimension, record.arrays[dimension], scale), {"kind": kind})
+    elif record.arrays:
+        rows = np.arange(len(next(iter(record.arrays.values()))))
+        hdf5.put(group, dimension, rows, Column((dimension,), "1", "number of the row"))
+    for name, (units, long_name) in _COLUMNS.items():
+        if name in record.arrays:
+            values = np.asarray(record.arrays[name])
+            values = values.astype(np.int64) if name in _INTEGERS else values
+            dataset = hdf5.put(group, name, values, Column((dimension,), units, long_name))
+            if name == "status":
+                dataset.attrs.update(flags())
+
+
+def read_records(path: Path, *kinds: str) -> list[Record]:
+    """The records of a results file, of these kinds or of all, in the order of the file. Raises StoreError."""
+    with open_results(path) as results:
+        return [read_record(name, group) for name, group in records_in(results.root, *kinds)]
+
+
+def records_in(file: Any, *kinds: str) -> Iterator[tuple[str, Any]]:
+    """(path, group) of every record in an open file, of these kinds or of all."""
+    for kind in kinds or _FOLDERS:
+        folder = _FOLDERS[kind]
+        if folder in file:
+            yield from _leaves(file[folder], folder)
+
+
+def _leaves(group: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """A record has arrays, or says that it is one; the errata are one record."""
+    if "record" in group.attrs or path == "errata" or not all(hdf5.is_group(item) for item in group.values()):
+        yield path, group
+    else:
+        for name, item in group.items():
+            yield from _leaves(item, f"{path}/{name}")
+
+
+def read_record(path: str, group: Any) -> Record:
+    """The record in a group of an open file, by its path in the file."""
+    kind = next(kind for kind, folder in _FOLDERS.items() if path == folder or path.startswith(f"{folder}/"))
+    parts = path.removeprefix(_FOLDERS[kind]).strip("/").split("/")
+    arrays = {name: item[()] for name, item in group.items() if name != "row" and not hdf5.is_group(item)}
+    if "status" in arrays:
+        arrays["status"] = recode(arrays["status"], group["status"].attrs)
+    return Record(kind, "/".join(parts[:-2]), "/".join(parts[-2:]), hdf5.attributes_of(group), arrays)
