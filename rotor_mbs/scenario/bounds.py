@@ -66,15 +66,10 @@ class Bounds:
         return Bounds([*entries, *self.entries])
 
 
-def shipped_file() -> Path:
-    """The file whose bounds count where a user's own file has none."""
-    return reference_folder() / "accuracy.toml"
-
-
 @functools.cache
 def shipped_bounds() -> Bounds:
     """The bounds of reference/accuracy.toml, read once. Raises InputError with every error of the file."""
-    return read_bounds(shipped_file())
+    return read_bounds(reference_folder() / "accuracy.toml")
 
 
 def load_bounds(own: Path | None = None) -> Bounds:

@@ -1,4 +1,4 @@
-"""Which scenes there are, and which ones a command line means. Knows no model; reads numbers only when asked to."""
+"""Which scenes are shipped, and which ones the arguments of a command mean. Must not know models."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
 
     An argument is the name of a shipped scene (`paper/fig05`), a shipped folder (`paper`), a path to a TOML file, or a
     path to a folder of TOML files; a shipped name goes before a path (write ./paper for a folder of one's own).
-    Raises InputError with all faults of all arguments and files.
+    Raises InputError with all errors of all arguments and files.
     """
     problems: list[str] = []
     files: dict[Path, _File] = {}
@@ -96,9 +96,9 @@ def _files(argument: str) -> list[_File]:
 
 def _why_unknown(argument: str, is_there: bool, shipped: Iterable[str]) -> str:
     if is_there:
-        return "is no TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
+        return "is not a TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
     if not _NAME.fullmatch(argument):
-        return f"is no scene's name and no TOML file; allowed: pieces {_NAME_RULE}, joined by /"
+        return f"is neither a scene's name nor a TOML file; allowed: pieces {_NAME_RULE}, joined by /"
     names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
     near = difflib.get_close_matches(argument, sorted(names), n=3, cutoff=0.5)
     return "no such scene; " + (f"near: {', '.join(near)}" if near else "allowed: what `rotor-mbs list` names")

@@ -1,4 +1,4 @@
-"""Where the shipped scenes and references lie. Knows no file format."""
+"""Where the shipped scenes and reference data are. Must not know file formats."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def scenarios_folder() -> Path:
-    """The shipped scenes; raises RotorError in an incomplete installation."""
+    """The shipped scenes. Raises RotorError in an incomplete installation."""
     return _folder("scenarios")
 
 
 def sweeps_folder() -> Path:
-    """The shipped sweeps: TOML files that vary a scene, and are none themselves."""
+    """The shipped sweeps: TOML files that vary a scene."""
     return scenarios_folder() / "sweeps"
 
 
 def reference_folder() -> Path:
-    """What runs are held against: published numbers, errata, frozen trajectories; raises RotorError as above."""
+    """The shipped reference data: published numbers, errata, bounds, trajectories. Raises RotorError as above."""
     return _folder("reference")
 
 

@@ -209,7 +209,7 @@ class InitialTable(Table):
     @field_validator("rates")
     @classmethod
     def _moves_what_has_inertia(cls, rates: list[float], info: ValidationInfo) -> list[float]:
-        # Their number is not known to be right where `blades` is faulty, but then no pitch is known to be bare.
+        # Their number may be wrong where `blades` has an error, but then no pitch is known to be bare.
         moved = [i for i in _context(info).get("bare_pitches", ()) if rates[1 + i] != 0.0]
         if moved:
             raise invalid(f"a pitch rate for {_blades_named(moved)}, whose pitch has no inertia", _PITCH_LEFT_OUT)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -22,7 +22,7 @@ from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
 from rotor_mbs.scenario.sweep_design import Axis, Design
 from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path
 from rotor_mbs.scenario.validation import Line, Number, Table, invalid, validate_file
-from rotor_mbs.scenario.variants import Variants, parse_key, unit_of
+from rotor_mbs.scenario.variants import KEY_FORM, Variants, is_key, parse_key, unit_of
 
 MAX_COUNT = 10**15  # values of a range; too many runs are reported where they are counted
 MAX_ROWS = 10_000_000
@@ -37,6 +37,15 @@ _MAX_ROW_ERRORS = 20
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
+def _varied_key(key: str) -> str:
+    if not is_key(key):
+        raise invalid("{shown} is not the path of a key", KEY_FORM)
+    table = parse_key(key)[0]
+    if table in _OF_ONE_SHAPE:
+        raise invalid(f"all runs of a dataset share one {table}", "a sweep for each, or a key that keeps the shape")
+    return key
+
+
 class RangeTable(Table):
     """`linear` or `log`: `count` values from `start` to `end`, both included."""
 
@@ -48,7 +57,7 @@ class RangeTable(Table):
 class AxisTable(Table):
     """One [[axis]]: a key of the scene, and where its values come from."""
 
-    key: Line = Field(description="the path of a number of the scene, such as initial.angles[1]")
+    key: Annotated[Line, AfterValidator(_varied_key)] = Field(description="the path of a number of the scene")
     values: list[Number] | None = Field(None, min_length=1, description="a list of numbers")
     linear: RangeTable | None = Field(None, description="a table with start, end, count")
     log: RangeTable | None = Field(None, description="a table with start, end, count, both ends above 0")
@@ -188,7 +197,6 @@ class _Reader:
     def sweep(self) -> Sweep:
         table = self._table
         base = self._changed(self._base())
-        self._check_keys()
         design = self._design()
         sweep = Sweep(
             name=self._path.stem,
@@ -206,7 +214,7 @@ class _Reader:
             text=self._text,
             path=shown_path(self._path),
         )
-        self._check_rows(sweep)
+        check_rows(sweep)
         return sweep
 
     def _problem(self, key: KeyPath, message: str) -> str:
@@ -234,7 +242,7 @@ class _Reader:
         try:
             return base.replace(**changes) if changes else base
         except InputError as error:
-            key = "change" if self._table.change else "samples"
+            key = next(key for key in ("change", "samples", "outputs") if getattr(self._table, key))
             raise InputError([self._problem((key,), f"{key}: {problem}") for problem in error.problems]) from error
 
     def _design(self) -> Design:
@@ -248,31 +256,6 @@ class _Reader:
             raise InputError(self._problem(("axis",), f"axis: {design.count:,} runs; allowed: at most {MAX_ROWS:,}"))
         return design
 
-    def _check_keys(self) -> None:
-        problems = []
-        for i, axis in enumerate(self._table.axis):
-            wrong = _wrong_key(axis.key)
-            if wrong:
-                problems.append(self._problem(("axis", i, "key"), f"axis.key: {axis.key}: {wrong}"))
-        if problems:
-            raise InputError(problems)
-
-    def _check_rows(self, sweep: Sweep) -> None:
-        """Validates the scenes of the ends of every axis, or of every row where that is needed."""
-        problems: dict[str, None] = {}
-        for i, variants, row in _rows_to_check(sweep):
-            try:
-                variants.scene(row)
-            except TableError as error:
-                pairs = zip(variants.keys, row, strict=True)
-                shown = ", ".join(key if error.is_of_keys else f"{key} = {value:g}" for key, value in pairs)
-                for problem in error.problems:
-                    problems.setdefault(self._problem(("axis", i, "key"), f"{shown}: {problem.message}"))
-                if len(problems) >= _MAX_ROW_ERRORS:
-                    break
-        if problems:
-            raise InputError(list(problems))
-
 
 def _axis(table: AxisTable, draws: int) -> Axis:
     kind = next(name for name in VARIED if getattr(table, name) is not None)
@@ -282,14 +265,24 @@ def _axis(table: AxisTable, draws: int) -> Axis:
     return Axis(table.key, kind, tuple(given), draws if kind in DRAWN else len(given))
 
 
-def _wrong_key(key: str) -> str:
-    try:
-        path = parse_key(key)
-    except TableError as error:
-        return str(error)
-    if path[0] in _OF_ONE_SHAPE:
-        return f"all runs of a dataset share one {path[0]}; allowed: a sweep for each, or a key that keeps the shape"
-    return ""
+def check_rows(sweep: Sweep) -> None:
+    """Validates the scenes of the ends of every axis, or of every row where that is needed.
+
+    Raises InputError with a line for each error.
+    """
+    problems: dict[str, None] = {}
+    for i, variants, row in _rows_to_check(sweep):
+        try:
+            variants.scene(row)
+        except TableError as error:
+            pairs = zip(variants.keys, row, strict=True)
+            shown = ", ".join(key if error.is_of_keys else f"{key} = {value:g}" for key, value in pairs)
+            for problem in error.problems:
+                problems.setdefault(sweep.problem(("axis", i, "key"), f"{shown}: {problem.message}"))
+            if len(problems) >= _MAX_ROW_ERRORS:
+                break
+    if problems:
+        raise InputError(list(problems))
 
 
 def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, ...]]]:

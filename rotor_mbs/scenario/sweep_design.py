@@ -1,7 +1,7 @@
-"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped. Knows numbers; no scene and no file.
+"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped. Must not know scenes or files.
 
 A grid runs through its axes like the digits of a number, the last axis fastest; all random axes together are one
-digit, the draw. Every row follows from its number alone, so that any part of a sweep can be made on any machine.
+digit, the draw. Every row follows from its number alone, so that any part of a sweep can be computed on any computer.
 """
 
 from __future__ import annotations

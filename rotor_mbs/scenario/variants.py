@@ -18,7 +18,7 @@ from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.scenario.scene_file import scene_tables, scene_toml, validated_scene
 from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError
 
-FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (entries counted from 0)"
+KEY_FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (entries counted from 0)"
 _PART = r"[A-Za-z_][A-Za-z0-9_]{0,59}(?:\[[0-9]{1,6}\])*"
 _KEY = re.compile(rf"{_PART}(?:\.{_PART})*")
 _UNITS: dict[str, str] = {one.metadata["key"]: one.metadata["unit"] for one in fields(Scene)} | {
@@ -31,10 +31,15 @@ _START = {one.metadata["key"]: one.name for one in scene_fields("start")}
 _MAX_ROTORS = 512
 
 
+def is_key(text: str) -> bool:
+    """Whether it has the form of a key's path."""
+    return _KEY.fullmatch(text) is not None
+
+
 def parse_key(text: str) -> KeyPath:
     """("initial", "angles", 1) of "initial.angles[1]". Raises TableError."""
-    if not _KEY.fullmatch(text):
-        raise _wrong((), f"{text[:60]!a} is not the path of a key; allowed: {FORM}")
+    if not is_key(text):
+        raise _wrong((), f"{text[:60]!a} is not the path of a key; allowed: {KEY_FORM}")
     return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[A-Za-z_]\w*|[0-9]+", text))
 
 
@@ -82,7 +87,7 @@ def _check_step(here: Any, path: KeyPath, depth: int) -> None:
         return
     if not isinstance(here, list):
         kind = "a table" if isinstance(here, dict) else "a single value"
-        raise _wrong(path, f"{shown} is {kind}; allowed: {FORM}")
+        raise _wrong(path, f"{shown} is {kind}; allowed: {KEY_FORM}")
     if isinstance(part, str) or part >= len(here):
         raise _wrong(path, f"{shown} has {len(here)} entries; allowed: {shown}[0] to {shown}[{len(here) - 1}]")
 
