@@ -23,10 +23,11 @@ _MAX_KEY_PARTS = 32
 _LONG_KEY = re.compile(
     r"(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)" + f"{{{_MAX_KEY_PARTS}}}"
 )
+_MARKS = frozenset("[]{}=,.\n")
 _TOKEN = re.compile(
-    r'(?P<string>"{3}(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'{3}(?:[^\']|\'{1,2}(?!\'))*\'{3,5}'
-    r'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\')'
-    r"|(?P<mark>[\[\]{}=,.\n])|(?P<bare>[^\s\[\]{}=,.#\"']+)|#[^\n]*",
+    r'("{3}(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'{3}(?:[^\']|\'{1,2}(?!\'))*\'{3,5}'  # strings of several lines
+    r'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\''
+    r"|[\[\]{}=,.\n]|[^\s\[\]{}=,.#\"']+)|#[^\n]*",
     re.DOTALL,
 )
 
@@ -132,97 +133,93 @@ def line_of(lines: Mapping[KeyPath, int], path: KeyPath) -> int:
     return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), 1)
 
 
-class _Token(NamedTuple):
-    text: str
-    line: int
-    is_mark: bool
-
-
 class _Scanner:
-    """One pass over the tokens of a TOML text."""
+    """One pass over the tokens of a TOML text: brackets and other marks, newlines, strings, bare pieces."""
 
     def __init__(self, text: str) -> None:
-        self._tokens: list[_Token] = []
+        self._tokens: list[tuple[str, int]] = []
         self._position = 0
         self._lines: dict[KeyPath, int] = {}
         self._table_counts: dict[KeyPath, int] = {}
         line = 1
         for match in _TOKEN.finditer(text):
-            if match.lastgroup is not None:
-                self._tokens.append(_Token(match[0], line, match.lastgroup == "mark"))
+            if match[1]:
+                self._tokens.append((match[1], line))
             line += match[0].count("\n")
-        self._end = _Token("", line, is_mark=True)
+        self._end = ("", line)
 
     def scan(self) -> dict[KeyPath, int]:
         table: KeyPath = ()
-        while self._next is not self._end:
-            if self._next.text == "\n":
+        while self._next:
+            if self._next == "\n":
                 self._position += 1
-            elif self._next.text == "[":
+            elif self._next == "[":
                 table = self._header()
             else:
                 self._entry(table)
         return self._lines
 
     @property
-    def _next(self) -> _Token:
+    def _token(self) -> tuple[str, int]:
         return self._tokens[self._position] if self._position < len(self._tokens) else self._end
+
+    @property
+    def _next(self) -> str:
+        return self._token[0]
 
     def _header(self) -> KeyPath:
         """Reads [a.b] or [[a.b]]; a part that is an array of tables is followed by the number of its last table."""
         self._position += 1
-        of_array = self._next.text == "["
+        of_array = self._next == "["
         self._position += of_array
         path: KeyPath = ()
         parts = self._key_parts("]")
-        for i, token in enumerate(parts):
-            path = self._found(path, token)
+        for i, (name, line) in enumerate(parts):
+            path = self._add((*path, name), line)
             if of_array and i == len(parts) - 1:
                 self._table_counts[path] = self._table_counts.get(path, 0) + 1
             if path in self._table_counts:
-                path = (*path, self._table_counts[path] - 1)
-                self._lines.setdefault(path, token.line)
+                path = self._add((*path, self._table_counts[path] - 1), line)
         self._position += of_array
         return path
 
     def _entry(self, path: KeyPath) -> None:
         """Reads `a.b = value`."""
-        for token in self._key_parts("="):
-            path = self._found(path, token)
+        for name, line in self._key_parts("="):
+            path = self._add((*path, name), line)
         self._value(path)
 
-    def _found(self, path: KeyPath, token: _Token) -> KeyPath:
-        # Escapes in a quoted key are left as they are: its line is then the one of the table around it.
-        path = (*path, token.text[1:-1] if token.text[0] in "\"'" else token.text)
-        self._lines.setdefault(path, token.line)
+    def _add(self, path: KeyPath, line: int) -> KeyPath:
+        self._lines.setdefault(path, line)
         return path
 
-    def _key_parts(self, end: str) -> list[_Token]:
-        """The parts of a dotted key, up to and over the mark that ends it."""
+    def _key_parts(self, end: str) -> list[tuple[str, int]]:
+        """Names and lines of the parts of a dotted key, up to and over the mark that ends it."""
         parts = []
-        while self._next.text not in (end, "\n", ""):
-            if not self._next.is_mark:
-                parts.append(self._next)
+        while self._next not in (end, "\n", ""):
+            name, line = self._token
+            if name not in _MARKS:
+                # Escapes in a quoted key are left as they are: its line is then the one of the table around it.
+                parts.append((name[1:-1] if name[0] in "\"'" else name, line))
             self._position += 1
         self._position += 1
         return parts
 
     def _value(self, path: KeyPath) -> None:
         """Reads a scalar (which may be several tokens: 1.5, or a date and a time), an array or an inline table."""
-        opening = self._next.text
+        opening = self._next
         if opening not in ("[", "{"):
-            while self._next.text not in (",", "]", "}", "\n", ""):
+            while self._next not in (",", "]", "}", "\n", ""):
                 self._position += 1
             return
         self._position += 1
         entry = 0
-        while self._next.text not in ("]", "}", ""):
-            if self._next.text in (",", "\n"):
-                entry += self._next.text == ","
+        while self._next not in ("]", "}", ""):
+            if self._next in (",", "\n"):
+                entry += self._next == ","
                 self._position += 1
             elif opening == "{":
                 self._entry(path)
             else:
-                self._lines.setdefault((*path, entry), self._next.line)
-                self._value((*path, entry))
+                self._value(self._add((*path, entry), self._token[1]))
         self._position += 1
