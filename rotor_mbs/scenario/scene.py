@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields
+from operator import attrgetter
 from typing import Any, Literal
 
 OUTPUTS = ("angles", "rates", "tip", "energy")
@@ -116,7 +117,8 @@ class Scene:
     @property
     def rotor_key(self) -> tuple[object, ...]:
         """The rotor's parameters and loads: equal for scenes that differ in start, run or label alone."""
-        return tuple(getattr(self, name) for name in _ROTOR_FIELDS)
+        key: tuple[object, ...] = _rotor_values(self)
+        return key
 
     def replace(self, **changes: Any) -> Scene:
         """A scene with other values at some keys of the scene file, validated like a file.
@@ -159,7 +161,7 @@ def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
     return (one for one in fields(Scene) if one.metadata["part"] in parts)
 
 
-_ROTOR_FIELDS = tuple(one.name for one in scene_fields("rotor"))
+_rotor_values = attrgetter(*(one.name for one in scene_fields("rotor")))
 
 
 def scene_hash(scene: Scene) -> str:
