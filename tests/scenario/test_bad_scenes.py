@@ -1,4 +1,4 @@
-"""Wrong scene files: one readable line per fault, with file, line, key and what is allowed, and never a traceback."""
+"""Wrong scene files: one readable line per error, with file, line, key and what is allowed, and never a traceback."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ damping = 3
 BLADE = "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ninertia = [1, 1, 1, 0, 0, 0]\ntip = [0.5, 0, 7]\n"
 ON_THE_AXIS = "[blade]\nmass = 2\ncentre_of_mass = [0, 0, 3]\ntip = [0.5, 0, 7]\n"
 
-# What to write for what, and the line and key of the one fault, with a piece of its message.
+# What to write for what, and the line and key of the one error, with a piece of its message.
 WRONG = {
     "title missing": ('title = "A good scene"\n', "", 1, "title", "is missing"),
     "title empty": ('"A good scene"', '"  "', 1, "title", "is empty"),
@@ -203,18 +203,18 @@ def _problems(folder: Path, content: str | bytes) -> list[str]:
     return problems
 
 
-def test_the_scene_that_is_made_wrong_is_right(tmp_path: Path) -> None:
+def test_the_scene_before_it_is_changed_is_valid(tmp_path: Path) -> None:
     path = tmp_path / "good.toml"
     path.write_text(SCENE, encoding="utf-8")
     assert load_scene(path, "good").title == "A good scene"
 
 
-@pytest.mark.parametrize(("old", "new", "line", "key", "words"), WRONG.values(), ids=WRONG)
-def test_one_fault_one_line(tmp_path: Path, old: str, new: str, line: int, key: str, words: str) -> None:
+@pytest.mark.parametrize(("old", "new", "line", "key", "message"), WRONG.values(), ids=WRONG)
+def test_one_error_is_one_line(tmp_path: Path, old: str, new: str, line: int, key: str, message: str) -> None:
     assert SCENE.count(old) == 1
     text = SCENE.replace(old, new)
     (problem,) = _problems(tmp_path, text)
-    assert re.match(rf":{line}: {key}: .*{words}.*; allowed: .+", problem), problem
+    assert re.match(rf":{line}: {key}: .*{message}.*; allowed: .+", problem), problem
 
 
 @pytest.mark.parametrize(
@@ -250,14 +250,14 @@ def test_a_pitch_without_inertia_takes_no_rate_and_no_bearing(tmp_path: Path) ->
     assert damping.startswith(":19: bearing.damping: acts on blades 1, 2")
 
 
-def test_a_bearing_may_spare_the_blade_without_pitch_inertia(tmp_path: Path) -> None:
+def test_a_bearing_may_leave_out_the_blade_without_pitch_inertia(tmp_path: Path) -> None:
     tables = (BLADE + ON_THE_AXIS).replace("[blade]", "[[blade]]")
     text = SCENE.replace(BLADE, tables).replace("stiffness = 1", "stiffness = [1, 0]")
     (problem,) = _problems(tmp_path, text)
     assert problem.startswith(":24: bearing.damping: acts on blade 2, whose pitch has no inertia")
 
 
-def test_all_faults_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
+def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
     text = SCENE
     for name in ("title empty", "blades true", "gravity NaN", "samples one", "outputs unknown", "mass zero"):
         text = text.replace(*WRONG[name][:2])
@@ -302,12 +302,12 @@ def test_all_faults_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_is_no_toml_text(tmp_path: Path, content: bytes, start: str) -> None:
+def test_a_file_that_is_not_toml_text(tmp_path: Path, content: bytes, start: str) -> None:
     (problem,) = _problems(tmp_path, content)
     assert problem.startswith(start)
 
 
-def test_a_flood_of_faults_is_cut_and_counted(tmp_path: Path) -> None:
+def test_very_many_errors_are_cut_and_counted(tmp_path: Path) -> None:
     path = tmp_path / "flood.toml"
     path.write_text("\n".join(f"key{i} = 1" for i in range(300)), encoding="utf-8")
     with pytest.raises(InputError) as caught:
@@ -318,7 +318,7 @@ def test_a_flood_of_faults_is_cut_and_counted(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("argument", "words"),
+    ("argument", "message"),
     [
         ("", "is neither a scene's name nor a TOML file"),
         ("../paper/fig05", "is neither a scene's name nor a TOML file"),
@@ -347,7 +347,7 @@ def test_a_flood_of_faults_is_cut_and_counted(tmp_path: Path) -> None:
     ],
 )
 def test_arguments_that_name_no_scene(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, argument: str, words: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, argument: str, message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("empty").mkdir()
@@ -359,7 +359,7 @@ def test_arguments_that_name_no_scene(
     with pytest.raises(InputError) as caught:
         find_scenes([argument])
     (problem,) = caught.value.problems
-    assert words in problem
+    assert message in problem
     assert problem.isprintable()
 
 
@@ -368,7 +368,7 @@ def test_a_folder_where_a_file_should_be(tmp_path: Path) -> None:
         load_scene(tmp_path, "folder")
 
 
-def test_faults_of_all_arguments_and_files_at_once(tmp_path: Path) -> None:
+def test_errors_of_all_arguments_and_files_at_once(tmp_path: Path) -> None:
     for name in ("one", "two"):
         (tmp_path / f"{name}.toml").write_text(SCENE.replace("mass = 2", "mass = -2"), encoding="utf-8")
     with pytest.raises(InputError) as caught:

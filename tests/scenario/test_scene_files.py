@@ -138,7 +138,7 @@ def test_what_is_optional_is_left_out(tmp_path: Path) -> None:
     assert scene.blades[0].tip == scene.blades[0].centre_of_mass == (0.5, 0.0, 3.0)
 
 
-def test_everything_that_can_be_said(tmp_path: Path) -> None:
+def test_every_key_reaches_the_scene(tmp_path: Path) -> None:
     text = SCENE.replace('["angles"]', '["energy", "tip", "angles"]').replace(
         "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\n",
         '[[blade]]\nmass = 2\ncentre_of_mass = [0.5, 0, "6/2"]\ntip = [0, 0, 7]\ninertia = [2, 2, 1, 0, 0, 0]\n'
@@ -159,7 +159,7 @@ def test_everything_that_can_be_said(tmp_path: Path) -> None:
     assert scene.text == text
 
 
-def test_a_huge_rate_is_for_the_run_to_judge(tmp_path: Path) -> None:
+def test_a_huge_rate_is_accepted(tmp_path: Path) -> None:
     assert _load(tmp_path, SCENE.replace("rates = [0,", "rates = [1e200,")).initial_rates[0] == 1e200
 
 
@@ -209,13 +209,13 @@ def test_hash_follows_every_number(tmp_path: Path, old: str, new: str) -> None:
     arrays(float, (5, 3), elements=st.floats(-10, 10)),
     arrays(float, 5, elements=st.floats(0, 10)),
 )
-def test_every_cloud_of_masses_is_a_rigid_body(r: np.ndarray, m: np.ndarray) -> None:
+def test_every_set_of_point_masses_is_a_rigid_body(r: np.ndarray, m: np.ndarray) -> None:
     J = sum(mass * (point @ point * np.eye(3) - np.outer(point, point)) for mass, point in zip(m, r, strict=True))
     assert is_rigid_body_inertia([J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
 
 
 @given(st.integers(0, 2), arrays(float, (3, 3), elements=st.floats(-1, 1)), st.floats(1e-6, 10.0))
-def test_no_turn_hides_a_broken_triangle_inequality(axis: int, random: np.ndarray, excess: float) -> None:
+def test_a_broken_triangle_inequality_is_found_in_any_frame(axis: int, random: np.ndarray, excess: float) -> None:
     moments = np.array([1.0, 1.0, 1.0])
     moments[axis] = 2.0 + excess
     R, _ = np.linalg.qr(random)
@@ -290,7 +290,7 @@ def test_a_key_that_is_not_there_has_the_line_of_what_encloses_it() -> None:
 
 
 @given(st.text(alphabet="ab=.,[]{}\"'#\n 1\\", max_size=60))
-def test_no_text_stops_the_line_scanner(text: str) -> None:
+def test_the_line_scanner_ends_for_any_text(text: str) -> None:
     assert all(1 <= line <= text.count("\n") + 1 for line in find_lines(text).values())
 
 

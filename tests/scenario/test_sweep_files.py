@@ -1,4 +1,4 @@
-"""Sweep files: what the rows of a design are, and that every fault is told with file, line, key and what is allowed."""
+"""Sweep files: the rows of a design, and errors with file, line, key and what is allowed."""
 
 from __future__ import annotations
 
@@ -188,9 +188,9 @@ _BAD = {
 }
 
 
-@pytest.mark.parametrize(("text", "line", "words"), _BAD.values(), ids=list(_BAD))
-def test_faults_name_file_line_key_and_what_is_allowed(tmp_path: Path, text: str, line: int, words: str) -> None:
-    with pytest.raises(InputError, match=words) as caught:
+@pytest.mark.parametrize(("text", "line", "message"), _BAD.values(), ids=list(_BAD))
+def test_errors_name_file_line_key_and_what_is_allowed(tmp_path: Path, text: str, line: int, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
         _load(tmp_path, text)
     for problem in caught.value.problems:
         assert problem.startswith(f"{tmp_path / 's.toml'}:")
@@ -199,7 +199,7 @@ def test_faults_name_file_line_key_and_what_is_allowed(tmp_path: Path, text: str
     assert int(caught.value.problems[0].removeprefix(f"{tmp_path / 's.toml'}:").split(":")[0]) == line
 
 
-def test_all_faults_at_once(tmp_path: Path) -> None:
+def test_all_errors_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         _load(tmp_path, 'precision = "half"\n[[axis]]\nkey = "gravity"\nvalues = ["x"]\nlog = {start = 1, count = 1}\n')
     assert len(caught.value.problems) == 4  # precision, values, log.end, log.count
