@@ -10,7 +10,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -19,23 +19,16 @@ OUTPUTS = ("angles", "rates", "tip", "energy")
 Part = Literal["label", "run", "start", "rotor"]
 
 
-def scene_key(
-    path: str,
-    unit: str = "1",
-    part: Part = "rotor",
-    *,
-    default: Any = MISSING,
-    per_blade: bool = False,
-    added: bool = False,
-) -> Any:
-    """A field of Scene, read from the key `path` of the scene file.
+def file_key(
+    path: str, unit: str = "1", part: Part = "rotor", *, per_blade: bool = False, added: bool = False
+) -> dict[str, Any]:
+    """Metadata of a field of Scene that is read from the key `path` of the scene file ("" for none).
 
     part        label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
     per_blade   the file may have one number for all blades
     added       the key is younger than the stored hashes: at its default it does not enter them
     """
-    metadata = {"key": path, "unit": unit, "part": part, "per_blade": per_blade, "added": added}
-    return field(default=default, metadata=metadata)
+    return {"key": path, "unit": unit, "part": part, "per_blade": per_blade, "added": added}
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,22 +69,26 @@ class Scene:
     text                            the TOML text it was read from
     """
 
-    name: str = scene_key("", part="label")
-    title: str = scene_key("title", part="label")
-    figures: tuple[str, ...] = scene_key("figures", part="label")
-    gravity: float = scene_key("gravity", "m/s^2")
-    duration: float = scene_key("duration", "s", "run")
-    samples: int = scene_key("samples", part="run")
-    outputs: tuple[str, ...] = scene_key("outputs", part="run")
-    blades: tuple[Blade, ...] = scene_key("blade")
-    hub_inertia: float = scene_key("hub.inertia", "kg m^2")
-    initial_angles: tuple[float, ...] = scene_key("initial.angles", "rad", "start")
-    initial_rates: tuple[float, ...] = scene_key("initial.rates", "rad/s", "start")
-    rotor_torque: tuple[tuple[float, float], ...] = scene_key("torque.rotor", "N m", default=())
-    bearing_stiffness: tuple[float, ...] = scene_key("bearing.stiffness", "N m/rad", default=(), per_blade=True)
-    bearing_damping: tuple[float, ...] = scene_key("bearing.damping", "N m s/rad", default=(), per_blade=True)
-    shaft_damping: float = scene_key("shaft.damping", "N m s/rad", default=0.0)
-    text: str = scene_key("", part="label", default="")
+    name: str = field(metadata=file_key("", part="label"))
+    title: str = field(metadata=file_key("title", part="label"))
+    figures: tuple[str, ...] = field(metadata=file_key("figures", part="label"))
+    gravity: float = field(metadata=file_key("gravity", "m/s^2"))
+    duration: float = field(metadata=file_key("duration", "s", "run"))
+    samples: int = field(metadata=file_key("samples", part="run"))
+    outputs: tuple[str, ...] = field(metadata=file_key("outputs", part="run"))
+    blades: tuple[Blade, ...] = field(metadata=file_key("blade"))
+    hub_inertia: float = field(metadata=file_key("hub.inertia", "kg m^2"))
+    initial_angles: tuple[float, ...] = field(metadata=file_key("initial.angles", "rad", "start"))
+    initial_rates: tuple[float, ...] = field(metadata=file_key("initial.rates", "rad/s", "start"))
+    rotor_torque: tuple[tuple[float, float], ...] = field(default=(), metadata=file_key("torque.rotor", "N m"))
+    bearing_stiffness: tuple[float, ...] = field(
+        default=(), metadata=file_key("bearing.stiffness", "N m/rad", per_blade=True)
+    )
+    bearing_damping: tuple[float, ...] = field(
+        default=(), metadata=file_key("bearing.damping", "N m s/rad", per_blade=True)
+    )
+    shaft_damping: float = field(default=0.0, metadata=file_key("shaft.damping", "N m s/rad"))
+    text: str = field(default="", metadata=file_key("", part="label"))
 
     @property
     def phases(self) -> tuple[float, ...]:
