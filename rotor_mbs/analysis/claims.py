@@ -1,4 +1,4 @@
-"""Each published number and claim against the printed equations and against the right model. Knows no page, no plot."""
+"""Each published number and claim tested on the printed equations and on the corrected model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Choice = Callable[[StoredScene], StoredRun | None]
 
 @dataclass(frozen=True)
 class Reading:
-    """A test carried out. value, limit: numbers read off the runs (None: undefined); holds: None where data lack."""
+    """A test and its result. value, limit: read off the runs, None where undefined; holds: None without the data."""
 
     test: Condition
     value: float | None
@@ -25,29 +25,30 @@ class Reading:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one model gives. holds: None where the file cannot decide; broke_off: scenes whose run ended early."""
+    """The result for one model. holds: None where the file cannot decide; ended_early: scenes whose run did."""
 
     holds: bool | None
     value: float | None = None
     readings: tuple[Reading, ...] = ()
-    broke_off: tuple[str, ...] = ()
+    ended_early: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A number or claim of the paper with what the printed and the right model give."""
+    """A number or claim of the paper with the results of the printed and of the corrected model."""
 
     published: Published
     printed: Outcome
-    right: Outcome
+    corrected: Outcome
 
     @property
     def is_decided(self) -> bool:
-        return self.printed.holds is not None or self.right.holds is not None
+        """Whether the file decides it for one of the models."""
+        return self.printed.holds is not None or self.corrected.holds is not None
 
 
 def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Claim]:
-    """All that the paper says and `scenes` can decide for one model at least; `items`: what to test, default all."""
+    """The numbers and claims that `scenes` can decide for at least one model; of `items`, by default of all."""
     found = []
     for item in published() if items is None else items:
         printed = _outcome(item, _Runs(scenes, methods.printed_run))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
@@ -26,6 +27,14 @@ class Rehydrated:
     run: Solution | None
     reference: Trajectory | None
     faults: list[str]
+
+
+def scene_of(stored: StoredScene) -> Scene | None:
+    """The scene of its stored text; None where that is not a scene."""
+    try:
+        return parse_scene(str(stored.attributes.get("scene_toml", "")), stored.name)
+    except InputError:
+        return None
 
 
 def rehydrate(stored: StoredScene, run: StoredRun) -> Rehydrated:

@@ -1,6 +1,6 @@
-"""One number read off a stored run: an extreme, a range, how it grows. Knows no claim and no method.
+"""One number read off a stored run: an extreme, a range, how it grows.
 
-Extremes are read off an integrator's own output points where the run has them, as off a printed figure.
+Extremes are read at an integrator's own output points where the run has them, as off a printed figure.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The finding in numbers: how much of the paper comes out, what its errata do, how far the right models agree.
-
-Knows no words: the sentences are the report's.
-"""
+"""The finding in numbers: how much of the paper is reproduced, what its errata do, how well corrected models agree."""
 
 from __future__ import annotations
 
@@ -10,19 +7,18 @@ from dataclasses import dataclass
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.errors import InputError
+from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.scenario.names import natural_order
-from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.store.read import StoredScene
 
-# Share of a scene's energy scale. ode45's own drift at the paper's tolerances is below a thousandth of that (seen on
-# the right equations: 3e-7 of the scale at most).
-MADE_ENERGY = 1e-3
+# Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that
+# (3e-7 of the scale at most, on the corrected equations).
+ENERGY_RISE = 1e-3
 
 
 @dataclass(frozen=True)
 class Tally:
-    """So many of so many."""
+    """A count of a total."""
 
     count: int
     of: int
@@ -30,10 +26,10 @@ class Tally:
 
 @dataclass(frozen=True)
 class Reproduced:
-    """Published numbers of one figure that the printed model gives, and on what condition.
+    """Published numbers of one figure that the printed model reproduces, and the conditions.
 
-    gravity   m/s², None where the file does not tell; duration: s
-    matched   whether they are grown rounding error, with the run's length and the order of adding chosen to match
+    gravity   m/s², None where it is not known; duration: s
+    matched   whether they are grown rounding error, for a run length and an order of adding chosen to match
     """
 
     figure: str
@@ -45,21 +41,24 @@ class Reproduced:
 
 @dataclass(frozen=True)
 class PrintedEnergy:
-    """Scenes in which the printed equations make energy.
+    """Scenes in which the energy of the printed model rises without work.
 
     gain, scene   J: the largest gain among runs that reached their end, and where ("" where none did)
-    broke_off     scenes where the integration ended early
+    ended_early   scenes where the integration ended early
     """
 
-    made: Tally
+    rises: Tally
     gain: float
     scene: str
-    broke_off: tuple[str, ...]
+    ended_early: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """A right model's worst over the scenes: rad up to each horizon, energy relative to its scale; None: no data."""
+    """A corrected model's largest errors over the scenes.
+
+    angle_error rad up to each horizon, energy_drift relative to the energy scale; None without data.
+    """
 
     method: str
     runs: Tally  # ok, of all
@@ -69,14 +68,14 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Finding:
-    """Parts are None, or empty, where the file cannot tell."""
+    """Parts are None, or empty, where the file does not have the data."""
 
     scenes: int
     numbers: Tally | None
-    numbers_right: Tally | None
+    numbers_corrected: Tally | None
     reproduced: tuple[Reproduced, ...]
     claims_printed: Tally | None
-    claims_right: Tally | None
+    claims_corrected: Tally | None
     energy: PrintedEnergy | None
     agreement: tuple[Agreement, ...]
 
@@ -89,10 +88,10 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
     return Finding(
         len(scenes),
         _tally(claim.printed.holds for claim in numbers),
-        _tally(claim.right.holds for claim in numbers),
+        _tally(claim.corrected.holds for claim in numbers),
         _reproduced(scenes, [claim for claim in numbers if claim.printed.holds]),
         _tally(claim.printed.holds for claim in others),
-        _tally(claim.right.holds for claim in others),
+        _tally(claim.corrected.holds for claim in others),
         _printed_energy(scenes),
         _agreement(scenes),
     )
@@ -118,15 +117,9 @@ def _on_condition(figure: str, numbers: Sequence[Claim], scenes: Mapping[str, St
     run = methods.printed_run(stored)
     assert run is not None  # it has given the number
     matched = any(claim.published.matched for claim in numbers)
-    return Reproduced(figure, len(numbers), _gravity(stored), float(run.array("time")[-1]), matched)
-
-
-def _gravity(stored: StoredScene) -> float | None:
-    """m/s², from the scene's stored text."""
-    try:
-        return parse_scene(str(stored.attributes.get("scene_toml", "")), stored.name).gravity
-    except InputError:
-        return None
+    scene = scene_of(stored)
+    gravity = None if scene is None else scene.gravity
+    return Reproduced(figure, len(numbers), gravity, float(run.array("time")[-1]), matched)
 
 
 def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
@@ -134,11 +127,11 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
     gains = {name: run.attributes["energy_gain_J"] for name, run in runs.items() if "energy_gain_J" in run.attributes}
     if not gains:
         return None
-    made = [name for name in gains if gains[name] > MADE_ENERGY * runs[name].attributes["energy_scale_J"]]
+    made = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
     complete = {name: gains[name] for name in made if runs[name].status == "ok"}
     largest = max(complete, key=lambda name: complete[name], default="")
-    broke_off = tuple(name for name, run in runs.items() if run.status not in ("ok", "inaccurate"))
-    return PrintedEnergy(Tally(len(made), len(gains)), complete.get(largest, 0.0), largest, broke_off)
+    ended_early = tuple(name for name, run in runs.items() if run.status not in ("ok", "inaccurate"))
+    return PrintedEnergy(Tally(len(made), len(gains)), complete.get(largest, 0.0), largest, ended_early)
 
 
 def _agreement(scenes: Mapping[str, StoredScene]) -> tuple[Agreement, ...]:

@@ -18,10 +18,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.kinematics import tip_paths
+from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core.canvas import font_file
 from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
-from rotor_mbs.report.pages.viewer import magnification, scene_of
+from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots.paths import projected
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results

@@ -94,8 +94,8 @@ def test_a_number_that_the_printed_model_gives_and_the_right_one_does_not(tmp_pa
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as results:
         found = claims(results.scenes, [number("max", 2.7315)])
-    assert [(one.printed.holds, one.right.holds) for one in found] == [(True, False)]
-    assert found[0].right.value == pytest.approx(3.67)
+    assert [(one.printed.holds, one.corrected.holds) for one in found] == [(True, False)]
+    assert found[0].corrected.value == pytest.approx(3.67)
 
 
 def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
             ],
         )
     assert [one.printed.holds for one in found] == [True, False, True, False, False]
-    assert all(one.right.holds is None for one in found)
+    assert all(one.corrected.holds is None for one in found)
 
 
 def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_a_run_that_ended_early_is_named(tmp_path: Path) -> None:
     made = Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t), until=0.5, attributes={"status": "solver_failed"})
     with open_results(store(tmp_path / "r.h5", [made])) as results:
         found = claims(results.scenes, [claim(Condition(of=of("range"), relation=">", bound=0.1))])
-    assert found[0].printed.broke_off == ("paper/fig11",)
+    assert found[0].printed.ended_early == ("paper/fig11",)
 
 
 def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path: Path) -> None:
@@ -159,11 +159,11 @@ def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
     with open_results(store(tmp_path / "r.h5", runs)) as results:
         facts = finding(results.scenes, [])
     assert facts.energy is not None
-    assert (facts.energy.made.count, facts.energy.made.of) == (2, 2)
+    assert (facts.energy.rises.count, facts.energy.rises.of) == (2, 2)
     # The run that broke off made more, but what a runaway reaches is no measure.
     assert facts.energy.gain == pytest.approx(3e5)
     assert facts.energy.scene == "paper/fig11"
-    assert facts.energy.broke_off == ("paper/fig12",)
+    assert facts.energy.ended_early == ("paper/fig12",)
     (agreement,) = facts.agreement
     assert agreement.angle_error == pytest.approx(1e-9)
     assert (agreement.runs.count, agreement.runs.of) == (1, 2)

@@ -51,7 +51,7 @@ def unit_of(asked: TrajectoryNumber) -> str:
 
 
 def _number_row(claim: Claim) -> list[TableCell]:
-    item, printed, corrected = claim.published, claim.printed, claim.right
+    item, printed, corrected = claim.published, claim.printed, claim.corrected
     assert item.of is not None  # every number has it
     verdict = _verdict(printed.holds, "reproduced", "not reproduced")
     if item.matched and printed.holds:
@@ -74,7 +74,7 @@ def _claim_row(claim: Claim) -> list[TableCell]:
         TableCell(item.statement, note=f"«{item.quote}»", note_language="es"),
         *(
             replace(_verdict(one.holds, "holds", "does not hold"), note=_evidence(one) if one.holds is not None else "")
-            for one in (claim.printed, claim.right)
+            for one in (claim.printed, claim.corrected)
         ),
     ]
 
@@ -94,8 +94,8 @@ def _evidence(outcome: Outcome) -> str:
     text = _reading(shown[0])
     if len(shown) > 1:
         text += f"; {len(shown) - 1} more {'fail' if failed else 'tests hold'}"
-    if outcome.broke_off:
-        text += f" (judged by the samples there are: the run ended early in {', '.join(outcome.broke_off)})"
+    if outcome.ended_early:
+        text += f" (judged by the samples there are: the run ended early in {', '.join(outcome.ended_early)})"
     return text
 
 

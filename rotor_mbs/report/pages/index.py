@@ -114,7 +114,7 @@ def finding_sentences(facts: Finding) -> list[str]:
 
 
 def _reproduced(facts: Finding) -> str:
-    numbers, printed, corrected = facts.numbers, facts.claims_printed, facts.claims_right
+    numbers, printed, corrected = facts.numbers, facts.claims_printed, facts.claims_corrected
     if numbers is None:
         tallies = [(printed, "printed"), (corrected, "corrected")]
         parts = [f"{_share(tally)} hold in the {model} model" for tally, model in tallies if tally is not None]
@@ -125,8 +125,8 @@ def _reproduced(facts: Finding) -> str:
     )
     if facts.reproduced:
         text += f": {'; '.join(map(_condition, facts.reproduced))}"
-    if facts.numbers_right is not None:
-        text += f". The corrected model reproduces {facts.numbers_right.count or 'none'}"
+    if facts.numbers_corrected is not None:
+        text += f". The corrected model reproduces {facts.numbers_corrected.count or 'none'}"
     if printed is not None and corrected is not None:
         text += (
             f"; of the paper's claims in words {_share(printed)} hold in the printed model, {_share(corrected)} in the "
@@ -148,17 +148,16 @@ def _printed_energy(energy: PrintedEnergy | None) -> str:
     if energy is None:
         return ""
     text = "Three errors in the printed matrices (E1, E2, E3) make the printed model inconsistent in energy: "
-    if not energy.made.count:
-        where = "this scene" if energy.made.of == 1 else "these scenes"
+    if not energy.rises.count:
+        where = "this scene" if energy.rises.of == 1 else "these scenes"
         return f"{text}but its energy does not rise noticeably in {where}."
-    scenes = f"{energy.made.of} scene{'' if energy.made.of == 1 else 's'}"
-    text += (
-        f"its energy rises without work done, by more than a thousandth of its scale in {energy.made.count} of {scenes}"
-    )
+    rises, of = energy.rises.count, energy.rises.of
+    where = f"{rises} of {of} scene{'' if of == 1 else 's'}"
+    text += f"its energy rises without work done, by more than a thousandth of its scale in {where}"
     if energy.scene:
         text += f", among the runs that reach the end by up to {prefixed(energy.gain, 'J')}"
-    if energy.broke_off:
-        text += f", and in {len(energy.broke_off)} it diverges until ode45 stops"
+    if energy.ended_early:
+        text += f", and in {len(energy.ended_early)} it diverges until ode45 stops"
     return f"{text}."
 
 

@@ -7,12 +7,12 @@ from itertools import product
 
 import numpy as np
 
+from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.error_pictures import Curves, error_picture, run_legend, visible
-from rotor_mbs.report.pages.viewer import scene_of
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.time_histories import Series
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities

@@ -17,10 +17,9 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report.core.looks import coordinate_look
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]
@@ -39,14 +38,6 @@ class Viewer:
     data: Markup
     models: Sequence[str]
     magnified: int | None
-
-
-def scene_of(stored: StoredScene) -> Scene | None:
-    """The scene as its stored text says; None where that is not a scene or has other blades than the runs."""
-    try:
-        return parse_scene(str(stored.attributes.get("scene_toml", "")), stored.name)
-    except InputError:
-        return None
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> Viewer | None:

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.claims import Claim
+from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report import paper_figures
 from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, quantity
 from rotor_mbs.report.pages.claims import description_of, unit_of
 from rotor_mbs.report.pages.scene_tables import horizon, metric
-from rotor_mbs.report.pages.viewer import scene_of
 from rotor_mbs.report.paper_figures import HEADINGS, PATHS, TORQUES, PaperFigure, compared_runs
 from rotor_mbs.store.read import StoredRun, StoredScene
 
@@ -147,7 +147,7 @@ def _number(claim: Claim) -> str:
     item = claim.published
     assert item.of is not None  # every number has it
     published, printed, corrected = (
-        fixed(value, item.decimals) for value in (item.value, claim.printed.value, claim.right.value)
+        fixed(value, item.decimals) for value in (item.value, claim.printed.value, claim.corrected.value)
     )
     return (
         f"{with_capital(description_of(item.of))}: published {published} {unit_of(item.of)}; as printed {printed}; "
