@@ -52,7 +52,7 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
     found = []
     for item in published() if items is None else items:
         printed = _outcome(item, _Runs(scenes, methods.printed_run))
-        found.append(Claim(item, printed, _outcome(item, _Runs(scenes, methods.right_run))))
+        found.append(Claim(item, printed, _outcome(item, _Runs(scenes, methods.corrected_run))))
     return [claim for claim in found if claim.is_decided]
 
 

@@ -1,13 +1,10 @@
-"""Which of a scene's runs is the printed model, which are right models, which stands for the right answer.
-
-Knows the names of methods only; no numbers.
-"""
+"""Which of a scene's runs are of the printed model, which of corrected models, which is the most accurate one."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rotor_mbs.methods.catalogue import errata_methods, method_names
+from rotor_mbs.methods.catalogue import errata_methods, is_corrected, method_names
 from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
@@ -36,21 +33,19 @@ def printed_run(scene: StoredScene) -> StoredRun | None:
     return run if run is not None and has_samples(run) else None
 
 
-def right_runs(scene: StoredScene) -> dict[str, StoredRun]:
+def corrected_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """Runs of the corrected models, in the order of the catalogue; those without samples too."""
-    corrected = method_names(is_corrected=True)
-    return {name: scene.methods[name] for name in corrected if name in scene.methods}
+    return {name: scene.methods[name] for name in in_catalogue_order(scene.methods) if is_corrected(name)}
 
 
-def right_run(scene: StoredScene) -> StoredRun | None:
-    """What stands for the right answer: the reference, else the first right model that has samples."""
-    candidates = [scene.reference, *right_runs(scene).values()]
+def corrected_run(scene: StoredScene) -> StoredRun | None:
+    """The reference, else the first run of a corrected model that has samples; None without either."""
+    candidates = [scene.reference, *corrected_runs(scene).values()]
     return next((run for run in candidates if run is not None and has_samples(run)), None)
 
 
 def in_order(scene: StoredScene) -> dict[str, StoredRun]:
-    """All runs as a reader wants them: printed, reference, right models, each erratum alone, others."""
-    right = right_runs(scene)
-    first = [PRINTED, REFERENCE, *right, *errata_methods().values()]
+    """All runs in the order of tables: printed, reference, corrected models, each erratum alone, others."""
+    first = [PRINTED, REFERENCE, *corrected_runs(scene), *errata_methods().values()]
     names = [name for name in first if name in scene.runs]
     return {name: scene.runs[name] for name in [*names, *(name for name in scene.runs if name not in names)]}

@@ -135,7 +135,7 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
 
 
 def _agreement(scenes: Mapping[str, StoredScene]) -> tuple[Agreement, ...]:
-    names = dict.fromkeys(name for scene in scenes.values() for name in methods.right_runs(scene))
+    names = dict.fromkeys(name for scene in scenes.values() for name in methods.corrected_runs(scene))
     return tuple(_worst(name, scenes) for name in methods.in_catalogue_order(names))
 
 

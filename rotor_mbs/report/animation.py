@@ -70,7 +70,7 @@ def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image
     scene = scene_of(stored)
     runs = {
         label_of(run.method): run
-        for run in (methods.printed_run(stored), methods.right_run(stored))
+        for run in (methods.printed_run(stored), methods.corrected_run(stored))
         if run is not None and "angles" in run
     }
     if scene is None or not runs:

@@ -66,12 +66,12 @@ def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """The scene's runs by the keys of HEADINGS, those that have samples of angles and rates."""
     exudyn = [
-        run for name, run in methods.right_runs(scene).items()
+        run for name, run in methods.corrected_runs(scene).items()
         if (method := look_up(name)) and "exudyn" in method.distributions and methods.has_samples(run)
     ]  # fmt: skip
     runs = {
         "printed": methods.printed_run(scene),
-        "corrected": methods.right_run(scene),
+        "corrected": methods.corrected_run(scene),
         "exudyn": next(iter(exudyn), None),
     }
     found: dict[str, StoredRun] = {}

@@ -138,10 +138,10 @@ def test_a_run_that_ended_early_is_named(tmp_path: Path) -> None:
 def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path: Path) -> None:
     right = [Made(FIG11, name, rotor(np.zeros_like)) for name in ("exudyn_tree/rk67", TAYLOR, REFERENCE, PRINTED)]
     with open_results(store(tmp_path / "a.h5", right)) as results:
-        assert methods.right_run(results.scenes["paper/fig11"]).method == REFERENCE
+        assert methods.corrected_run(results.scenes["paper/fig11"]).method == REFERENCE
         assert list(methods.in_order(results.scenes["paper/fig11"]))[:2] == [PRINTED, REFERENCE]
     with open_results(store(tmp_path / "b.h5", right[:2])) as results:
-        assert methods.right_run(results.scenes["paper/fig11"]).method == TAYLOR
+        assert methods.corrected_run(results.scenes["paper/fig11"]).method == TAYLOR
         assert methods.printed_run(results.scenes["paper/fig11"]) is None
 
 

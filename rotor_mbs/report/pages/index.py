@@ -60,7 +60,7 @@ def versions(results: Results) -> list[tuple[str, str]]:
 def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
     """A row per scene: its horizon, the printed model's departure, the errors of the corrected models."""
     corrected = methods.in_catalogue_order(
-        dict.fromkeys(name for scene in scenes.values() for name in methods.right_runs(scene))
+        dict.fromkeys(name for scene in scenes.values() for name in methods.corrected_runs(scene))
     )
     head = ["Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain"]
     for name in corrected:

@@ -77,8 +77,8 @@ class DrawnRuns:
     @classmethod
     def of(cls, scene: StoredScene) -> DrawnRuns:
         """The runs of `scene` that have samples."""
-        printed, corrected = methods.printed_run(scene), methods.right_run(scene)
-        good = {n: run for n, run in methods.right_runs(scene).items() if methods.has_samples(run)}
+        printed, corrected = methods.printed_run(scene), methods.corrected_run(scene)
+        good = {n: run for n, run in methods.corrected_runs(scene).items() if methods.has_samples(run)}
         others = {name: run for name, run in good.items() if corrected is None or name != corrected.method}
         return cls(scene, printed, corrected, others, scene_tables.horizon(scene))
 
@@ -142,7 +142,7 @@ def _lead(drawn: DrawnRuns) -> list[str]:
         gain = metric(printed, "energy_gain_J")
         energy = "" if gain is None else f"; its energy rises by up to {prefixed(gain, 'J')}"
         found.append(f"The printed model departs from the reference by up to {quantity(departure, 'rad')}{energy}.")
-    runs = [run for run in methods.right_runs(drawn.scene).values() if run.status == "ok"]
+    runs = [run for run in methods.corrected_runs(drawn.scene).values() if run.status == "ok"]
     errors = [error for run in runs if (error := metric(run, "angle_error_max")) is not None]
     if errors and drawn.horizon is not None:
         found.append(

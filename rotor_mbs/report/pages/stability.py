@@ -199,7 +199,7 @@ def _shown(value: float | None) -> str:
 
 
 def _scene_page(scene: StoredScene, own: Sequence[Cell], ladders: Sequence[Record]) -> StabilityScenePage:
-    corrected = methods.right_runs(scene)
+    corrected = methods.corrected_runs(scene)
     runs = {name: run for name, run in corrected.items() if methods.has_samples(run) and len(run.array("time")) > 1}
     return StabilityScenePage(
         scene.name,
@@ -208,7 +208,7 @@ def _scene_page(scene: StoredScene, own: Sequence[Cell], ladders: Sequence[Recor
         opening_comment(scene),
         str(scene.attributes["scene_toml"]),
         Section(tables=[_outcome_table(own)]),
-        _motion(methods.right_run(scene)),
+        _motion(methods.corrected_run(scene)),
         _errors(scene, runs),
         _error_over_step(ladders),
         previous="",
