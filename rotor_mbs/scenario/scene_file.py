@@ -5,14 +5,13 @@ Quoted expressions are evaluated here, once for every model.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
-from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path
+from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_value
 
 
 def load_scene(path: Path, name: str) -> Scene:
@@ -88,20 +87,14 @@ def scene_toml(scene: Scene) -> str:
     Comments and expressions of the file that the scene was read from are not kept.
     """
     tables = scene_tables(scene)
-    parts = ["".join(f"{key} = {_toml_value(tables[key])}\n" for key in tables if not _is_table(tables[key]))]
+    parts = ["".join(f"{key} = {toml_value(tables[key])}\n" for key in tables if not _is_table(tables[key]))]
     for key, value in tables.items():
         if _is_table(value):
             head = f"[{key}]" if isinstance(value, dict) else f"[[{key}]]"
             for table in [value] if isinstance(value, dict) else value:
-                parts.append(f"{head}\n" + "".join(f"{name} = {_toml_value(table[name])}\n" for name in table))
+                parts.append(f"{head}\n" + "".join(f"{name} = {toml_value(table[name])}\n" for name in table))
     return "\n".join(parts)
 
 
 def _is_table(value: Any) -> bool:
     return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(_toml_value(entry) for entry in value)}]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)

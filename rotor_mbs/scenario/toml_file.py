@@ -5,6 +5,7 @@ Everything that prevents reading is one line of an InputError: `file:line: what 
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -80,6 +81,19 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     except ValueError as error:
         # The reader does not convert this one to its own error: whole numbers of more digits than Python converts.
         raise InputError(f"{source}:1: a number is too long; allowed: |x| <= 1e300") from error
+
+
+def toml_value(value: object) -> str:
+    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables.
+
+    >>> toml_value({"start": 0.1, "names": ["a"], "log": True})
+    '{"start" = 0.1, "names" = ["a"], "log" = true}'
+    """
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml_value(entry) for entry in value)}]"
+    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
 def _read_text(path: Path) -> str:
