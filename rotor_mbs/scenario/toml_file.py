@@ -93,7 +93,7 @@ def toml_value(value: object) -> str:
         return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(toml_value(entry) for entry in value)}]"
-    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+    return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
 def _read_text(path: Path) -> str:
