@@ -1,10 +1,64 @@
-"""rotor_mbs: every scene of a rotor built two independent ways, compared, and held against a paper.
+"""rotor_mbs: scenes of a bladed rotor by independent models, compared with a reference, and with a published paper.
 
-The way of the data, and of the imports (an upper layer may import a lower one, never the reverse):
+The Python API. Everything is loaded when it is first used: importing this package imports nothing else.
 
-    scenario -> models -> runner -> store (HDF5) -> analysis -> report;  cli knows them all
+    scenes, scene, load      names of the shipped scenes; one of them; a scene of one's own from a TOML file
+    run                      one scene by one method: a `Run`
+    compare                  one scene by several methods, against its reference: a `Comparison`
+    sweep                    one scene over the values of its parameters: a `Sweep`
+    open                     a results file: runs by their path; the dataset of a sweep
 
-Importing this package imports nothing else: the command line must start in a blink.
+Examples
+--------
+>>> import rotor_mbs as rm
+>>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
+>>> run = rm.run(scene, "exudyn_tree/rk67")
+>>> run.status, run.angles.shape
+('ok', (101, 4))
 """
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from rotor_mbs.api import Comparison as Comparison
+    from rotor_mbs.api import ResultsTree as ResultsTree
+    from rotor_mbs.api import Run as Run
+    from rotor_mbs.api import compare as compare
+    from rotor_mbs.api import load as load
+    from rotor_mbs.api import open as open
+    from rotor_mbs.api import run as run
+    from rotor_mbs.api import scene as scene
+    from rotor_mbs.api import scenes as scenes
+    from rotor_mbs.errors import InputError as InputError
+    from rotor_mbs.errors import MethodRefusal as MethodRefusal
+    from rotor_mbs.errors import RotorError as RotorError
+    from rotor_mbs.errors import StoreError as StoreError
+    from rotor_mbs.methods.base import Method as Method
+    from rotor_mbs.scenario.scene import Blade as Blade
+    from rotor_mbs.scenario.scene import Scene as Scene
+
+_PLACES = {
+    "rotor_mbs.api": ("Comparison", "ResultsTree", "Run", "compare", "load", "open", "run", "scene", "scenes"),
+    "rotor_mbs.errors": ("InputError", "MethodRefusal", "RotorError", "StoreError"),
+    "rotor_mbs.methods.base": ("Method",),
+    "rotor_mbs.scenario.scene": ("Blade", "Scene"),
+}
+_HOME = {name: place for place, names in _PLACES.items() for name in names}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    """PEP 562: a public name is imported when it is first asked for."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from html import escape
 from typing import Any
@@ -13,9 +13,6 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import SCALES, Array, arrays, find_quantity, scale_values
 from rotor_mbs.solution.record import Integration, Trajectory
-
-# What a notebook shows below the table of a solution: functions from a solution to HTML, added by upper layers.
-NOTEBOOK_PARTS: list[Callable[[Solution], str]] = []
 
 
 @dataclass
@@ -94,10 +91,7 @@ class Solution:
         InputError
             Where xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError as exc:
-            raise InputError('xarray is not installed; allowed: pip install "rotor_mbs[xarray]"') from exc
+        xarray = need_xarray()
         labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
         if (refined := self.trajectory.get("refined_time")) is not None:
@@ -117,7 +111,7 @@ class Solution:
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
     def _repr_html_(self) -> str:
-        """For a notebook: a table of status and numbers, then what upper layers add."""
+        """For a notebook: a table of status and numbers."""
         reached = f"{self.time[-1]:g} s of {self.scene.duration:g} s" if len(self.time) else "no sample"
         rows = {
             "method": self.method,
@@ -129,8 +123,16 @@ class Solution:
             **{name: f"{value:.3g}" for name, value in self.metrics.items()},
         }
         cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items() if v)
-        parts = "".join(part(self) for part in NOTEBOOK_PARTS)
-        return f"<table><caption>{escape(self.scene.title)}</caption>{cells}</table>{parts}"
+        return f"<table><caption>{escape(self.scene.title)}</caption>{cells}</table>"
+
+
+def need_xarray() -> Any:
+    """The module xarray. Raises InputError that says how to get it."""
+    try:
+        import xarray
+    except ImportError as exc:
+        raise InputError('xarray is not installed; allowed: pip install "rotor_mbs[xarray]"') from exc
+    return xarray
 
 
 def _described(units: str, long_name: str) -> dict[str, str]:

@@ -109,8 +109,18 @@ def legend_below(figure: Figure, labelled: Sequence[tuple[str, Look]]) -> None:
         figure.legend(lines, names, loc="lower center", ncols=min(len(lines), 5), handlelength=2.6)
 
 
+def legend_inside(axes: Any, labelled: Sequence[tuple[str, str, Any, str]]) -> None:
+    """(label, colour, line, marker) of each curve, where the axes have most room."""
+    with matplotlib.rc_context(_STYLE):
+        lines = [Line2D([], [], color=c, linestyle=line, marker=mark) for _, c, line, mark in labelled]
+        axes.legend(lines, [label for label, *_ in labelled], loc="best", fontsize=8.0)
+
+
+KINDS = ("pdf", "svg", "png")
+
+
 def encoded(figure: Figure, kind: str) -> bytes:
-    """The figure as a file: "pdf", "svg" or "png"; the same bytes every time."""
+    """The figure as a file of one of KINDS; the same bytes every time."""
     metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
     with style(for_print=True):
         stream = io.BytesIO()

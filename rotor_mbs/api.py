@@ -1,0 +1,354 @@
+"""The Python API: what `import rotor_mbs as rm` offers, on the studies that the command line runs, too.
+
+Prints nothing. Bad input raises `rotor_mbs.errors.InputError`, an unreadable or foreign file `StoreError`.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotor_mbs.analysis.rehydrate import rehydrate
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.methods.catalogue import REFERENCE, check_names, default_methods
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene_file import load_scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import compare as metrics_of
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.solution import Solution, need_xarray
+from rotor_mbs.store.read import StoredRun, StoredScene, open_results
+from rotor_mbs.studies.frozen import frozen_file, frozen_solution
+from rotor_mbs.studies.run import able_methods, asked_methods, run_scenes
+
+if TYPE_CHECKING:
+    from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
+
+
+def scenes(folder: str = "") -> list[str]:
+    """Names of the shipped scenes, of one folder where it is named.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> rm.scenes("paper")[:3]
+    ['paper/fig03', 'paper/fig04b', 'paper/fig05']
+    """
+    names = [name for name, _ in list_scenes() if not folder or name.startswith(f"{folder.rstrip('/')}/")]
+    if not names:
+        folders = sorted({name.partition("/")[0] for name, _ in list_scenes()})
+        raise InputError(f"no shipped scenes in {folder!r}; allowed: {', '.join(folders)}")
+    return names
+
+
+def scene(name: str) -> Scene:
+    """The shipped scene of that name. Raises InputError, with the nearest names, where there is none.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> scene = rm.scene("paper/fig11")
+    >>> scene.title, len(scene.blades), scene.gravity
+    ('Three pitched blades, rotor at 30 degrees and pi/10 rad/s', 3, 9.8)
+    >>> scene.replace(gravity=9.81, **{"initial.angles[1]": 0.3}).initial_angles[1]
+    0.3
+    """
+    found = find_scenes([name])
+    if len(found) != 1:
+        raise InputError(f"{name}: {len(found)} scenes; allowed: the name of one scene, see rotor_mbs.scenes()")
+    return found[0]
+
+
+def load(path: str | os.PathLike[str]) -> Scene:
+    """The scene in a TOML file, named like the file. Raises InputError with every fault of the file, a line each."""
+    return load_scene(Path(path), Path(path).stem)
+
+
+def run(
+    scene: Scene, method: str = "lagrange/taylor", *, timeout: float = float("inf"), reference: bool = False,
+    **settings: object,
+) -> Run:  # fmt: skip
+    """One scene by one method, in this process, judged from its samples.
+
+    Parameters
+    ----------
+    scene : from `scene`, `load`, or made by `Scene.replace`.
+    method : "model/integrator"; `rotor-mbs show` lists those that can represent a scene.
+    timeout : s, after which the integration ends itself; `Run.status` is then "timed_out".
+    reference : whether to compute the quad-precision reference of a scene that has no shipped one (up to some seconds).
+        Without any, the status rests on the samples and the energy balance.
+    **settings : of the method, in place of its defaults; `find_method(method).settings` has names, units and ranges.
+
+    Raises
+    ------
+    InputError
+        For an unknown method, or a setting that the method does not have or that is out of its range.
+    MethodRefusal
+        Where the method cannot represent the scene, or is not installed.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> run = rm.run(rm.scene("paper/fig08"), "lagrange/dop853", relative_tolerance=1e-12)
+    >>> run.status
+    'ok'
+    >>> run.metrics["angle_error_max"] < 1e-9   # rad, against the reference, up to the scene's horizon
+    True
+    """
+    exact = _reference(scene, compute=reference)
+    found = _with_reference(solve(method, scene, settings, time_limit_s=timeout), exact)
+    judgement = judge(scene, found, exact)
+    found.status, found.message, found.metrics = judgement.status, judgement.message, judgement.metrics
+    return found
+
+
+def _reference(scene: Scene, *, compute: bool) -> Trajectory | None:
+    """The shipped reference of the scene's numbers; else a computed one, where that is asked for."""
+    number = scene_hash(scene)
+    if frozen_file(number) is not None:
+        return frozen_solution(scene, number)[0].trajectory
+    return solve(REFERENCE, scene, {}).trajectory if compute else None
+
+
+@dataclass
+class Run(Solution):
+    """A scene by one method.
+
+    As `Solution`: samples (`time`, `angles`, `rates`, `run["tip"]`), `status`, `message`, `metrics`, `settings`, times,
+    `to_xarray()`. In addition:
+
+    Attributes
+    ----------
+    reference : the trajectory it was judged against; None where there was none.
+    plot : `run.plot()` draws the motion; `run.plot.energy()`, `run.plot.error()`, `run.plot.tips()`.
+    """
+
+    reference: Trajectory | None = None
+
+    @property
+    def plot(self) -> RunPlots:
+        from rotor_mbs.report.run_plots import RunPlots  # late: matplotlib
+
+        return RunPlots(self, self.reference)
+
+    def _repr_html_(self) -> str:
+        return super()._repr_html_() + (self.plot()._repr_svg_() if len(self.time) else "")
+
+
+@dataclass
+class Comparison:
+    """A scene by several methods, judged against its reference, in one results file.
+
+    Attributes
+    ----------
+    scene, runs : the scene; a `Run` by the name of each method.
+    reference : the trajectory that they were compared with.
+    plot : `comparison.plot.error()`, `.rotor()`, `.energy_error()`.
+    """
+
+    scene: Scene
+    runs: dict[str, Run]
+    reference: Trajectory | None
+    _file: Path  # in a temporary folder, removed with this object
+
+    def __post_init__(self) -> None:
+        weakref.finalize(self, shutil.rmtree, self._file.parent, ignore_errors=True)
+
+    def __getitem__(self, method: str) -> Run:
+        return self.runs[method]
+
+    def table(self) -> Table:
+        """A row for each method: status, error (rad), energy drift (of the energy scale), run time (s)."""
+        return Table(
+            ("method", "status", "error (rad)", "energy drift", "time (s)"), [_row(r) for r in self.runs.values()]
+        )
+
+    @property
+    def plot(self) -> ComparisonPlots:
+        from rotor_mbs.report.run_plots import ComparisonPlots  # late: matplotlib
+
+        return ComparisonPlots(self.runs, self.reference)
+
+    def to_xarray(self) -> Any:
+        """All runs as one xarray.Dataset with the dimension `solver`; samples that a run did not reach are NaN.
+
+        Select by label: `data.angles.sel(solver="lagrange/taylor", coordinate="pitch 1")`.
+        """
+        xarray = need_xarray()
+        names = list(self.runs)
+        sets = [self.runs[name].to_xarray() for name in names]
+        over_time = [one.drop_dims("refined_time", errors="ignore") for one in sets]
+        joined = xarray.concat(
+            over_time, xarray.Variable("solver", names), join="outer", combine_attrs="drop_conflicts"
+        )
+        statuses = xarray.Variable("solver", [self.runs[name].status for name in names])
+        return joined.assign(status=statuses)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """The results file under another name; `rotor-mbs report` and `rotor_mbs.open` read it. Replaces the file."""
+        target = Path(path)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(self._file, target)
+        except OSError as exc:
+            raise StoreError(f"{target}: cannot be written: {exc.strerror}") from exc
+        return target
+
+    def to_html(self, folder: str | os.PathLike[str]) -> Path:
+        """The report's pages into a folder; the path of its index."""
+        from rotor_mbs.report.build import write_report  # late: templates
+
+        return write_report(self._file, Path(folder))
+
+    def __repr__(self) -> str:
+        return f"{self.scene.name}: {self.scene.title}\n{self.table()}"
+
+    def _repr_html_(self) -> str:
+        drawn = self.plot.error()._repr_svg_() if self.reference is not None else ""
+        return f"<p>{escape(self.scene.name)}: {escape(self.scene.title)}</p>{self.table()._repr_html_()}{drawn}"
+
+
+def compare(
+    scene: Scene, methods: Sequence[str] = (), *, workers: int = 0, timeout: float = 60.0, **settings: object
+) -> Comparison:
+    """One scene by several methods, each judged against the scene's reference (shipped, or computed).
+
+    Parameters
+    ----------
+    methods : names; the default set where none is given, without those that cannot represent the scene.
+    workers : parallel processes; 0 runs everything in this process. In a script, processes need the usual
+        `if __name__ == "__main__":`.
+    timeout : s, for each run.
+    **settings : of every method, in place of its defaults.
+
+    Raises
+    ------
+    InputError
+        For an unknown method or setting, and for a method that was named and cannot represent the scene.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
+    >>> study = rm.compare(scene, ["lagrange/dop853", "exudyn_tree/rk67"])
+    >>> [run.status for run in study.runs.values()]
+    ['ok', 'ok']
+    >>> float(study.to_xarray().angles.sel(solver="exudyn_tree/rk67", coordinate="pitch 1").isel(time=0))
+    0.7853981633974483
+    """
+    named = check_names(methods)
+    able = asked_methods([scene], named)[scene.name] if named else able_methods(scene, default_methods())[0]
+    path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "comparison.h5"
+    run_scenes([scene], {scene.name: able}, path, workers=workers, timeout_s=timeout, settings=settings)
+    with open_results(path) as results:
+        stored = results.scenes[scene.name]
+        runs = {name: _loaded(stored, stored.runs[name]) for name in able}
+    reference = next(iter(runs.values())).reference if runs else None
+    return Comparison(scene, runs, reference, path)
+
+
+def open(path: str | os.PathLike[str]) -> ResultsTree:
+    """The results file at `path`: its scenes and runs by path. Raises StoreError where it is none.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> tree = rm.open("rotor-mbs-out/results.h5")            # doctest: +SKIP
+    >>> tree["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
+    (1001, 4)
+    """
+    with open_results(Path(path)) as results:
+        return ResultsTree(Path(path), {name: tuple(scene.runs) for name, scene in results.scenes.items()})
+
+
+@dataclass(frozen=True)
+class ResultsTree(Mapping[str, Run]):
+    """A results file: a mapping from "scene/model/integrator" (or "scene/reference") to a `Run`, read when asked for.
+
+    Attributes
+    ----------
+    path : of the file, which is open only while something is read.
+    scenes : names of the methods (and "reference") by the name of each scene.
+    """
+
+    path: Path
+    scenes: Mapping[str, tuple[str, ...]]
+
+    def __getitem__(self, name: str) -> Run:
+        """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
+        scene = next((one for one in self.scenes if name.startswith(f"{one}/")), None)
+        if scene is None or name.removeprefix(f"{scene}/") not in self.scenes[scene]:
+            raise KeyError(f"{name}; the file has: {', '.join(self)}")
+        with open_results(self.path) as results:
+            stored = results.scenes[scene]
+            return _loaded(stored, stored.runs[name.removeprefix(f"{scene}/")])
+
+    def __iter__(self) -> Iterator[str]:
+        return (f"{scene}/{method}" for scene, methods in self.scenes.items() for method in methods)
+
+    def __len__(self) -> int:
+        return sum(map(len, self.scenes.values()))
+
+    def to_xarray(self) -> Any:
+        """The whole file as an xarray.DataTree, opened lazily."""
+        return need_xarray().open_datatree(self.path)
+
+    def __repr__(self) -> str:
+        return "\n".join([f"{self.path}: {len(self.scenes)} scenes, {len(self)} runs", *map("  {}".format, self)])
+
+
+def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
+    """A run as it was stored; its metrics follow from its samples."""
+    found = rehydrate(scene, stored)
+    if found.run is None:
+        raise StoreError(f"{scene.name}/{stored.method}: {'; '.join(found.faults)}")
+    facts = stored.attributes
+    run = _with_reference(found.run, None if stored.method == REFERENCE else found.reference)
+    run.status, run.message = stored.status, str(facts.get("message", ""))
+    run.metrics = metrics_of(run.scene, run.trajectory, run.reference)
+    setup, integration, output = (float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output"))
+    run.setup_time_s, run.run_times_s, run.output_time_s = setup, [integration], output
+    return run
+
+
+def _with_reference(solution: Solution, reference: Trajectory | None) -> Run:
+    return Run(**{one.name: getattr(solution, one.name) for one in fields(Solution)}, reference=reference)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text under a heading; printed in columns, a table in a notebook."""
+
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+    def __str__(self) -> str:
+        lines = [self.head, *self.rows]
+        widths = [max(len(line[i]) for line in lines) for i in range(len(self.head))]
+        return "\n".join(
+            "  ".join(f"{cell:{w}}" for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines
+        )
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{escape(cell)}</th>" for cell in self.head)
+        rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows)
+        return f"<table><tr>{head}</tr>{rows}</table>"
+
+
+def _row(run: Run) -> tuple[str, ...]:
+    numbers = [run.metrics.get(name, np.nan) for name in ("angle_error_max", "energy_drift_max")]
+    texts = ["" if np.isnan(value) else f"{value:.1e}" for value in numbers]
+    return (run.method, run.status, *texts, f"{float(np.median(run.run_times_s)):.3g}")

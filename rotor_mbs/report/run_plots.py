@@ -1,0 +1,137 @@
+"""Figures of runs that are in memory, for notebooks and scripts: motion, energy, error, paths of the tips.
+
+Knows solutions and looks; no file, no page, no engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import label_of, look_of
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.plots import time_histories
+from rotor_mbs.report.plots.paths import paths
+from rotor_mbs.report.plots.time_histories import Motion, Series
+from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
+from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.solution import Solution
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure that a notebook shows; `save` writes it; `figure` is the matplotlib Figure, to be changed at will."""
+
+    figure: Any
+
+    def _repr_svg_(self) -> str:
+        return canvas.svg_text(self.figure)
+
+    def save(self, path: str | Path) -> None:
+        """As PDF, SVG or PNG, by the ending of `path`."""
+        kind = Path(path).suffix.removeprefix(".")
+        if kind not in canvas.KINDS:
+            raise InputError(
+                f"{path}: no such kind of picture; allowed: a name that ends in .{', .'.join(canvas.KINDS)}"
+            )
+        Path(path).write_bytes(canvas.encoded(self.figure, kind))
+
+
+class RunPlots:
+    """Figures of one run."""
+
+    def __init__(self, run: Solution, reference: Trajectory | None) -> None:
+        self._run, self._reference = run, reference
+
+    def __call__(self) -> Drawing:
+        """Angles (rad) and rates (rad/s) over time (s): rotor and pitches."""
+        run = self._run
+        horizon_s = None if self._reference is None else horizon(self._reference)
+        return Drawing(time_histories.motion(Motion(_some(run.time), run.angles, run.rates), (), horizon_s).figure)
+
+    def energy(self) -> Drawing:
+        """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
+        run = self._run
+        kinetic, potential, work = (_quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work"))
+        scale = energy_scale(run.scene, run.trajectory)
+        curves = (kinetic, potential, kinetic + potential - work)
+        return Drawing(time_histories.energies(run.time, curves, scale).figure)
+
+    def error(self) -> Drawing:
+        """Largest angle error (rad) against the reference over time. Raises InputError where there is none."""
+        return error_figure({self._run.method: self._run}, self._reference)
+
+    def tips(self) -> Drawing:
+        """Paths of the blade tips (m). Raises InputError where the scene does not ask for them."""
+        return Drawing(paths(_some(self._run.time), _quantity(self._run, "tip")).figure)
+
+
+class ComparisonPlots:
+    """Figures of several runs of one scene."""
+
+    def __init__(self, runs: Mapping[str, Solution], reference: Trajectory | None) -> None:
+        self._runs, self._reference = runs, reference
+
+    def __call__(self) -> Drawing:
+        """The same as `error`."""
+        return self.error()
+
+    def error(self) -> Drawing:
+        """Largest angle error (rad) of each run against the reference over time. Raises InputError without one."""
+        return error_figure(self._runs, self._reference)
+
+    def rotor(self) -> Drawing:
+        """The rotor's angle (rad) by each method over time."""
+        runs = list(self._runs.values())
+        return _with_legend(
+            time_histories.lines([_series(run, run.angles[:, 0]) for run in runs], "rotor angle (rad)", None), runs
+        )
+
+    def energy_error(self) -> Drawing:
+        """|energy less work, less its start| of each run, of the scene's energy scale. Raises InputError without."""
+        series = []
+        for run in self._runs.values():
+            scale = energy_scale(run.scene, run.trajectory)
+            series.append(_series(run, np.abs(_quantity(run, "energy_error")) / (scale or 1.0)))
+        return _with_legend(time_histories.errors(series, "energy error, of the energy scale"), self._runs.values())
+
+
+def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> Drawing:
+    """Largest angle error (rad) of each run over time (s), on a logarithmic axis, with the horizon."""
+    if reference is None:
+        raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
+    series = [_series(run, angle_error(run.trajectory, reference)) for run in runs.values()]
+    picture = time_histories.errors(series, "largest angle error (rad)", horizon(reference))
+    return _with_legend(picture, runs.values())
+
+
+def _with_legend(picture: Panels, runs: Iterable[Solution]) -> Drawing:
+    looks = {label_of(run.method): look_of(run.method) for run in runs}
+    canvas.legend_inside(
+        picture.axes[0], [(label, look.colour, look.line, look.marker) for label, look in looks.items()]
+    )
+    return Drawing(picture.figure)
+
+
+def _series(run: Solution, values: Array) -> Series:
+    return Series(_some(run.time)[: len(values)], values, look_of(run.method))
+
+
+def _some(time: Array) -> Array:
+    if not len(time):
+        raise InputError("the run left no samples; nothing to draw")
+    return time
+
+
+def _quantity(run: Solution, name: str) -> Array:
+    _some(run.time)
+    try:
+        return run[name]
+    except KeyError as exc:
+        raise InputError(f"{run.scene.name} {run.method} has no {exc.args[0]}") from exc

@@ -1,0 +1,132 @@
+"""The Python API as a user has it: scenes in, runs and comparisons out, labelled, in files, in a notebook."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotor_mbs as rm
+
+SHORT = {"duration": 1.0, "samples": 101}
+
+
+@pytest.fixture(scope="module")
+def study() -> rm.Comparison:
+    scene = rm.scene("paper/fig08").replace(**SHORT)
+    return rm.compare(scene, ["lagrange/dop853", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+
+
+def test_every_public_name_is_there_and_documented() -> None:
+    for name in rm.__all__:
+        assert getattr(rm, name).__doc__, name
+    assert set(rm.__all__) <= set(dir(rm))
+
+
+def test_importing_the_package_imports_nothing_else() -> None:
+    code = "import sys; before = set(sys.modules); import rotor_mbs; print(*sorted(set(sys.modules) - before))"
+    loaded = subprocess.run(
+        [sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert [name for name in loaded if not name.startswith("rotor_mbs")] == []
+    assert [name for name in loaded if name.startswith("rotor_mbs")] == ["rotor_mbs"]
+
+
+def test_a_run_is_judged_against_the_shipped_reference() -> None:
+    run = rm.run(rm.scene("paper/fig08"), "lagrange/dop853")
+    assert (run.status, run.message) == ("ok", "")
+    assert 0.0 < run.metrics["angle_error_max"] < 1e-9
+    coarse = rm.run(rm.scene("paper/fig08"), "lagrange/dop853", relative_tolerance=1e-3)
+    assert coarse.status == "inaccurate"
+    assert coarse.settings["relative_tolerance"] == 1e-3
+
+
+def test_a_scene_of_ones_own_gets_a_computed_reference(tmp_path: Path) -> None:
+    pytest.importorskip("heyoka")
+    path = tmp_path / "mine.toml"
+    path.write_text(rm.scene("paper/fig09").replace(**SHORT).text)
+    mine = rm.load(path)
+    assert mine.name == "mine"
+    assert rm.run(mine, "lagrange/dop853").reference is None
+    run = rm.run(mine, "lagrange/dop853", reference=True)
+    assert run.reference is not None
+    assert run.metrics["angle_error_max"] < 1e-10
+
+
+def test_wrong_names_and_settings_are_refused_with_what_is_allowed() -> None:
+    scene = rm.scene("paper/fig08")
+    with pytest.raises(rm.InputError, match=r"lagrange/taylor"):
+        rm.run(scene, "lagrange/tailor")
+    with pytest.raises(rm.InputError, match=r"tolerence.*relative_tolerance"):
+        rm.run(scene, "lagrange/dop853", tolerence=1e-3)
+    with pytest.raises(rm.InputError, match="relative_tolerance"):
+        rm.run(scene, "lagrange/dop853", relative_tolerance=-1)
+    with pytest.raises(rm.InputError, match=r"paper/fig08"):
+        rm.scene("paper/fig8")
+    with pytest.raises(rm.InputError, match="paper"):
+        rm.scenes("papers")
+
+
+def test_labels_units_and_values_of_xarray(study: rm.Comparison) -> None:
+    pytest.importorskip("xarray")
+    data = study.to_xarray()
+    run = study["exudyn_tree/rk67"]
+    chosen = data.angles.sel(solver="exudyn_tree/rk67", coordinate="pitch 1")
+    np.testing.assert_array_equal(chosen, run.angles[:, 1])
+    np.testing.assert_array_equal(data.tip.sel(solver="exudyn_tree/rk67", blade=2, axis="y"), run["tip"][:, 1, 1])
+    assert data.angles.attrs["units"] == "rad"
+    assert data.time.attrs["units"] == "s"
+    assert "method" not in data.dims
+    # The chain alone has joints that can open: NaN for the others, not a missing solver.
+    assert data.constraint_error.sel(solver="lagrange/dop853").isnull().all()
+    assert data.constraint_error.sel(solver="exudyn_chain/generalized_alpha").notnull().all()
+
+
+def test_two_models_differ_by_what_the_plot_and_the_table_show(study: rm.Comparison) -> None:
+    drawn = study.plot.error().figure.axes[0]
+    labels = [text.get_text() for text in drawn.get_legend().get_texts()]
+    assert labels == ["closed form, DOP853", "Exudyn tree, RK67", "Exudyn chain, generalized-α"]
+    for line, run in zip(drawn.get_lines(), study.runs.values(), strict=False):
+        assert np.nanmax(line.get_ydata()) == run.metrics["angle_error_whole"]
+    assert all(f"{run.metrics['angle_error_max']:.1e}" in str(study.table()) for run in study.runs.values())
+    assert study.reference is not None
+
+
+def test_a_comparison_is_saved_opened_and_rendered(study: rm.Comparison, tmp_path: Path) -> None:
+    path = study.save(tmp_path / "deep" / "study.h5")
+    tree = rm.open(path)
+    assert set(tree) == {f"{study.scene.name}/{name}" for name in (*study.runs, "reference")}
+    for name, run in study.runs.items():
+        again = tree[f"{study.scene.name}/{name}"]
+        assert again.angles.tobytes() == run.angles.tobytes()
+        assert (again.status, again.settings, again.metrics) == (run.status, run.settings, run.metrics)
+    with pytest.raises(KeyError, match="rk67"):
+        tree[f"{study.scene.name}/lagrange/radau"]
+    index = study.to_html(tmp_path / "pages")
+    assert index.read_text().startswith("<!DOCTYPE html>")
+    assert len(list(index.parent.glob("*.html"))) >= 2
+
+
+def test_notebooks_show_a_table_and_a_drawing(study: rm.Comparison) -> None:
+    run = study["lagrange/dop853"]
+    html = run._repr_html_()
+    assert "<table>" in html
+    assert "<svg" in html
+    assert "<svg" in study._repr_html_()
+    assert "exudyn_tree/rk67" in repr(study)
+
+
+def test_what_was_not_asked_for_is_refused_by_name(tmp_path: Path) -> None:
+    scene = rm.scene("paper/fig08").replace(outputs=["angles", "rates"], **SHORT)
+    run = rm.run(scene, "lagrange/dop853")
+    with pytest.raises(rm.InputError, match="kinetic_energy"):
+        run.plot.energy()
+    with pytest.raises(rm.InputError, match="reference"):
+        run.plot.error()
+    with pytest.raises(rm.InputError, match=r"\.pdf"):
+        run.plot().save(tmp_path / "motion.bmp")
+    run.plot().save(tmp_path / "motion.png")
+    assert (tmp_path / "motion.png").read_bytes().startswith(b"\x89PNG")
