@@ -76,6 +76,7 @@ def _title(path: Path) -> str:
 
 
 def _files(argument: str) -> list[_File]:
+    """The files that one argument means."""
     shipped = _shipped()
     if argument in shipped:
         return [_file(shipped[argument])]
@@ -91,10 +92,10 @@ def _files(argument: str) -> list[_File]:
         return _files_in(path)
     if path.suffix == ".toml":
         return [_file(path)]
-    raise InputError(f"{_quoted(argument)}: {_why_unknown(argument, is_there, shipped)}")
+    raise InputError(f"{_quoted(argument)}: {_unknown_argument(argument, is_there, shipped)}")
 
 
-def _why_unknown(argument: str, is_there: bool, shipped: Iterable[str]) -> str:
+def _unknown_argument(argument: str, is_there: bool, shipped: Iterable[str]) -> str:
     if is_there:
         return "is not a TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
     if not _NAME.fullmatch(argument):
@@ -105,11 +106,7 @@ def _why_unknown(argument: str, is_there: bool, shipped: Iterable[str]) -> str:
 
 
 def _files_in(folder: Path) -> list[_File]:
-    try:
-        paths = sorted(folder.glob("*.toml"), key=lambda path: natural_key(path.name))
-    except OSError as error:
-        reason = f"cannot be read: {error.strerror}; allowed: a readable folder"
-        raise InputError(f"{shown_path(folder)}: {reason}") from error
+    paths = sorted(folder.glob("*.toml"), key=lambda path: natural_key(path.name))
     if not paths:
         raise InputError(f"{shown_path(folder)}: no TOML file in this folder; allowed: a folder of scene files")
     return [_file(path) for path in paths]

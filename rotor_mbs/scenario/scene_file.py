@@ -14,13 +14,14 @@ from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_value
 
 
-def load_scene(path: Path, name: str) -> Scene:
-    """The scene in the TOML file `path`, under `name`.
+def load_scene(path: Path | str, name: str | None = None) -> Scene:
+    """The scene in the TOML file `path`, under `name`, by default the file's name without its ending.
 
     Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`;
     entries are counted from 1.
     """
-    return _scene(*read_toml(path), name, shown_path(path))
+    path = Path(path)
+    return _scene(*read_toml(path), path.stem if name is None else name, shown_path(path))
 
 
 def parse_scene(text: str, name: str) -> Scene:

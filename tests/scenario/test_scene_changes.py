@@ -105,14 +105,14 @@ def test_a_tip_that_the_file_does_not_give_is_not_made_up(tmp_path: Path) -> Non
         "[blade]\nmass = 1\ncentre_of_mass = [1, 0, 1]\n[initial]\nangles = [0, 0]\nrates = [0, 0]\n"
     )
     with pytest.raises(InputError, match=r"blade\.tip: is missing"):
-        load_scene(path, "scene").replace(outputs=["tip"])
+        load_scene(path).replace(outputs=["tip"])
 
 
 def test_the_template_is_a_scene_with_every_key(tmp_path: Path) -> None:
     path = tmp_path / "new.toml"
     path.write_text(new_scene_text(), encoding="utf-8")
-    scene = load_scene(path, "new")
-    assert len(scene.blades) == 3
+    scene = load_scene(str(path))
+    assert (scene.name, len(scene.blades)) == ("new", 3)
     tables = tomllib.loads(new_scene_text())
     for one in fields(Scene):
         here = tables
