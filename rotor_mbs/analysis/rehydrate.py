@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
@@ -53,6 +54,8 @@ def rehydrate(stored: StoredScene, run: StoredRun) -> Rehydrated:
         out_of_time=run.status == "timed_out" and not facts.get("engine_success", 0),
     )
     found = Solution(scene, run.method, _trajectory(scene, run), engine, run.settings)
+    if (method := look_up(run.method)) is not None:
+        found.is_corrected, found.bounds = method.is_corrected, method.bounds
     return Rehydrated(scene, found, reference, faults)
 
 

@@ -15,7 +15,7 @@ from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.rehydrate import Rehydrated, rehydrate
-from rotor_mbs.methods.catalogue import is_corrected
+from rotor_mbs.methods.catalogue import is_corrected, methods
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import energy_slack, judge, quantity_bound, quantity_errors
@@ -56,6 +56,7 @@ def verdicts(results: Results, frozen: Sequence[Results], bounds: Bounds) -> lis
 
     Raises InputError where a stored scene is none.
     """
+    bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
     shipped = {name: scene.reference for file in frozen for name, scene in file.scenes.items()}
     found: list[Verdict] = []
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails

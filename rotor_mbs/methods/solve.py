@@ -47,4 +47,6 @@ def solve(
     start = time.perf_counter()
     trajectory = solver.observe()
     output = time.perf_counter() - start
-    return Solution(scene, method.name, trajectory, integration, chosen.as_dict(), setup, run_times, output)
+    found = Solution(scene, method.name, trajectory, integration, chosen.as_dict(), setup, run_times, output)
+    found.is_corrected, found.bounds = method.is_corrected, method.bounds
+    return found

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
-from rotor_mbs.scenario.bounds import Bounds, shipped_bounds
+from rotor_mbs.scenario.bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import Metrics, compare
 from rotor_mbs.solution.quantities import Array, Comparison, Quantity, known_quantities
@@ -64,9 +64,10 @@ class Judgement:
 
 
 @functools.cache
-def allowed_of(method: str) -> Allowed | None:
-    """The bounds on "model/integrator"; None for methods that have none (the printed equations)."""
-    angle, energy = (shipped_bounds().find(check, method) for check in ("agreement", "energy"))
+def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> Allowed | None:
+    """The bounds on "model/integrator", `own` first; None for methods that have none (the printed equations)."""
+    bounds = shipped_bounds().with_entries(own)
+    angle, energy = (bounds.find(check, method) for check in ("agreement", "energy"))
     if angle is None or energy is None:
         return None
     return Allowed(angle.value, energy.value)
@@ -78,16 +79,17 @@ def quantity_bound(rule: Comparison, bounds: Bounds, method: str) -> float | Non
     return entry.value if entry else rule.bound
 
 
-def is_held(method: str) -> bool:
-    """Whether the method claims to solve the right equations, so that anything but "ok" is a failure."""
-    return not method.startswith("printed")
+def judged(run: Solution, reference: Trajectory | None) -> Solution:
+    """The run with its status, message and metrics; reference: of the same scene, or None."""
+    found = judge(run.scene, run, reference)
+    return replace(run, status=found.status, message=found.message, metrics=found.metrics)
 
 
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
     """Finite? End reached? Through a singularity? Energy, quantities, reference? The first no names the status."""
     metrics = compare(scene, run.trajectory, reference)
     status, message = _broken_off(scene, run)
-    if not status and is_held(run.method):
+    if not status and run.is_corrected:
         status, message = _through_singularity(scene, run, reference)
     if not status:
         status, message = _inaccurate(scene, run, metrics)
@@ -145,14 +147,15 @@ def _through_singularity(scene: Scene, run: Solution, reference: Trajectory | No
 
 
 def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str]:
-    allowed = allowed_of(run.method)
+    allowed = allowed_of(run.method, run.bounds)
     if allowed is None:
         return "ok", ""
     energy = allowed.energy + energy_slack(scene, run.trajectory)
     if not metrics.get("energy_drift_max", 0.0) <= energy:
         return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of its scale, allowed {energy:.0e}"
+    bounds = shipped_bounds().with_entries(run.bounds)
     for _, rule, error in quantity_errors(scene, metrics):
-        bound = quantity_bound(rule, shipped_bounds(), run.method)
+        bound = quantity_bound(rule, bounds, run.method)
         if bound is not None and not error <= bound:
             fault = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()
             return "inaccurate", f"{fault.format(value=f'{error:.1e}')}, allowed {bound:.0e}"

@@ -203,7 +203,7 @@ def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
 
     Raises InputError where an output is neither built in nor brought by an installed package.
     """
-    return BUILT_IN + tuple(one for output in outputs if output not in _OUTPUTS for one in _installed(output))
+    return BUILT_IN + tuple(one for output in outputs if output not in _OUTPUTS for one in installed(output))
 
 
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
@@ -221,7 +221,7 @@ def find_quantity(name: str, outputs: Iterable[str] = ()) -> Quantity | None:
 
 
 @functools.cache
-def _installed(output: str) -> tuple[Quantity, ...]:
+def installed(output: str) -> tuple[Quantity, ...]:
     """What the entry point called `output` brings."""
     found = entry_points(group=ENTRY_POINTS, name=output)
     if not found:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import SCALES, Array, arrays, find_quantity, scale_values
 from rotor_mbs.solution.record import Integration, Trajectory
@@ -28,6 +29,8 @@ class Solution:
     setup_time_s, run_times_s, output_time_s : s, building the model, each integration, computing the samples.
     status, message : from the samples, see `judgement`; "" where the run was not judged.
     metrics : numbers by their names in a results file, such as energy_drift_max.
+    is_corrected : whether the method claims to solve the corrected equations.
+    bounds : accuracy bounds that the method brings beside those of reference/accuracy.toml.
 
     Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n samples.
     """
@@ -43,6 +46,8 @@ class Solution:
     status: str = ""
     message: str = ""
     metrics: Mapping[str, float] = field(default_factory=dict)
+    is_corrected: bool = True
+    bounds: tuple[Bound, ...] = ()
 
     @property
     def time(self) -> Array:

@@ -136,7 +136,9 @@ class TimingProcess:
         output = self._clock() - start
         integration = self._last[point]
         scene, reference = self._scene_of(point)
-        run = Solution(scene, point.method, trajectory, integration, dict(point.settings), output_time_s=output)
+        method = find_method(point.method)
+        run = Solution(scene, method.name, trajectory, integration, dict(point.settings), output_time_s=output)
+        run.is_corrected, run.bounds = method.is_corrected, method.bounds
         with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
             verdict = judge(scene, run, reference)
         status, message = _status(verdict.status, verdict.message, verdict.metrics)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis import kinematics
+from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.judgement import judge, rotor_inertia_shares
@@ -54,7 +55,9 @@ class KnownRun:
 
     def faults(self) -> str:
         """What the judgement says against what is known; "" where it is right."""
-        run = Solution(SCENE, self.method, self.trajectory, Integration(*self.engine))
+        run = Solution(
+            SCENE, self.method, self.trajectory, Integration(*self.engine), is_corrected=is_corrected(self.method)
+        )
         with np.errstate(all="ignore"):
             found = judge(SCENE, run, self.reference)
         if found.status != self.status:

@@ -125,7 +125,6 @@ TARGETS = (
         "rotor_mbs.solution.judgement",
         (
             "allowed_of",
-            "is_held",
             "judge",
             "_is_close",
             "_broken_off",

@@ -1,0 +1,174 @@
+"""Output quantities: declared once, brought by other packages, computed for every method, stored and judged."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+from rotor_mbs.analysis.rehydrate import rehydrate
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution import quantities
+from rotor_mbs.solution.judgement import judge, judged
+from rotor_mbs.solution.quantities import BUILT_IN, Quantity, shapes
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.status import STATUSES, flags, recode
+from rotor_mbs.store.read import open_results
+from rotor_mbs.store.write import write_run
+
+PLUG_IN = """
+from rotor_mbs.solution.quantities import Comparison, Quantity
+
+def heights(scene, samples):
+    return samples.angles[:, 1:] ** 2
+
+SQUARES = Quantity("pitch_squares", ("time", "blade"), "rad2", "squares of the pitches", output="squares",
+                   producer=heights, judgement=Comparison("pitch_squares_error_max", bound=1e-6))
+"""
+SCENE = paper("fig08", duration=0.5, samples=11)
+ASKED = replace(SCENE, outputs=("angles", "squares"))
+
+
+@pytest.fixture
+def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """An installed package with the output `squares`."""
+    folder = tmp_path / "site"
+    (folder / "squares-1.dist-info").mkdir(parents=True)
+    (folder / "squares.py").write_text(PLUG_IN)
+    (folder / "squares-1.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: squares\nVersion: 1\n")
+    (folder / "squares-1.dist-info" / "entry_points.txt").write_text(
+        "[rotor_mbs.quantities]\nsquares = squares:SQUARES\nbroken = squares:NOTHING\nnumber = math:pi\n"
+    )
+    monkeypatch.syspath_prepend(folder)
+    quantities.installed.cache_clear()
+    yield
+    quantities.installed.cache_clear()
+    sys.modules.pop("squares", None)
+
+
+def moved(scene: Scene, pitch: float) -> Trajectory:
+    time = np.linspace(0.0, scene.duration, scene.samples)
+    return Trajectory(time, np.full((scene.samples, 4), pitch), np.zeros((scene.samples, 4)))
+
+
+@pytest.mark.usefixtures("plug_in")
+@pytest.mark.parametrize("method", ["lagrange/dop853", "exudyn_tree/rk44", "printed/ode45"])
+def test_a_quantity_of_another_package_is_computed_for_every_method_and_stored(method: str, tmp_path: Path) -> None:
+    run = solve(method, ASKED, {})
+    np.testing.assert_array_equal(run["pitch_squares"], run.angles[:, 1:] ** 2)
+    write_run(tmp_path / "a.h5", scene_hash(ASKED), run, {"status": "ok", "message": ""})
+    with open_results(tmp_path / "a.h5") as results:
+        stored = results.scenes[ASKED.name].runs[method]
+        np.testing.assert_array_equal(stored.array("pitch_squares"), run.pitch_squares)
+        dataset = results.root[f"{ASKED.name}/{method}/pitch_squares"]
+        assert (dataset.attrs["units"], dataset.dims[1].keys()) == ("rad2", ["blade"])
+
+
+@pytest.mark.usefixtures("plug_in")
+@pytest.mark.parametrize(("error", "status"), [(1e-8, "ok"), (1e-5, "inaccurate"), (math.nan, "inaccurate")])
+def test_it_is_judged_against_the_same_producer_applied_to_the_reference(error: float, status: str) -> None:
+    exact, run = moved(ASKED, 1.0), moved(ASKED, 1.0)
+    run.quantities["pitch_squares"] = exact.angles[:, 1:] ** 2 + error
+    found = judge(ASKED, Solution(ASKED, "lagrange/taylor", run, Integration(True)), exact)
+    assert found.status == status
+    assert found.metrics["pitch_squares_error_max"] == pytest.approx(error, nan_ok=True)
+
+
+@pytest.mark.usefixtures("plug_in")
+@pytest.mark.parametrize("output", ["broken", "number", "absent"])
+def test_an_output_that_cannot_be_had_is_refused_in_one_line(output: str) -> None:
+    with pytest.raises(InputError) as caught:
+        quantities.quantities(["angles", output])
+    assert output in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_producer_of_another_shape_is_refused() -> None:
+    wrong = Quantity("wrong", ("time", "blade"), "1", "", producer=lambda _, samples: samples.time)
+    with pytest.raises(InputError, match=r"gives shape \(11,\); allowed: \(11, 3\)"):
+        quantities.array_of(wrong, SCENE, moved(SCENE, 0.0))
+
+
+def test_shapes_are_those_of_a_complete_run() -> None:
+    run = solve("lagrange/dop853", SCENE, {})
+    expected = {quantity.name: shape for quantity, shape in shapes(SCENE, SCENE.outputs).items()}
+    assert expected == {name: values.shape for name, values in run.quantities.items()}
+
+
+def test_every_name_is_declared_once_and_every_judged_number_has_one_name() -> None:
+    names = [quantity.name for quantity in BUILT_IN]
+    metrics = [quantity.judgement.metric for quantity in BUILT_IN if quantity.judgement]
+    assert len(set(names)) == len(names)
+    assert len(set(metrics)) == len(metrics)
+
+
+def test_a_trajectory_refuses_names_that_are_not_declared() -> None:
+    run = moved(SCENE, 0.0)
+    run.tip = np.zeros((11, 3, 3))
+    assert run.replace(tip=None).tip is None
+    with pytest.raises(AttributeError, match="tpi"):
+        run.tpi = run.tip
+    with pytest.raises(AttributeError, match="tpi"):
+        assert run.tpi is None
+
+
+def test_a_solution_has_its_quantities_status_and_metrics() -> None:
+    run = judged(solve("lagrange/dop853", SCENE, {}), None)
+    assert (run.status, run.message) == ("ok", "")
+    assert run.metrics["energy_drift_max"] < 1e-9
+    np.testing.assert_array_equal(run.energy_error, run["energy_error"])
+    np.testing.assert_array_equal(run["time"], run.time)
+    with pytest.raises(KeyError, match="this solution has: time, angles"):
+        run["constraint_error"]
+    with pytest.raises(AttributeError, match="nothing"):
+        assert run.nothing is None
+    table = run._repr_html_()
+    assert "<td>ok</td>" in table
+    assert "energy_drift_max" in table
+
+
+def test_a_solution_as_xarray_is_selected_by_label() -> None:
+    pytest.importorskip("xarray")
+    run = solve("lagrange/dop853", SCENE, {})
+    data = run.to_xarray()
+    np.testing.assert_array_equal(data.angles.sel(coordinate="pitch 2"), run.angles[:, 2])
+    np.testing.assert_array_equal(data.tip.sel(blade=3, axis="z"), run.tip[:, 2, 2])
+    assert data.work.attrs == {"units": "J", "long_name": "work of the torque less what the dampers took"}
+    assert data.attrs["method"] == "lagrange/dop853"
+
+
+def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(InputError, match=r'pip install "rotor_mbs\[xarray\]"'):
+        solve("lagrange/dop853", SCENE, {}).to_xarray()
+
+
+def test_a_stored_run_comes_back_as_it_was(tmp_path: Path) -> None:
+    scene = paper("fig08")
+    made = [Made(scene, name, rotor(np.sin)) for name in ("reference", "lagrange/taylor")]
+    with open_results(store(tmp_path / "r.h5", made)) as results:
+        stored = results.scenes[scene.name]
+        found = rehydrate(stored, stored.runs["lagrange/taylor"])
+    assert found.faults == []
+    assert found.run is not None
+    for name, values in made[1].run().quantities.items():
+        np.testing.assert_array_equal(found.run[name], values)
+
+
+def test_codes_of_statuses_are_read_by_their_meanings() -> None:
+    earlier = {"flag_meanings": "ok inaccurate diverged singular solver_failed timed_out worker_died"}
+    codes = recode(np.array([0, 6, -1], dtype=np.int8), earlier)
+    assert [STATUSES[code] for code in codes[:2]] == ["ok", "worker_died"]
+    assert codes[2] == -1
+    same = np.arange(len(STATUSES))
+    np.testing.assert_array_equal(recode(same, flags()), same)
