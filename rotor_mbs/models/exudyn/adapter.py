@@ -9,7 +9,7 @@ import contextlib
 import io
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,15 @@ with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
 _engine: Any = exudyn
 _engine.config.printToConsole = False
 _engine.config.suppressWarnings = True
+
+
+class Linearized(NamedTuple):
+    """M δq̈ + D δq̇ + K δq + C δλ = 0 in the engine's coordinates; M, K, D (n, n), C (n, constraints), SI units."""
+
+    M: Array
+    K: Array
+    D: Array
+    C: Array
 
 
 class _StuckError(Exception):
@@ -79,6 +88,38 @@ class System:
         """(n, 1 + k) rows a sensor kept in the last integration: time in s, then its k values."""
         stored = self._mbs.GetSensorStoredData(self._numbers[Ref("sensor", sensor)])
         return np.array(stored, dtype=float, ndmin=2)
+
+    def linearized(self, step: float) -> Linearized:
+        """The engine's own linearization at the initial state, its difference quotients taken with `step` (rad, m).
+
+        The quotients are one-sided, so that their error is of the first order in `step`.
+        """
+        settings = _engine.SimulationSettings()
+        settings.solution.file.write = False
+        differences = settings.staticSolver.newton.numericalDifferentiation
+        differences.relativeEpsilon, differences.minimumCoordinateSize = step, 1.0
+        M, K, D, *more = self._mbs.ComputeLinearizedSystem(settings, returnConstraintJacobian=True)
+        C = more[0] if more else np.zeros((len(M), 0))  # of a model without joints
+        return Linearized(np.array(M), np.array(K), np.array(D), np.array(C))
+
+    def forces(self) -> Array:
+        """(n,) applied and gyroscopic forces on the coordinates at the initial state, without those of the joints."""
+        solver, settings = _engine.MainSolverStatic(), _engine.SimulationSettings()
+        settings.solution.file.write = False
+        solver.InitializeSolver(self._mbs, settings)
+        solver.ComputeODE2RHS(self._mbs)
+        found = np.array(solver.GetSystemResidual())[: solver.GetODE2size()]
+        solver.FinalizeSolver(self._mbs, settings)
+        return found
+
+    @property
+    def coordinates(self) -> Array:
+        """(n,) displacement coordinates of the initial state."""
+        return np.array(self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Initial))
+
+    @coordinates.setter
+    def coordinates(self, values: Array) -> None:
+        self._mbs.systemData.SetODE2Coordinates(values, _engine.ConfigurationType.Initial)
 
     def integrate(
         self, scheme: Scheme, legs: Sequence[Leg], rows_between: bool, before_leg: Callable[[Leg], None]

@@ -1,0 +1,137 @@
+"""The engine's models linearized by the engine: the tree in steady rotation or at rest, the chain at rest.
+
+The engine differentiates its forces by one-sided quotients; here they are taken with several steps and extrapolated to
+none. For joints it leaves out the geometric stiffness, by which constraint forces turn with the bodies: it is added
+here, from the engine's own constraint Jacobian beside the state. (Without it the chain's frequencies at a rest under
+gravity are wrong by percents.)
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.models.exudyn import chain, tree
+from rotor_mbs.models.exudyn.adapter import Linearized, System
+from rotor_mbs.models.exudyn.geometry import pitching, quaternion
+from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.linearization import Linearization
+from rotor_mbs.solution.record import Array
+
+# rad, m: the smallest step and how often it is doubled. Each doubling takes one order of the step out of the error.
+_STEP, _DOUBLINGS = 1e-3, 5
+
+
+def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
+    """The kinematic tree about `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m.
+
+    Raises MethodRefusal where the engine does not take the scene.
+    """
+    state = _at(scene, angles, speed, torque)
+    system = System(tree.parts(state, RotorTorque(state)))
+    found = _extrapolated(system.linearized)
+    inverse = np.asarray(np.linalg.inv(found.M), dtype=np.float64)
+    return Linearization(inverse @ found.K, inverse @ found.D, inverse @ system.forces())
+
+
+def linearize_chain(scene: Scene, angles: Sequence[float] | Array) -> Linearization:
+    """The chain of bodies and joints at rest at `angles` (1 + blades,) rad, in the rotor's and the pitch angles.
+
+    With N a basis of what the joints allow and λ the joint forces at rest, its stiffness is Nᵀ (K + ∂(C λ)/∂q) N.
+
+    Raises MethodRefusal where the engine does not take the scene, or the state is not at rest.
+    """
+    state = _at(scene, angles, 0.0, 0.0)
+    system = System(chain.parts(state, RotorTorque(state), "euler_parameters"))
+    found = _extrapolated(system.linearized)
+    force = system.forces()
+    multipliers = np.asarray(np.linalg.lstsq(found.C, force, rcond=None)[0], dtype=np.float64)
+    left = np.abs(force - found.C @ multipliers).max()
+    if left > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(found.K).max():
+        raise MethodRefusal(f"exudyn_chain: not at rest: {left:g} N of the forces are not taken by the joints")
+    N = _free_directions(found.C)
+    geometric = _extrapolated_array(lambda step: _geometric_stiffness(system, multipliers, N, step))
+    joint = _joint_angles(state) @ N
+    mass = N.T @ found.M @ N
+
+    def in_joint_angles(matrix: Array) -> Array:
+        return np.asarray(joint @ np.linalg.solve(mass, matrix) @ np.linalg.inv(joint))
+
+    stiffness = in_joint_angles(N.T @ (found.K @ N + geometric))
+    damping = in_joint_angles(N.T @ found.D @ N)
+    return Linearization(stiffness, damping, joint @ np.linalg.solve(mass, N.T @ force))
+
+
+def _at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
+    return replace(
+        scene,
+        initial_angles=tuple(float(angle) for angle in angles),
+        initial_rates=(speed, *(0.0 for _ in scene.blades)),
+        rotor_torque=((0.0, torque),) if torque else (),
+        outputs=("angles",),
+    )
+
+
+def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
+    rows = [linearized(_STEP * 2.0**k) for k in range(_DOUBLINGS + 1)]
+    return Linearized(*(_limit(list(matrices)) for matrices in zip(*rows, strict=True)))
+
+
+def _extrapolated_array(quotient: Callable[[float], Array]) -> Array:
+    return _limit([quotient(_STEP * 2.0**k) for k in range(_DOUBLINGS + 1)])
+
+
+def _limit(values: list[Array]) -> Array:
+    """At step 0, from values at h, 2h, 4h, ... whose error is a power series of the step (Richardson)."""
+    for power in range(1, len(values)):
+        pairs = itertools.pairwise(values)
+        values = [(2.0**power * fine - coarse) / (2.0**power - 1.0) for fine, coarse in pairs]
+    return values[0]
+
+
+def _free_directions(C: Array) -> Array:
+    """(n, free) orthonormal basis of the velocities with Cᵀ q̇ = 0."""
+    vectors, sizes, _ = np.linalg.svd(C)
+    rank = int(np.count_nonzero(sizes > 1e-10 * sizes[0]))
+    return np.asarray(vectors[:, rank:])
+
+
+def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
+    """(n, free): difference quotients of C λ along each column of N."""
+    start = system.coordinates
+    here = system.linearized(_STEP).C @ multipliers
+    columns = []
+    for direction in N.T:
+        system.coordinates = start + step * direction
+        columns.append((system.linearized(_STEP).C @ multipliers - here) / step)
+    system.coordinates = start
+    return np.array(columns).T
+
+
+def _joint_angles(scene: Scene) -> Array:
+    """(1 + pitching, n): rates of the joint angles from the velocities of the bodies' coordinates at rest.
+
+    A body's coordinates are its position and its Euler parameters p; its angular velocity is 2 (e0 ė - ė0 e + e × ė).
+    """
+    bodies = 1 + len(pitching(scene))
+    out = np.zeros((bodies, 7 * bodies))
+    for k in range(bodies):
+        if k == 0:
+            axis, p = np.array([0.0, 1.0, 0.0]), quaternion(scene.initial_angles[0], 0.0)
+        else:
+            blade = pitching(scene)[k - 1]
+            turn = scene.initial_angles[0] + scene.phases[blade]
+            axis, p = np.array([np.sin(turn), 0.0, np.cos(turn)]), quaternion(turn, scene.initial_angles[1 + blade])
+        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + _cross(p[1:])])
+        out[k, 7 * k + 3 : 7 * k + 7] = 2.0 * axis @ spin
+    return out
+
+
+def _cross(vector: Array) -> Array:
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,0 +1,166 @@
+"""A rotor that turns under gravity: its periodic motion at a mean speed, and the transition matrix over one turn.
+
+Under gravity a turning rotor has no equilibrium. What takes its place is a motion that comes back after one turn, with
+the rotor one turn further; small departures from it are carried over a turn by the state transition matrix, whose
+eigenvalues are the Floquet multipliers. Needs heyoka: the variational equations are differentiated by it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
+from rotor_mbs.models.lagrange.linearization import (
+    Jet,
+    cosine,
+    holding_torque,
+    moving_coordinates,
+    sine,
+    steady_rotation,
+)
+from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.system import compiled
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Array
+
+# What is left of a turn's mismatch, in rad and in shares of the speed: Newton's method ends at the first, and its best
+# state counts as periodic below the second. (A multiplier of 1e9 amplifies the rounding of 1e-16 to 1e-7.)
+_CLOSED = 1e-13
+_ACCEPTED = 1e-9
+_CORRECTIONS = 12
+# Steps for one turn: a stiff bearing's ten thousand oscillations, not a blade that spins without end.
+_LONGEST = 50_000
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A motion that repeats itself after a turn, and how small departures from it grow over that turn.
+
+    speed       rad/s, of the rotor, averaged over the turn
+    start       (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
+    torque      N m on the rotor, constant: what the dampers take in a turn is put in by it
+    transition  (2n, 2n) state transition matrix over the turn
+    gradient    (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where
+                dampers take energy
+    flow        (2n,) time derivative of the state at the start
+    trace_integral  ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the
+                determinant of `transition`, computed without it
+    mismatch    largest difference between end and start: rad, and rates as shares of the speed
+    message     why no periodic motion was found; "" where it was
+    """
+
+    speed: float
+    start: Array
+    torque: float
+    transition: Array
+    gradient: Array
+    flow: Array
+    trace_integral: float
+    mismatch: float
+    message: str = ""
+
+
+def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:
+    """The periodic motion of `scene` at a mean `speed` > 0 rad/s, its rotor starting at the scene's initial angle.
+
+    Found by Newton's method from `guess`, or from steady rotation without gravity. The constant torque is an unknown.
+
+    Raises MethodRefusal where heyoka is not installed, InputError where there is no steady rotation to start from.
+    """
+    system = _Variational(scene)
+    n = system.coordinates
+    if guess is None:
+        angles = steady_rotation(scene, speed)[list(moving_coordinates(scene))]
+        state, torque = np.concatenate([angles, [speed], np.zeros(n - 1)]), holding_torque(scene, speed)
+    else:
+        state, torque = guess.start * np.repeat([1.0, speed / guess.speed], n), guess.torque
+    units = np.repeat([1.0, speed], n)
+    period = 2.0 * math.pi / speed
+    shift = np.zeros(2 * n)
+    shift[0] = 2.0 * math.pi
+    best: Turn | None = None
+    for _ in range(_CORRECTIONS):
+        end = system.propagate(state, torque, period)
+        if end.message:
+            return _not_found(speed, n, end.message)
+        residual = (end.state - state - shift) / units
+        mismatch = float(np.abs(residual).max())
+        if best is None or mismatch < best.mismatch:
+            best = Turn(speed, state, torque, end.by_state, *_invariants(scene, state, torque), end.trace, mismatch)
+        if mismatch < _CLOSED:
+            break
+        jacobian = np.column_stack([end.by_torque, (end.by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
+        sizes = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+        change = np.linalg.lstsq(jacobian / sizes, -residual, rcond=1e-13)[0] / sizes
+        torque, state = torque + change[0], state + np.concatenate([[0.0], change[1:]])
+    if best is None or best.mismatch > _ACCEPTED:
+        left = math.inf if best is None else best.mismatch
+        return _not_found(speed, n, f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
+    return best
+
+
+def _not_found(speed: float, n: int, message: str) -> Turn:
+    nothing, matrix = np.full(2 * n, np.nan), np.full((2 * n, 2 * n), np.nan)
+    return Turn(speed, nothing, math.nan, matrix, nothing, nothing, math.nan, math.nan, message)
+
+
+def _invariants(scene: Scene, state: Array, torque: float) -> tuple[Array, Array]:
+    """(2n,) gradient of energy less the torque's work, zero where dampers act; (2n,) time derivative of the state."""
+    form, n = rotor_form(scene), len(state) // 2
+    variables = Jet.variables(state)
+    kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, sine, cosine)
+    gradient = (kinetic + potential).slope
+    gradient[0] -= torque
+    angles, rates = state[:n].tolist(), state[n:].tolist()
+    found = closed_form.accelerations(angles, rates, form, torque, math.sin, math.cos)
+    return (np.zeros(2 * n) if scene.has_damping else gradient), np.array([*rates, *found])
+
+
+class _End(NamedTuple):
+    """State after a turn, its derivatives by the initial state and the torque, ∫ tr A dt; a message if it failed."""
+
+    state: Array
+    by_state: Array
+    by_torque: Array
+    trace: float
+    message: str
+
+
+class _Variational:
+    """The closed form with its first variational equations by state and torque; compiled once per structure."""
+
+    def __init__(self, scene: Scene) -> None:
+        engine = heyoka()
+        parameters = Parameters()
+        form = rotor_form(scene, parameters)
+        n = self.coordinates = 1 + len(form.blades)
+        torque = parameters.own(Fraction(0))
+        symbols = engine.make_vars(*(f"q{i}" for i in range(n)), *(f"w{i}" for i in range(n)))
+        angles, rates = symbols[:n], symbols[n:]
+        found = closed_form.accelerations(angles, rates, form, torque, engine.sin, engine.cos)
+        equations = [*zip(symbols, [*rates, *found], strict=True)]
+
+        def make() -> object:
+            trace = engine.sum([engine.diff(each, rate) for each, rate in zip(found, rates, strict=True)])
+            system = engine.var_ode_sys(equations, args=[*symbols, torque], order=1).sys
+            system.append((engine.make_vars("trace"), trace))
+            return engine.taylor_adaptive(system, state=np.zeros(len(system)), compact_mode=True)
+
+        self._integrator = compiled(("turn", tuple(parameters.structure)), make)
+        self._values = array_of(parameters.values, quad=False)
+
+    def propagate(self, state: Array, torque: float, period: float) -> _End:
+        count, integrator = len(state), self._integrator
+        integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
+        integrator.time = 0.0
+        integrator.state[:] = np.concatenate([state, np.eye(count, count + 1).ravel(), [0.0]])
+        message = failure(integrator.propagate_until(period, max_steps=_LONGEST)[0])
+        whole = np.array(integrator.state)
+        derivatives = whole[count:-1].reshape(count, count + 1)
+        return _End(whole[:count], derivatives[:, :count], derivatives[:, count], float(whole[-1]), message)

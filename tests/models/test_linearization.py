@@ -1,0 +1,143 @@
+"""Linearized models: exact derivatives, exact cases, and closed form, tree and chain beside each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.rotors import AXIAL, acceleration, make_scene
+from support.scenes import general
+
+from rotor_mbs.analysis.modes import modes_of
+from rotor_mbs.errors import InputError
+from rotor_mbs.models.exudyn import linearization as engine
+from rotor_mbs.models.lagrange import linearization as closed
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Blade, Scene
+
+DAMPED = general(bearing_damping=(30.0, 20.0, 10.0), shaft_damping=50.0)
+SLAB = Blade(120.0, (0.0, 0.0, 6.0), (900.0, 400.0, 520.0, 0.0, 0.0, 0.0), (0.0, 0.0, 9.0))
+
+
+def shipped(name: str) -> Scene:
+    return find_scenes([name])[0]
+
+
+def without_gravity(scene: Scene, speed: float) -> Scene:
+    return replace(scene, gravity=0.0) if speed else scene
+
+
+def state(scene: Scene, speed: float) -> np.ndarray:
+    return closed.steady_rotation(scene, speed) if speed else closed.equilibrium(scene)
+
+
+def linear(scene: Scene, speed: float):
+    """The closed form about the scene's steady state: without gravity where it turns."""
+    rates = [speed] + [0.0] * len(scene.blades)
+    return closed.linearize(
+        without_gravity(scene, speed), state(scene, speed), rates, closed.holding_torque(scene, speed)
+    )
+
+
+def frequencies(linearization, scene: Scene, speed: float) -> np.ndarray:
+    is_cyclic = scene.gravity == 0.0 or speed > 0.0
+    return modes_of(linearization.stiffness, linearization.damping, is_cyclic=is_cyclic).undamped_frequencies
+
+
+def test_derivatives_of_the_closed_form_are_those_of_the_equations_written_once_more():
+    angles, rates = np.array([0.4, 0.7, -1.1, 2.0]), np.array([1.3, -0.4, 0.9, 0.2])
+    found = closed.linearize(DAMPED, angles, rates, 0.0)
+    start = np.concatenate([angles, rates])
+    for k in range(8):
+        step = np.zeros(8)
+        step[k] = 1e-3
+        # Of the sixth order: weights 45, -9, 1 over 60.
+        change = sum(
+            w * (acceleration(DAMPED, 0.0, start + j * step) - acceleration(DAMPED, 0.0, start - j * step))
+            for j, w in ((1, 45.0), (2, -9.0), (3, 1.0))
+        )
+        column = -change[4:] / (60.0 * 1e-3)
+        ours = (found.stiffness if k < 4 else found.damping)[:, k % 4]
+        np.testing.assert_allclose(ours, column, rtol=1e-9, atol=1e-9)
+
+
+def test_pendulum():
+    blade = replace(AXIAL)
+    J = blade.inertia[1] + blade.mass * 9.0
+    hanging = make_scene([2.5, 0.1], [0, 0], (blade,), gravity=9.81, hub_inertia=20.0, bearing_stiffness=(70.0,))
+    assert closed.equilibrium(hanging) == pytest.approx([math.pi, 0.0], abs=1e-12)
+    expected = [math.sqrt(blade.mass * 9.81 * 3.0 / (J + 20.0)), math.sqrt(10.0)]
+    assert frequencies(linear(hanging, 0.0), hanging, 0.0) == pytest.approx(sorted(expected), rel=1e-13)
+    upright = replace(hanging, initial_angles=(0.0, 0.0))
+    assert closed.equilibrium(upright) == pytest.approx([0.0, 0.0], abs=0.0)
+    rates = modes_of(linear(upright, 0.0).stiffness, np.zeros((2, 2)), is_cyclic=False).growth_rates
+    assert max(rates) == pytest.approx(expected[0], rel=1e-13)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5, 2.0])
+def test_the_propeller_moment_is_a_pitch_stiffness(speed):
+    """(Jyy - Jxx) Ω² about the pitch axis, for blades whose principal axes are the blade's: exact at any speed."""
+    scene = make_scene([0.2, 0, 0, 0], [0] * 4, (SLAB,) * 3, gravity=0.0, bearing_stiffness=(5000.0,) * 3)
+    xx, yy, zz, *_ = SLAB.inertia
+    expected = math.sqrt((5000.0 + (yy - xx) * speed**2) / zz)
+    assert frequencies(linear(scene, speed), scene, speed)[1:] == pytest.approx([expected] * 3, rel=1e-13)
+
+
+def test_the_propeller_moment_makes_pitch_diverge_past_the_speed_where_it_balances_the_spring():
+    scene = make_scene([0.2, 0], [0, 0], (SLAB,), gravity=0.0, bearing_stiffness=(5000.0,), hub_inertia=1.0)
+    critical = math.sqrt(5000.0 / (900.0 - 400.0))
+    for speed, grows in ((0.99 * critical, False), (1.01 * critical, True)):
+        found = closed.linearize(scene, [0, 0], [speed, 0], 0.0)
+        assert (found.stiffness[1, 1] < 0.0) == grows
+
+
+def test_a_point_mass_off_the_pitch_axis_swings_once_a_turn():
+    scene = replace(shipped("paper/fig08"), gravity=0.0, initial_angles=(0.0, 0.1, -0.2, 0.3))
+    assert state(scene, 1.2) == pytest.approx([0.0] * 4, abs=1e-9)
+    cosine_and_sine = frequencies(linear(scene, 1.2), scene, 1.2)[1:3]
+    assert cosine_and_sine == pytest.approx([1.2, 1.2], rel=1e-9)
+
+
+SOURCES = [
+    (DAMPED, 0.0),
+    (DAMPED, 1.2),
+    (DAMPED, 8.0),
+    (replace(DAMPED, gravity=0.0), 0.0),
+    (shipped("stiff/nrel-5mw"), 0.0),
+    (shipped("stiff/nrel-5mw"), 1.267),
+    (shipped("paper/fig08"), 0.0),
+    (shipped("paper/fig05"), 1.0),
+    (shipped("check/held"), 0.0),
+    (shipped("stiff/bearing-1e12-damping-0.7"), 0.0),
+]
+
+
+@pytest.mark.parametrize(("scene", "speed"), SOURCES, ids=lambda value: getattr(value, "name", value))
+def test_closed_form_tree_and_chain_have_the_same_frequencies(scene, speed):
+    ours, angles, at = linear(scene, speed), state(scene, speed), without_gravity(scene, speed)
+    others = [engine.linearize_tree(at, angles, speed, closed.holding_torque(scene, speed))]
+    if not speed:
+        others.append(engine.linearize_chain(at, angles))
+    expected = frequencies(ours, scene, speed)
+    significant = expected > 1e-6 * np.nanmax(expected)
+    size = max(np.abs(ours.stiffness).max(), 1e-3)
+    for other in others:
+        np.testing.assert_allclose(frequencies(other, scene, speed)[significant], expected[significant], rtol=1e-8)
+        np.testing.assert_allclose(other.stiffness, ours.stiffness, atol=1e-8 * size)
+        np.testing.assert_allclose(other.damping, ours.damping, atol=1e-8 * max(1.0, np.abs(ours.damping).max()))
+        assert np.abs(other.residual).max() < 1e-8 * size
+
+
+def test_joint_forces_stiffen_the_chain(monkeypatch):
+    """Without the geometric stiffness the same comparison fails, by percents."""
+    monkeypatch.setattr(engine, "_geometric_stiffness", lambda _system, _forces, N, _step: np.zeros_like(N))
+    found = frequencies(engine.linearize_chain(DAMPED, state(DAMPED, 0.0)), DAMPED, 0.0)
+    assert np.abs(found[1:] / frequencies(linear(DAMPED, 0.0), DAMPED, 0.0)[1:] - 1.0).max() > 0.01
+
+
+def test_no_steady_state_is_an_input_error():
+    # Lighter than the rounding of its energies can show.
+    with pytest.raises(InputError, match="steady state"):
+        closed.steady_rotation(shipped("extreme/light-1e-8"), 1.2)

@@ -1,0 +1,147 @@
+"""Periodic motion of a turning rotor under gravity, and its multipliers: Mathieu's equation, Liouville's rule."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import mathieu_a, mathieu_b
+from support.rotors import acceleration, make_scene
+from support.scenes import general
+
+from rotor_mbs.analysis.modes import floquet
+from rotor_mbs.models.lagrange.linearization import linearize
+from rotor_mbs.models.lagrange.turn import Turn, periodic_turn
+from rotor_mbs.scenario.scene import Blade, Scene
+
+pytest.importorskip("heyoka")
+
+# Its centre of mass off the pitch axis, in the plane of rotation: gravity on it is a stiffness that comes and goes.
+BLADE = Blade(120.0, (0.5, 0.0, 6.0), (900.0, 880.0, 40.0, 0.0, 3.0 * 120.0, 0.0), (0.5, 0.0, 9.0))
+PITCH_INERTIA = 40.0 + 120.0 * 0.25
+DAMPED = general(bearing_damping=(30.0, 20.0, 10.0), shaft_damping=50.0)
+
+
+def slow_blade(speed: float, stiffness: float, gravity: float = 9.81, damping: float = 0.0) -> Scene:
+    """One blade on a hub so heavy that nothing changes its speed."""
+    more = {"bearing_damping": (damping,)} if damping else {}
+    return make_scene(
+        [0.3, 0.0],
+        [speed, 0.0],
+        (BLADE,),
+        gravity=gravity,
+        hub_inertia=1e15,
+        bearing_stiffness=(stiffness,),
+        **more,
+    )
+
+
+def others(scene: Scene, speed: float):
+    turn = periodic_turn(scene, speed)
+    assert not turn.message
+    return floquet(turn.transition, turn.flow, turn.gradient, speed)
+
+
+def mathieu_numbers(speed: float, stiffness: float) -> tuple[float, float]:
+    """(a, q) of θ'' + (a - 2q cos 2s) θ = 0, a turn being s = π: Jzz θ̈ + (k + (Jyy - Jxx) Ω² + m g x sin φ) θ = 0."""
+    unit = PITCH_INERTIA * speed**2 / 4.0
+    centrifugal = (880.0 + 120.0 * 0.25 - 900.0) * speed**2
+    return (stiffness + centrifugal) / unit, 120.0 * 9.81 * 0.5 / (2.0 * unit)
+
+
+def mathieu_trace(a: float, q: float) -> float:
+    """Trace of the transition matrix over s = π by Hill's determinant: 2 - 4 Δ(0) sin²(π √a / 2)."""
+    before, determinant = 1.0, 1.0
+    ratios = q / ((2.0 * np.arange(-4000, 4001)) ** 2 - a)
+    for one, other in pairwise(ratios.tolist()):
+        before, determinant = determinant, determinant - one * other * before
+    return 2.0 - 4.0 * determinant * math.sin(0.5 * math.pi * math.sqrt(a)) ** 2
+
+
+@pytest.mark.parametrize(("speed", "stiffness"), [(2.0, 1000.0), (1.0, 700.0), (0.5, 900.0), (3.0, 650.0)])
+def test_a_blade_turning_slowly_under_gravity_obeys_mathieus_equation(speed, stiffness):
+    multipliers = others(slow_blade(speed, stiffness), speed).others
+    assert len(multipliers) == 2
+    trace = mathieu_trace(*mathieu_numbers(speed, stiffness))
+    assert multipliers.sum() == pytest.approx(trace, rel=1e-8, abs=1e-8)
+    assert np.prod(multipliers) == pytest.approx(1.0, rel=1e-8)
+
+
+@pytest.mark.parametrize(("boundary", "order"), [(mathieu_a, 1), (mathieu_b, 1), (mathieu_a, 2), (mathieu_b, 2)])
+def test_stability_changes_on_mathieus_characteristic_values(boundary, order):
+    speed, unit = 6.0, PITCH_INERTIA * 9.0
+    _, q = mathieu_numbers(speed, 0.0)
+    verdicts = []
+    for shift in (-0.01, 0.01):
+        stiffness = (boundary(order, q) + shift) * unit - (880.0 + 30.0 - 900.0) * speed**2
+        verdicts.append(others(slow_blade(speed, stiffness), speed).is_stable)
+    # Tongues of growth lie between b1 and a1, b2 and a2: below an `a` it grows, below a `b` it does not.
+    assert verdicts == ([False, True] if boundary is mathieu_a else [True, False])
+
+
+def test_a_pitch_damper_scales_the_multipliers_by_what_it_takes_in_a_turn():
+    multipliers = others(slow_blade(2.0, 1000.0, damping=14.0), 2.0).others
+    pitch = multipliers[np.argsort(np.abs(multipliers - 1.0))][-2:]
+    assert np.prod(pitch) == pytest.approx(math.exp(-14.0 / PITCH_INERTIA * math.pi), rel=1e-8)
+
+
+def oracle(scene: Scene, turn: Turn):
+    """The same turn by SciPy from equations written once more: dense solution."""
+    driven = replace(scene, rotor_torque=((0.0, turn.torque),))
+    span = (0.0, 2.0 * math.pi / turn.speed)
+    return solve_ivp(
+        lambda t, y: acceleration(driven, t, y), span, turn.start, "DOP853", rtol=1e-12, atol=1e-13, dense_output=True
+    )
+
+
+def test_the_motion_repeats_itself_after_a_turn_also_by_other_equations():
+    turn = periodic_turn(DAMPED, 1.2)
+    end = oracle(DAMPED, turn).y[:, -1]
+    np.testing.assert_allclose(end - turn.start, [2.0 * math.pi, *[0.0] * 7], atol=1e-9)
+    assert turn.torque == pytest.approx(50.0 * 1.2, rel=0.05)
+
+
+def test_the_product_of_the_multipliers_is_the_exponential_of_the_integrated_trace():
+    turn = periodic_turn(DAMPED, 1.2)
+    multipliers = floquet(turn.transition, turn.flow, turn.gradient, 1.2).multipliers
+    # The trace along the motion is periodic: the mean of equally spaced samples converges faster than any power.
+    times = 2.0 * math.pi / 1.2 * np.arange(256) / 256.0
+    states = oracle(DAMPED, turn).sol(times).T
+    traces = [-np.trace(linearize(DAMPED, state[:4], state[4:], turn.torque).damping) for state in states]
+    integral = float(np.mean(traces)) * 2.0 * math.pi / 1.2
+    assert np.prod(multipliers) == pytest.approx(math.exp(integral), rel=1e-9)
+    assert turn.trace_integral == pytest.approx(integral, rel=1e-9)
+
+
+def test_the_transition_matrix_is_the_derivative_of_a_turn():
+    turn = periodic_turn(DAMPED, 3.0)
+    for k, step in ((1, 1e-4), (4, 1e-4)):
+        ends = []
+        for sign in (-1.0, 1.0):
+            start = turn.start.copy()
+            start[k] += sign * step
+            ends.append(oracle(DAMPED, replace(turn, start=start)).y[:, -1])
+        np.testing.assert_allclose((ends[1] - ends[0]) / (2.0 * step), turn.transition[:, k], rtol=1e-5, atol=1e-5)
+
+
+def test_without_gravity_the_multipliers_are_those_of_the_eigenvalues():
+    scene = replace(DAMPED, gravity=0.0)
+    turn = periodic_turn(scene, 2.0)
+    found = floquet(turn.transition, turn.flow, turn.gradient, 2.0).multipliers
+    angles = [0.3, *turn.start[1:4]]
+    values = np.linalg.eigvals(linearize(scene, angles, [2.0, 0, 0, 0], turn.torque).state_matrix)
+    expected = np.exp(values * math.pi)
+    for multiplier in expected:
+        assert np.abs(found - multiplier).min() < 1e-7
+
+
+def test_where_no_motion_is_found_the_reason_is_given():
+    # One blade whose weight stops it: at so low a mean speed it would have to rest near the top.
+    heavy = replace(slow_blade(0.1, 1000.0), hub_inertia=0.0)
+    turn = periodic_turn(heavy, 0.1)
+    assert turn.message
+    assert np.isnan(turn.transition).all()
