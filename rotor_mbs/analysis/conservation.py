@@ -1,4 +1,4 @@
-"""What a right run keeps: angular momentum, symmetry, time reversal, energy up to a random walk of round-off.
+"""What an exact run conserves: angular momentum, symmetry, time reversal, energy up to a random walk of round-off.
 
 Knows scenes and samples; no model, no file.
 """
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:
-    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s; kept where neither gravity nor torque acts.
+    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s; constant where neither gravity nor torque acts.
 
     Summed over hub and blades as L = J_hub Ω + Σ e·(J ω), e the shaft's direction and ω the blade's angular velocity,
     both in the blade's own frame.
@@ -47,7 +47,7 @@ def largest_relative_change(values: Array) -> float:
 
 
 def mirrored(scene: Scene) -> Scene:
-    """The scene in a mirror in the plane of rotation: pitches and the blades' y turn round, the rotor does not."""
+    """The mirror image in the plane of rotation: pitches and the blades' y change sign, the rotor angle does not."""
     blades = []
     for blade in scene.blades:
         x, y, z = blade.centre_of_mass
@@ -68,7 +68,7 @@ def mirror_error(one: Array, other: Array) -> float:
 
 
 def relabelled(scene: Scene) -> Scene:
-    """The same machine with every blade's number raised by one; the rotor's zero goes back by a blade's phase."""
+    """The same rotor with every blade's number raised by one; the rotor's zero goes back by a blade's phase."""
     turn = 2.0 * math.pi / len(scene.blades)
     return replace(
         scene,
@@ -92,11 +92,11 @@ def relabelling_error(one: Array, other: Array) -> float:
 
 
 def reversed_from(scene: Scene, angles: Array, rates: Array) -> Scene:
-    """The scene from its last sample on with all rates turned round: it runs back to its start."""
+    """The scene from its last sample on with all rates reversed: it runs back to its start."""
     return replace(scene, initial_angles=tuple(angles[-1].tolist()), initial_rates=tuple((-rates[-1]).tolist()))
 
 
-def growth_exponent(time: Array, drift: Array) -> float:
+def drift_exponent(time: Array, drift: Array) -> float:
     """p of drift ~ t^p over the last hundredfold of time: 1/2 for a random walk of round-off, 1 for a steady loss."""
     used = time >= 0.01 * time[-1]
     # Equally spaced in log t: else the last decade alone would decide.

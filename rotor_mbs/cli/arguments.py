@@ -243,7 +243,7 @@ def _late(target: str) -> Callable[[argparse.Namespace], int]:
 
 def _add_jobs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "-j", "--jobs", type=_positive(int, "a whole number from 1 up"), default=_cores(), metavar="N",
+        "-j", "--jobs", type=_positive(int, "a whole number from 1 up"), default=cores(), metavar="N",
         help="parallel processes (default: the cores, %(default)s)",
     )  # fmt: skip
 
@@ -256,7 +256,8 @@ def _add_batch_options(parser: argparse.ArgumentParser, timeout_s: float = _DEFA
     )  # fmt: skip
 
 
-def _cores() -> int:
+def cores() -> int:
+    """How many processes this one may run at once."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self, TextIO
 
@@ -45,10 +46,15 @@ class ProgressLine:
 def print_summary(report: RunReport, output: Path) -> int:
     """The runs in a few lines; the exit status: 1 where a run that should succeed did not, or was not computed."""
     lost = report.not_computed
-    for one in lost:
-        print(f"{one.case.label}: not computed ({one.result.message}); the same command tries again", file=sys.stderr)
+    print_not_computed(lost)
     counts = {"failed": len(report.failures), "printed broke off": len(report.broken_off), "not computed": len(lost)}
     parts = [f"{len(report.made) - sum(counts.values())} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
     print(f"{output}: {made}, {report.kept} there already")
     return 1 if report.failures or lost else 0
+
+
+def print_not_computed(lost: Sequence[Outcome]) -> None:
+    """The cases whose process died or could not start, a line each."""
+    for one in lost:
+        print(f"{one.case.label}: not computed ({one.result.message}); the same command tries again", file=sys.stderr)

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rotor_mbs.execution.environment import fingerprint, numerics_fingerprint, versions
+from rotor_mbs.execution.environment import fingerprint, numerics_fingerprint, versions_with
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene, scene_hash
 
@@ -46,12 +46,13 @@ class Case:
     @functools.cached_property
     def key(self) -> str:
         """SHA-256, in hexadecimal, of all that the record depends on."""
-        settings = find_method(self.method).settings.of(self.method, self.settings).as_dict()
+        method = find_method(self.method)
+        settings = method.settings.of(self.method, self.settings).as_dict()
         content = {
             "scene": [self.scene.name, self.scene_hash],
             "method": [self.method, {name: str(value) for name, value in settings.items()}],
             "study": [self.study, dict(self.options)],
             "reference": self.reference,
-            "code": [versions(), numerics_fingerprint(), fingerprint(*self.sources)],
+            "code": [versions_with(*method.distributions), numerics_fingerprint(), fingerprint(*self.sources)],
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

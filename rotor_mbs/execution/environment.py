@@ -16,11 +16,16 @@ _OWN = ("numpy", "h5py")
 _NUMERICS = ("scenario", "solution", "methods", "models")
 
 
-@functools.cache
 def versions() -> dict[str, str]:
     """Of this package, of the engines and libraries ("not installed" where one is missing), and of Python."""
+    return versions_with(*(name for method in methods() for name in method.distributions))
+
+
+@functools.cache
+def versions_with(*distributions: str) -> dict[str, str]:
+    """Of this package, of Python, of the libraries that every method uses, and of `distributions`."""
     found = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
-    for name in dict.fromkeys([name for method in methods() for name in method.distributions] + [*_OWN]):
+    for name in dict.fromkeys((*distributions, *_OWN)):
         try:
             found[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
@@ -49,12 +54,12 @@ def numerics_fingerprint() -> str:
 
 
 @functools.cache
-def fingerprint(*folders: str) -> str:
-    """sha256 over every file of this package's `folders`."""
+def fingerprint(*parts: str) -> str:
+    """sha256 over every file of this package in `parts`, which are folders or files."""
     package = Path(rotor_mbs.__file__).parent
     digest = hashlib.sha256()
-    for folder in folders:
-        for path in sorted((package / folder).rglob("*")):
+    for part in parts:
+        for path in sorted({package / part, *(package / part).rglob("*")}):
             if path.is_file() and path.suffix != ".pyc":
                 digest.update(str(path.relative_to(package)).encode())
                 digest.update(path.read_bytes())

@@ -74,8 +74,8 @@ class Store(Protocol):
 
 
 Perform: TypeAlias = Callable[[Job], Result]
+Run: TypeAlias = Callable[[Sequence[Job]], Iterable[Finished[Job, Result]]]
 OnProgress: TypeAlias = Callable[[int, int, Outcome], None]
-Run: TypeAlias = Callable[[Perform, Sequence[Job], int, float], Iterable[Finished[Job, Result]]]
 
 
 def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
@@ -89,9 +89,7 @@ def execute(
     workers: int,
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
-    *,
     on_time_out: Callable[[Job, str], Result] | None = None,
-    run: Run | None = None,
 ) -> list[Outcome]:
     """The outcomes of the cases that `store` did not have; those that others are compared with come first.
 
@@ -100,57 +98,62 @@ def execute(
     timeout_s     of one case; its process is ended where the case has not ended itself a while after that
     on_progress   called with (cases done, of how many, outcome) after each
     on_time_out   writes the part of a job whose process was ended, in this process
-    run           in place of the process pool
 
     Raises InputError where another process is writing the output, StoreError, and what `perform` raises of RotorError.
     """
+    return execute_with(cases, _in_pool(perform, workers, timeout_s), store, on_progress, on_time_out, timeout_s)
+
+
+def execute_with(
+    cases: Iterable[Case],
+    run: Run,
+    store: Store,
+    on_progress: OnProgress = ignore_progress,
+    on_time_out: Callable[[Job, str], Result] | None = None,
+    timeout_s: float = float("inf"),
+) -> list[Outcome]:
+    """The same, where `run` has its own way to compute a list of jobs: a bench times them together."""
     with _parts_folder(store.path) as parts:
         stored = store.stored_keys()
         missing = [case for case in cases if case.key not in stored and not _part(parts, case.key).exists()]
         made: list[Outcome] = []
         for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
             jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored), timeout_s) for case in wave]
-            for outcome in _outcomes(jobs, perform, workers, on_time_out, run or run_tasks):
+            for outcome in _outcomes(jobs, run, on_time_out):
                 made.append(outcome)
                 on_progress(len(made), len(missing), outcome)
-        found = sorted(parts.glob("*.h5"), key=lambda path: (path.stem in {case.key for case in missing}, path.name))
+        new = {case.key for case in missing}
+        found = sorted(parts.glob("*.h5"), key=lambda path: (path.stem in new, path.name))
         if found or not store.path.exists():
             store.merge(found)
     return made
 
 
-def compute(
-    cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float, run: Run | None = None
-) -> Iterator[Outcome]:
+def compute(cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float) -> Iterator[Outcome]:
     """Outcomes of cases of which nothing is stored, as they come."""
     jobs = [Job(case, Path(), None, timeout_s) for case in cases]
-    return _outcomes(jobs, perform, workers, None, run or run_tasks)
+    return _outcomes(jobs, _in_pool(perform, workers, timeout_s), None)
 
 
-def _outcomes(
-    jobs: Sequence[Job],
-    perform: Perform,
-    workers: int,
-    on_time_out: Callable[[Job, str], Result] | None,
-    run: Run,
-) -> Iterator[Outcome]:
+def _in_pool(perform: Perform, workers: int, timeout_s: float) -> Run:
+    def run(jobs: Sequence[Job]) -> Iterable[Finished[Job, Result]]:
+        if not workers:
+            return (Finished(job, perform(job)) for job in jobs)
+        # What ends itself at its time limit needs a moment to write what it has.
+        return run_tasks(perform, jobs, workers, 1.2 * timeout_s + 10.0)
+
+    return run
+
+
+def _outcomes(jobs: Sequence[Job], run: Run, on_time_out: Callable[[Job, str], Result] | None) -> Iterator[Outcome]:
     ready = []
     for job in jobs:
         if job.reference is None or job.reference.exists():
             ready.append(job)
         else:
             yield Outcome(job.case, Result("no_reference", "its reference was not computed"))
-    if not ready:
-        return
-    # What ends itself at its time limit needs a moment to write what it has.
-    limit = 1.2 * ready[0].time_limit_s + 10.0
-    for finished in run(perform, ready, workers, limit) if workers else _in_this_process(perform, ready):
+    for finished in run(ready) if ready else ():
         yield Outcome(finished.task.case, _result(finished, on_time_out))
-
-
-def _in_this_process(perform: Perform, jobs: Iterable[Job]) -> Iterator[Finished[Job, Result]]:
-    for job in jobs:
-        yield Finished(job, perform(job))
 
 
 def _result(finished: Finished[Job, Result], on_time_out: Callable[[Job, str], Result] | None) -> Result:

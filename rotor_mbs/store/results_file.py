@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,11 +17,11 @@ class ResultsFile:
     path: Path
 
     def stored_keys(self) -> set[str]:
-        """Keys of all runs, bench curves and stability records. Raises StoreError."""
+        """Content hashes of all runs and records in the file. Raises StoreError."""
         refuse_other_kinds(self.path)
         return stored_keys(self.path)
 
-    def merge(self, parts: Sequence[Path]) -> None:
-        """The records of `parts` into the file, atomically. Raises StoreError."""
+    def merge(self, parts: Sequence[Path], without: Collection[str] = frozenset()) -> None:
+        """The records of `parts` into the file, atomically, and those of these keys out of it. Raises StoreError."""
         sources = [self.path, *parts] if self.path.exists() else parts
-        merge(self.path, sources, {**versions(), **machine()})
+        merge(self.path, sources, {**versions(), **machine()}, without)

@@ -138,8 +138,8 @@ def judge_frozen(bounds: Bounds) -> list[Verdict]:
 
 
 def is_available(method: str) -> bool:
-    """Whether the engine of `method` is installed."""
-    return find_method(method).is_installed
+    """Whether the engine of `method` is installed; "*" stands for none."""
+    return method == "*" or find_method(method).is_installed
 
 
 def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Verdict]:

@@ -1,48 +1,55 @@
 """How cost grows: run time against the number of blades and against the duration, per method, at one setting each.
 
-The sizes of a study are the rungs of its ladders: they are timed like a bench, and dear sizes are left out likewise.
+The sizes of a study are the rungs of its curves: they are timed like a bench, and expensive
+sizes are left out likewise.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.work_precision import growth_exponent
-from rotor_mbs.execution.servant import Servant, last_core
-from rotor_mbs.methods import catalogue
+from rotor_mbs.analysis.work_precision import cost_exponent
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute_with, ignore_progress
+from rotor_mbs.execution.pool import Finished
+from rotor_mbs.methods.catalogue import methods as all_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.records import COST_SCALING, Record
-from rotor_mbs.studies.bench_points import Findings, judge_all, rows, time_points
-from rotor_mbs.studies.bench_work import Point, TimingProcess, only_time
+from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.studies.bench import BENCH, SOURCES, arrays_of, measure_points, store_curve
+from rotor_mbs.studies.bench_worker import Point
 
-BLADES = (1, 2, 3, 6, 12, 24, 48)
-DURATIONS = (1.0, 10.0, 60.0, 600.0, 3600.0)
+_BLADES = (1, 2, 3, 6, 12, 24, 48)
+_DURATIONS = (1.0, 10.0, 60.0, 600.0, 3600.0)  # s
+# An hour of simulated time, or 48 blades, costs what several scenes do.
+_BUDGETS = 3.0
 
 
 @dataclass(frozen=True)
-class Study:
-    """kind: what grows; scenes: by size."""
+class CostStudy:
+    """kind: what grows; base: the scene that is varied; scenes: by size."""
 
     kind: str
+    base: Scene
     scenes: Mapping[float, Scene]
 
 
-def studies() -> tuple[Study, Study]:
+def cost_studies() -> tuple[CostStudy, CostStudy]:
     """Blades: like the paper's Fig. 8, every blade pitched a little, for the second in which no error has grown much.
     Duration: one blade with its pitch at rest, a plain pendulum, which is regular for ever (Fig. 3)."""
-    many = find_scenes(["paper/fig08"])[0]
-    one = find_scenes(["paper/fig03"])[0]
+    many, one = find_scenes(["paper/fig08"])[0], find_scenes(["paper/fig03"])[0]
+    by_duration = {t: replace(one, duration=t, samples=round(10 * t) + 1) for t in _DURATIONS}
     return (
-        Study("blades", {float(n): _with_blades(many, n) for n in BLADES}),
-        Study("duration", {t: replace(one, duration=t, samples=round(10 * t) + 1) for t in DURATIONS}),
+        CostStudy("blades", many, {float(n): _with_blades(many, n) for n in _BLADES}),
+        CostStudy("duration", one, by_duration),
     )
 
 
@@ -62,56 +69,73 @@ def _with_blades(scene: Scene, count: int) -> Scene:
 
 
 @dataclass(frozen=True)
-class _MakeProcess:
-    """Makes the timing process of a study."""
+class _SceneBySize:
+    study: CostStudy
 
-    study: Study
-    methods: tuple[str, ...]
-
-    def __call__(self) -> TimingProcess:
-        only_time(self.methods)
-        return TimingProcess(self._scene_of)
-
-    def _scene_of(self, point: Point) -> tuple[Scene, Trajectory | None]:
+    def __call__(self, point: Point) -> tuple[Scene, None]:
         return self.study.scenes[point.setting], None
 
 
-def measure_growth(study: Study, methods: Sequence[str], repeats: int, budget_s: float) -> list[Record]:
-    """A curve per method over the sizes: run times, and energy drift as its measure of error."""
-    chosen = {
-        method.name: method.cost_scaling
-        for method in catalogue.methods()
-        if method.cost_scaling is not None and (not methods or method.name in methods)
-    }
+def run_cost_scaling(
+    methods: Sequence[str],
+    output: Path,
+    *,
+    repeats: int,
+    budget_s: float,
+    on_progress: OnProgress = ignore_progress,
+) -> list[Outcome]:
+    """A curve per method and study into the results file: run times, and energy drift as the measure of error.
+
+    methods     of those that declare settings for this study; all of them where none is named
+    budget_s    s, of a scene of a bench; a study takes three times that
+    """
+    options = {"repeats": repeats, "budget_s": _BUDGETS * budget_s}
+    chosen = [m for m in all_methods() if m.cost_scaling is not None and (not methods or m.name in methods)]
+    cases = [
+        Case(
+            study.base, method.name, method.cost_scaling or {}, f"cost with {study.kind}",
+            {**options, "kind": study.kind, "sizes": list(study.scenes)}, sources=(*SOURCES, "studies/cost_scaling.py"),
+        )
+        for study in cost_studies()
+        for method in chosen
+    ]  # fmt: skip
+    return execute_with(cases, _time_by_study, ResultsFile(output), on_progress)
+
+
+def _time_by_study(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
+    for study in cost_studies():
+        own = [job for job in jobs if job.case.options["kind"] == study.kind]
+        for job, record in zip(own, _measure(study, own) if own else (), strict=True):
+            yield Finished(job, store_curve(job, record))
+
+
+def _measure(study: CostStudy, jobs: Sequence[Job]) -> list[Record]:
     points = [
-        [Point(name, name, i, size, tuple(sorted(settings.items()))) for i, size in enumerate(study.scenes)]
-        for name, settings in chosen.items()
+        [
+            Point(job.case.method, job.case.method, i, size, tuple(sorted(job.case.settings.items())))
+            for i, size in enumerate(study.scenes)
+        ]
+        for job in jobs
     ]
-    found = Findings()
-    with Servant(_MakeProcess(study, tuple(chosen)), last_core()) as servant:
-        timings = time_points(servant, points, repeats, budget_s, found)
-        judge_all(servant, timings, found, budget_s)
+    measured = measure_points(_SceneBySize(study), points, jobs[0].case.options)
     started = time.strftime("%Y-%m-%dT%H:%M:%S")
-    return [
-        _curve(study, name, settings, rows(of_method, timings, found), started)
-        for (name, settings), of_method in zip(chosen.items(), points, strict=True)
-    ]
+    return [_curve(study, job.case, measured.rows(own), started) for job, own in zip(jobs, points, strict=True)]
 
 
-def _curve(
-    study: Study, name: str, settings: Mapping[str, object], found: Sequence[Mapping[str, Any]], started: str
-) -> Record:
-    arrays = {key: np.array([row[key] for row in found]) for key in found[0] if key != "message"}
+def _curve(study: CostStudy, case: Case, rows: Sequence[Mapping[str, Any]], started: str) -> Record:
+    arrays = arrays_of(rows)
     arrays["simulated_s"] = np.array([study.scenes[size].duration for size in arrays["setting"]])
     attributes: dict[str, Any] = {
-        "method": name,
+        "method": case.method,
         "setting_kind": study.kind,
-        "settings": str(dict(settings)),
-        "messages": [str(row["message"]) for row in found],
+        "settings": str(dict(case.settings)),
+        "messages": [str(row["message"]) for row in rows],
         "started": started,
+        "scene_hash": case.scene_hash,
+        "run_hash": case.key,
     }
     ok = arrays["status"] == STATUSES.index("ok")
     rate = arrays["run_time_s"] / arrays["simulated_s"]
-    if (exponent := growth_exponent(arrays["setting"][ok], rate[ok])) is not None:
+    if (exponent := cost_exponent(arrays["setting"][ok], rate[ok])) is not None:
         attributes["exponent"] = exponent
-    return Record("bench", f"{COST_SCALING}/{study.kind}", name, attributes, arrays)
+    return Record(BENCH, f"{COST_SCALING}/{study.kind}", case.method, attributes, arrays)

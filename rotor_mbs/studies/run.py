@@ -83,9 +83,7 @@ def run_scenes(
         cases += [reference, *run_cases(scene, methods[scene.name], reference, settings or {})]
     refuse_losses(output, cases)
     cases.sort(key=_slowest_first)
-    made = execute(
-        cases, perform_run, ResultsFile(output), workers, timeout_s, on_progress, on_time_out=_store_time_out
-    )
+    made = execute(cases, perform_run, ResultsFile(output), workers, timeout_s, on_progress, _store_time_out)
     return RunReport(made, len(cases) - len(made))
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
 from rotor_mbs.analysis.step_limits import largest_stable_step, oscillator_modes
+from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
@@ -19,6 +19,7 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.records import Record
 from rotor_mbs.studies.frozen import load_reference
 
+STEPS, LIMIT = "steps", "limits"
 TARGET = 1e-6  # rad
 
 # A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to take this long.
@@ -32,56 +33,41 @@ _GROWTH = 100.0
 _INTERVALS = 10
 
 
-@dataclass(frozen=True)
-class StepTask:
-    """kind: "steps" or "limits"; results: a file with the scene's reference; piece: where the record goes."""
-
-    kind: str
-    scene: Scene
-    method: str
-    results: Path
-    piece: Path | None = None
-
-
-def perform_steps(task: StepTask) -> Record:
-    """Errors in rad over steps in s, or the largest stable step in s, as a record."""
-    return _ladder(task) if task.kind == "steps" else _limit(task)
-
-
 def has_limit(scene: Scene, method: str) -> bool:
     """Whether theory gives a limit: an explicit method, and a spring in every bearing."""
     has_function = find_method(method).stability_function is not None
     return has_function and bool(scene.bearing_stiffness) and min(scene.bearing_stiffness) >= 1e6
 
 
-def _ladder(task: StepTask) -> Record:
-    reference = load_reference(task.results, task.scene)
-    interval = task.scene.duration / (task.scene.samples - 1)
+def ladder_record(job: Job) -> Record:
+    """Errors in rad over steps in s, and the step that the target needs."""
+    scene, method = job.case.scene, job.case.method
+    reference = load_reference(job.reference, scene) if job.reference is not None else None
     rows: list[tuple[float, Judgement]] = []
-    expected, step = 0.0, interval
-    while expected <= _LONGEST_RUN_S and task.scene.duration <= _MOST_STEPS * step:
-        verdict, seconds = _judged(task, {"step": step}, reference)
-        rows.append((step, verdict))
-        if verdict.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and verdict.status == "ok":
+    expected, step = 0.0, scene.duration / (scene.samples - 1)
+    while expected <= _LONGEST_RUN_S and scene.duration <= _MOST_STEPS * step:
+        judgement, seconds = _judged(scene, method, {"step": step}, reference)
+        rows.append((step, judgement))
+        if judgement.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and judgement.status == "ok":
             break
         expected, step = _FACTOR * seconds, step / _FACTOR
+    judgements = [judgement for _, judgement in rows]
     # A run that broke off has no error up to the horizon.
-    complete = [verdict.status in ("ok", "inaccurate") for _, verdict in rows]
     errors = [
-        verdict.metrics.get("angle_error_max", np.nan) if ended else np.nan
-        for (_, verdict), ended in zip(rows, complete, strict=True)
+        one.metrics.get("angle_error_max", np.nan) if one.status in ("ok", "inaccurate") else np.nan
+        for one in judgements
     ]
     arrays = {
         "step": np.array([step for step, _ in rows]),
-        "status": np.array([STATUSES.index(verdict.status) for _, verdict in rows], dtype=np.int64),
+        "status": np.array([STATUSES.index(one.status) for one in judgements], dtype=np.int64),
         "angle_error_max": np.array(errors),
-        "energy_drift_max": np.array([verdict.metrics.get("energy_drift_max", np.nan) for _, verdict in rows]),
+        "energy_drift_max": np.array([one.metrics.get("energy_drift_max", np.nan) for one in judgements]),
     }
-    attributes: dict[str, object] = {"false_successes": sum(verdict.false_success for _, verdict in rows)}
+    attributes: dict[str, object] = {"false_successes": sum(one.false_success for one in judgements)}
     needed = step_for(TARGET, arrays["step"], arrays["angle_error_max"])
     if needed is not None:
         attributes["step_for_target_s"] = needed
-    return Record("steps", task.scene.name, task.method, attributes, arrays)
+    return Record("steps", scene.name, method, attributes, arrays)
 
 
 def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | None:
@@ -96,33 +82,35 @@ def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | No
     return float(steps[last + 1] * (target / errors[last + 1]) ** (1.0 / slope))
 
 
-def _judged(task: StepTask, settings: Mapping[str, object], reference: Trajectory | None) -> tuple[Judgement, float]:
-    """The verdict and the run time in s; a run over twice the longest one ends itself."""
+def _judged(
+    scene: Scene, method: str, settings: Mapping[str, object], reference: Trajectory | None
+) -> tuple[Judgement, float]:
+    """The judgement and the run time in s; a run over twice the longest one ends itself."""
     try:
         with time_limit(2.0 * _LONGEST_RUN_S):
-            run = solve(task.method, task.scene, settings)
+            run = solve(method, scene, settings)
     except OutOfTimeError as exc:
         return Judgement("timed_out", str(exc), False, {}), 2.0 * _LONGEST_RUN_S
-    return judge(task.scene, run, reference), run.run_times_s[0]
+    return judge(scene, run, reference), run.run_times_s[0]
 
 
-def _limit(task: StepTask) -> Record:
+def limit_record(job: Job) -> Record:
     """The largest stable step by bisection on what becomes of the pitches, beside that of the theory."""
-    scene = task.scene
+    scene, method = job.case.scene, job.case.method
+    function = find_method(method).stability_function
+    assert function is not None  # see has_limit
     modes = [mode for i in range(len(scene.blades)) for mode in _modes(scene, i)]
     window = _WINDOW_RADIANS / max(abs(mode) for mode in modes)
     short = replace(scene, duration=window, samples=_INTERVALS + 1, outputs=("angles", "rates"))
-    function = find_method(task.method).stability_function
-    assert function is not None  # see has_limit
     theory = largest_stable_step(function, modes, window, _GROWTH)
     low = max(1, int(0.5 * window / theory / _INTERVALS))  # steps per interval: too few, enough
     high = 4 * low + 1
-    if not _stays(short, task.method, high) or _stays(short, task.method, low):
+    if not _stays(short, method, high) or _stays(short, method, low):
         found = float("nan")
     else:
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (low, middle) if _stays(short, task.method, middle) else (middle, high)
+            low, high = (low, middle) if _stays(short, method, middle) else (middle, high)
         found = window / (_INTERVALS * high)
     attributes = {
         "largest_stable_step_s": found,
@@ -130,11 +118,11 @@ def _limit(task: StepTask) -> Record:
         "fastest_mode_per_s": max(abs(mode) for mode in modes),
         "mode_damping_ratio": min(1.0, *(abs(mode.real) / abs(mode) for mode in modes)),
     }
-    return Record("limits", scene.name, task.method, attributes)
+    return Record("limits", scene.name, method, attributes)
 
 
 def _modes(scene: Scene, blade: int) -> tuple[complex, complex]:
-    """Of one pitch about zero, the rotor held: gravity and turning are nothing beside such a spring."""
+    """Of one pitch about zero, with the rotor fixed: gravity and rotation are negligible beside such a spring."""
     x, y, _ = scene.blades[blade].centre_of_mass
     inertia = scene.blades[blade].inertia[2] + scene.blades[blade].mass * (x * x + y * y)
     damping = scene.bearing_damping[blade] if scene.bearing_damping else 0.0

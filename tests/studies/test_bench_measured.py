@@ -23,7 +23,7 @@ from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.solution.metrics import angle_error
 from rotor_mbs.store.records import Record, read_records
-from rotor_mbs.studies.bench_work import Judged, Point, Prepared, Request, TimingProcess, thinned, thinned_reference
+from rotor_mbs.studies.bench_worker import Judged, Point, PointTimer, Prepared, Request, thinned, thinned_reference
 
 
 def errors_of(method: str, settings: Mapping[str, object], name: str = "fig08", intervals: int = 100) -> float:
@@ -82,9 +82,9 @@ def test_every_method_but_the_printed_ones_has_a_ladder_of_six_rungs_or_more() -
     assert len({one.curve for one in found}) == len(found)
 
 
-def process() -> TimingProcess:
+def process() -> PointTimer:
     scene, k = thinned(paper("fig09"))
-    return TimingProcess(lambda _: (scene, thinned_reference(reference(f"paper/{'fig09'}"), k)))
+    return PointTimer(lambda _: (scene, thinned_reference(reference(f"paper/{'fig09'}"), k)))
 
 
 def measured(point: Point) -> Judged:
@@ -128,7 +128,7 @@ def test_a_method_made_twice_slower_moves_up_by_two(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(closed_form, "accelerations", counted)
     scene, k = thinned(paper("fig09"))
-    timing = TimingProcess(
+    timing = PointTimer(
         lambda _: (scene, thinned_reference(reference(f"paper/{'fig09'}"), k)), clock=lambda: float(now[0])
     )
     timing(Request("prepare", DOP853))

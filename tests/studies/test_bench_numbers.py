@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.work_precision import (
+    cost_exponent,
     failed,
     fitted_order,
-    growth_exponent,
     pareto,
     reaches,
     succeeded,
@@ -126,11 +126,11 @@ def test_orders_are_fitted_above_the_floor(order: int) -> None:
     assert fitted_order(steps, np.full(10, 1.0)) is None
 
 
-def test_growth_exponent_of_the_larger_sizes() -> None:
+def test_cost_exponent_of_the_larger_sizes() -> None:
     """3 + n²/100: the constant hides the square at small n, and not at large n."""
     sizes = np.array([1.0, 2.0, 3.0, 100.0, 200.0, 400.0])
-    assert growth_exponent(sizes, 3.0 + sizes**2 / 100.0) == pytest.approx(2.0, abs=0.05)
-    assert growth_exponent(sizes[:1], sizes[:1]) is None
+    assert cost_exponent(sizes, 3.0 + sizes**2 / 100.0) == pytest.approx(2.0, abs=0.05)
+    assert cost_exponent(sizes[:1], sizes[:1]) is None
 
 
 def test_failures_are_points_and_none_is_dropped() -> None:

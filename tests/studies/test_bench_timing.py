@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -10,13 +9,12 @@ import numpy as np
 import pytest
 from support.scenes import paper
 
-from rotor_mbs.execution.servant import NoAnswerError, Servant
 from rotor_mbs.execution.timing import Timings, Warm, allot, conduct, statistics
 from rotor_mbs.methods.base import Settings
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Integration, Item, Trajectory
-from rotor_mbs.studies import bench_work
-from rotor_mbs.studies.bench_work import Judged, Point, Prepared, Request, TimingProcess
+from rotor_mbs.studies import bench_worker
+from rotor_mbs.studies.bench_worker import Judged, Point, PointTimer, Prepared, Request
 
 SCENE = paper("fig08", duration=1.0, samples=11)
 
@@ -69,9 +67,9 @@ def point(curve: str = "a", rung: int = 0) -> Point:
     return Point(curve, curve, rung, 0.5**rung, ())
 
 
-def timing_process(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> TimingProcess:
-    monkeypatch.setattr(bench_work, "find_method", lambda _name: fake)
-    return TimingProcess(lambda _: (SCENE, still()), fake.clock)
+def timing_process(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
+    monkeypatch.setattr(bench_worker, "find_method", lambda _name: fake)
+    return PointTimer(lambda _: (SCENE, still()), fake.clock)
 
 
 def test_median_and_quartiles() -> None:
@@ -176,40 +174,8 @@ def test_a_point_that_never_came_back_is_not_repeated() -> None:
     assert a not in timings.times
 
 
-# A servant's functions must be found by name in its process.
-
-
-def hang_or_answer(request: object) -> object:
-    if request == "hang":
-        time.sleep(60.0)
-    if request == "die":
-        raise SystemExit(3)
-    if request == "fail":
-        raise ArithmeticError("no number")
-    return request
-
-
-def make() -> Callable[[object], object]:
-    return hang_or_answer
-
-
-def test_a_hanging_or_dying_process_is_replaced() -> None:
-    with Servant(make) as servant:
-        assert servant.ask(1, 20.0) == 1
-        with pytest.raises(NoAnswerError) as hung:
-            servant.ask("hang", 0.2)
-        assert hung.value.timed_out
-        assert servant.ask(2, 20.0) == 2
-        with pytest.raises(NoAnswerError, match="exit code 3") as died:
-            servant.ask("die", 20.0)
-        assert not died.value.timed_out
-        with pytest.raises(RuntimeError, match="ArithmeticError: no number"):
-            servant.ask("fail", 20.0)
-        assert servant.ask(3, 20.0) == 3
-
-
 def test_samples_are_thinned_to_a_divisor() -> None:
     cases = {1001: (101, 10), 101: (101, 1), 1084: (58, 19), 998: (998, 1), 401: (101, 4)}
     for samples, (left, every) in cases.items():
-        short, k = bench_work.thinned(replace(SCENE, samples=samples))
+        short, k = bench_worker.thinned(replace(SCENE, samples=samples))
         assert (short.samples, k) == (left, every)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,14 +11,22 @@ from support.quadrature import Passage
 from support.references import TAYLOR, reference, run, scene
 
 from rotor_mbs.analysis.step_limits import largest_stable_step
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Job
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import compare, horizon_samples
-from rotor_mbs.studies.conservation import ConservationTask, drift_record, perform_conservation
-from rotor_mbs.studies.step_limits import StepTask, perform_steps, step_for
+from rotor_mbs.studies.conservation import SYMMETRY, conservation_record, drift_record
+from rotor_mbs.studies.step_limits import LIMIT, STEPS, ladder_record, limit_record, step_for
 
 LIGHT = ("light-1e-2", "light-1e-4", "light-1e-6", "light-1e-8", "light-1e-4-hub", "light-1e-8-hub", "feather")
+
+
+def job(name: str, method: str, study: str) -> Job:
+    """As an executor gives it to a worker, the shipped reference in the place of the computed one."""
+    return Job(Case(scene(name), method, study=study), Path(), reference_folder() / f"{name.split('/')[0]}.h5")
 
 
 @pytest.mark.parametrize("hub", ["1e3", "1e0", "1e-3", "1e-6"])
@@ -96,14 +105,16 @@ def test_implicit_methods_take_an_overdamped_bearing(method: str) -> None:
 
 def test_the_theory_of_rk44() -> None:
     """2.828 = 2√2 on the imaginary axis, 2.785 on the negative real one (Hairer & Wanner II, IV.2)."""
+    function = find_method("exudyn_tree/rk44").stability_function
+    assert function is not None
     for mode, limit in ((1j, 2.0 * np.sqrt(2.0)), (-1.0, 2.7852935634)):
-        assert largest_stable_step("exudyn_tree/rk44", [mode], 1e6, 100.0) == pytest.approx(limit, rel=1e-4)
+        assert largest_stable_step(function, [mode], 1e6, 100.0) == pytest.approx(limit, rel=1e-4)
 
 
 @pytest.mark.parametrize("name", ["stiff/bearing-1e8", "stiff/bearing-1e8-damping-100"])
 def test_rk44_grows_where_theory_says(name: str) -> None:
     """Bisection on runs; a run has a whole number of steps between samples, about 180: half a percent and rounding."""
-    record = perform_steps(StepTask("limits", scene(name), "exudyn_tree/rk44", reference_folder() / "stiff.h5"))
+    record = limit_record(job(name, "exudyn_tree/rk44", LIMIT))
     facts = record.attributes
     assert facts["largest_stable_step_s"] == pytest.approx(facts["theory_s"], rel=0.01)
     scaled = facts["largest_stable_step_s"] * facts["fastest_mode_per_s"]
@@ -127,9 +138,7 @@ def test_a_step_for_a_target_is_read_off_a_ladder() -> None:
 
 def test_a_ladder_of_runs_that_fail_at_once_ends() -> None:
     name = "extreme/light-1e-8"
-    record = perform_steps(
-        StepTask("steps", scene(name), "exudyn_chain/generalized_alpha", reference_folder() / "extreme.h5")
-    )
+    record = ladder_record(job(name, "exudyn_chain/generalized_alpha", STEPS))
     assert "ok" not in record.statuses
     assert "step_for_target_s" not in record.attributes
 
@@ -139,7 +148,7 @@ def test_symmetry_momentum_and_the_way_back(method: str) -> None:
     """Bounds: ten times what round-off (the chain: its step, order 2) leaves on this regular motion."""
     if method == TAYLOR:
         pytest.importorskip("heyoka")
-    facts = perform_conservation(ConservationTask("symmetry", scene("extreme/zero-gravity"), method)).attributes
+    facts = conservation_record(job("extreme/zero-gravity", method, SYMMETRY)).attributes
     bound = {TAYLOR: 1e-13, "exudyn_tree/rk67": 1e-11, "exudyn_chain/generalized_alpha": 1e-6}[method]
     assert set(facts) == {"mirror_error", "relabelling_error", "reversal_error", "angular_momentum_drift"}
     assert all(value <= bound for value in facts.values()), facts
@@ -147,8 +156,7 @@ def test_symmetry_momentum_and_the_way_back(method: str) -> None:
 
 def test_energy_drifts_like_a_random_walk() -> None:
     pytest.importorskip("heyoka")
-    task = ConservationTask("drift", scene("extreme/zero-gravity"), TAYLOR)
-    record = drift_record(task)
+    record = drift_record(scene("extreme/zero-gravity"), TAYLOR)
     assert 0.3 <= record.attributes["exponent"] <= 0.6
     assert record.attributes["largest"] <= 1e-13
 

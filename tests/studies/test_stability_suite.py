@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from rotor_mbs.analysis.stability import OUTCOMES, advice, cells, in_words, reached_by, unreached
 from rotor_mbs.cli import main
-from rotor_mbs.execution.pool import Finished
+from rotor_mbs.execution.execute import Outcome
 from rotor_mbs.report.pages.stability import NOT_COMPARED, write_stability_report
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.records import Record, read_records, write_records
-from rotor_mbs.studies import stability_records
 from rotor_mbs.studies.run import run_scenes
-from rotor_mbs.studies.stability_records import complete_records
+from rotor_mbs.studies.stability import complete_records
 
 SCENES = ("stiff/bearing-1e8-damping-100", "extreme/light-1e-8", "extreme/rate-1e200")
 
@@ -103,30 +100,26 @@ def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     assert {name: list(values) for name, values in back.arrays.items()} == {"step": [0.5, 0.25]}
 
 
-def test_an_interrupted_suite_goes_on_with_its_records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each record is stored when it is made; what is there is not made again, by whatever way it got there."""
+def test_an_interrupted_suite_goes_on_with_its_records(tmp_path: Path) -> None:
+    """Each record is stored when it is computed; what is there is not computed again."""
     path = tmp_path / "s.h5"
     scenes, methods = find_scenes(["extreme/zero-gravity"]), ["lagrange/ode45", "exudyn_tree/rk67", "exudyn_tree/rk44"]
     by_scene = {"extreme/zero-gravity": methods}
     run_scenes(scenes, by_scene, path, workers=0, timeout_s=60.0)
     made: list[str] = []
-    ends_after = 1
+    is_interrupted = True
 
-    def one_by_one(work: Any, tasks: Any, *_: object) -> Iterator[Any]:
-        for task in tasks:
-            if len(made) == ends_after:
-                raise KeyboardInterrupt
-            yield Finished(task, work(task))
-            made.append(task.method)
+    def interrupt(_done: int, _total: int, outcome: Outcome) -> None:
+        made.append(outcome.case.method)
+        if is_interrupted:
+            raise KeyboardInterrupt
 
-    monkeypatch.setattr(stability_records, "run_tasks", one_by_one)
     with pytest.raises(KeyboardInterrupt):
-        complete_records(scenes, by_scene, [], path, 1)
+        complete_records(scenes, by_scene, path, 0, interrupt)
     assert read_records(path) == []
-    ends_after = 10
-    complete_records(scenes, by_scene, [], path, 1)
-    assert made == methods
-    assert [record.method for record in read_records(path)] == sorted(methods)
-    complete_records(scenes, by_scene, [], path, 1)
-    assert made == methods
+    is_interrupted = False
+    for _ in range(2):
+        assert complete_records(scenes, by_scene, path, 0, interrupt) == []
+        assert made == methods
+        assert [record.method for record in read_records(path)] == sorted(methods)
     assert [file.name for file in tmp_path.iterdir()] == ["s.h5"]

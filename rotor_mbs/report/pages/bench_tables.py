@@ -12,8 +12,8 @@ import numpy as np
 from rotor_mbs.analysis.work_precision import (
     TARGETS_RAD,
     Reach,
+    cost_exponent,
     fastest,
-    growth_exponent,
     left_out,
     reaches,
     succeeded,
@@ -188,7 +188,7 @@ def scaling_table(curves: Sequence[Record]) -> PageTable:
         ok = np.array([status == "ok" for status in curve.statuses])
         rate = curve.arrays["run_time_s"] / np.array(curve.arrays["simulated_s"])
         at = dict(zip(curve.arrays["setting"][ok].tolist(), rate[ok].tolist(), strict=True))
-        exponent = growth_exponent(curve.arrays["setting"][ok], rate[ok])
+        exponent = cost_exponent(curve.arrays["setting"][ok], rate[ok])
         cells = [TableCell(prefixed(at.get(size), "s", 3)) for size in sizes]
         rows.append([TableCell(curve_label(curve)), *cells, TableCell(number(exponent))])
     return PageTable(

@@ -1,17 +1,21 @@
-"""What the timing process does: builds a point, runs it, judges the last run. One scene, engines loaded beforehand."""
+"""What the timing worker of a bench does: it builds a point, runs it as often as asked, and judges the last run.
+
+A point is one method at one setting. Engines are loaded beforehand, so that no run is charged for that.
+"""
 
 from __future__ import annotations
 
+import functools
 import gc
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
-from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Solver
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene
@@ -42,7 +46,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Request:
-    """To the timing process."""
+    """To the timing worker."""
 
     do: Literal["prepare", "repeat", "judge"]
     point: Point
@@ -70,33 +74,17 @@ class Judged:
     metrics: Metrics
 
 
-def thinned(scene: Scene) -> tuple[Scene, int]:
-    """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or none."""
-    intervals = scene.samples - 1
-    k = next((k for k in range(1, intervals + 1) if intervals % k == 0 and intervals // k <= _MOST_INTERVALS), 1)
-    # A number of intervals without a fitting divisor would leave too few samples to see an error's largest.
-    k = k if intervals // k >= _MOST_INTERVALS // 5 or intervals <= _MOST_INTERVALS else 1
-    return replace(scene, samples=intervals // k + 1), k
+SceneOf: TypeAlias = Callable[[Point], tuple[Scene, Trajectory | None]]
 
 
-def thinned_reference(reference: Trajectory, k: int) -> Trajectory:
-    """Every k-th sample of everything that a comparison uses."""
-    arrays = {name: values[::k] for name, values in reference.quantities.items()}
-    return Trajectory(reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays)
-
-
-class TimingProcess:
-    """Answers requests about points. A point not prepared here (a process before this one was ended) is prepared when
+class PointTimer:
+    """Answers requests about points. A point not prepared here (the process before this one was ended) is prepared when
     first asked for.
 
     scene_of    the scene of a point, and its reference if there is one
     """
 
-    def __init__(
-        self,
-        scene_of: Callable[[Point], tuple[Scene, Trajectory | None]],
-        clock: Callable[[], float] = time.perf_counter,
-    ) -> None:
+    def __init__(self, scene_of: SceneOf, clock: Callable[[], float] = time.perf_counter) -> None:
         self._scene_of, self._clock = scene_of, clock
         self._solvers: dict[Point, Solver] = {}
         self._last: dict[Point, Integration] = {}
@@ -119,7 +107,7 @@ class TimingProcess:
             start = self._clock()
             self._solvers[point] = method.build(scene, settings)
             setups.append(self._clock() - start)
-        gc.collect()  # the collector is off in the timing process
+        gc.collect()  # the collector is off in the timing worker
         seconds = self._timed_run(point)
         self._first_angles[point] = self._solvers[point].observe().angles
         return Prepared(setups[0], setups[1], seconds)
@@ -137,15 +125,15 @@ class TimingProcess:
         integration = self._last[point]
         scene, reference = self._scene_of(point)
         method = find_method(point.method)
-        run = Solution(scene, method.name, trajectory, integration, dict(point.settings), output_time_s=output)
+        run = Solution(scene, method.name, trajectory, integration, dict(point.settings))
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
         with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
-            verdict = judge(scene, run, reference)
-        status, message = _status(verdict.status, verdict.message, verdict.metrics)
+            judgement = judge(scene, run, reference)
+        status, message = _status(judgement.status, judgement.message, judgement.metrics)
         del self._solvers[point]
         same = np.array_equal(trajectory.angles, self._first_angles[point])
         false_success = integration.success and status != "ok"
-        return Judged(status, message, false_success, same, integration.steps or 0, output, verdict.metrics)
+        return Judged(status, message, false_success, same, integration.steps or 0, output, judgement.metrics)
 
 
 def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[str, str]:
@@ -161,24 +149,43 @@ def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[st
 
 
 @dataclass(frozen=True)
-class MakeTimingProcess:
-    """Makes a TimingProcess where it is to run, with its engines loaded, so that no run is charged for that."""
+class StartTimer:
+    """Makes its process one that does nothing but time points: engines loaded, collector off. See `ask`."""
+
+    methods: tuple[str, ...]
+    scene_of: SceneOf
+
+    def __call__(self) -> None:
+        global _timer
+        for method in self.methods:
+            find_method(method).load()
+        gc.disable()
+        _timer = PointTimer(self.scene_of)
+
+
+_timer: PointTimer | None = None
+
+
+def ask(request: Request) -> Prepared | float | Judged:
+    """The answer of the timer that this process was started with."""
+    assert _timer is not None  # by StartTimer
+    return _timer(request)
+
+
+@dataclass(frozen=True)
+class BenchScene:
+    """The scene of every point of a bench; its reference is read in the worker. results: the file that has it."""
 
     scene: Scene
     results: Path
-    methods: tuple[str, ...]
 
-    def __call__(self) -> TimingProcess:
-        only_time(self.methods)
-        found = prepared_scene(self.scene, self.results)
-        return TimingProcess(lambda _: found)
+    def __call__(self, _: Point) -> tuple[Scene, Trajectory]:
+        return _prepared(self)
 
 
-def only_time(methods: Iterable[str]) -> None:
-    """Makes this process one that does nothing but time them: engines loaded, collector off."""
-    for method in methods:
-        find_method(method).load()
-    gc.disable()
+@functools.lru_cache(maxsize=1)
+def _prepared(bench: BenchScene) -> tuple[Scene, Trajectory]:
+    return prepared_scene(bench.scene, bench.results)
 
 
 def prepared_scene(scene: Scene, results: Path) -> tuple[Scene, Trajectory]:
@@ -190,10 +197,16 @@ def prepared_scene(scene: Scene, results: Path) -> tuple[Scene, Trajectory]:
     return short, thinned_reference(reference, k)
 
 
-def able(method: str, scene: Scene) -> str:
-    """Why `method` cannot represent `scene`, or ""."""
-    try:
-        find_method(method).items(scene)
-    except MethodRefusal as exc:
-        return str(exc)
-    return ""
+def thinned(scene: Scene) -> tuple[Scene, int]:
+    """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or none."""
+    intervals = scene.samples - 1
+    k = next((k for k in range(1, intervals + 1) if intervals % k == 0 and intervals // k <= _MOST_INTERVALS), 1)
+    # A number of intervals without a fitting divisor would leave too few samples to see an error's largest.
+    k = k if intervals // k >= _MOST_INTERVALS // 5 or intervals <= _MOST_INTERVALS else 1
+    return replace(scene, samples=intervals // k + 1), k
+
+
+def thinned_reference(reference: Trajectory, k: int) -> Trajectory:
+    """Every k-th sample of everything that a comparison uses."""
+    arrays = {name: values[::k] for name, values in reference.quantities.items()}
+    return Trajectory(reference.time[::k], reference.angles[::k], reference.rates[::k], **arrays)

@@ -1,0 +1,296 @@
+"""Error against run time: each curve is a case, one method over its ladder of settings on one scene.
+
+The curves of a scene are timed together, in rounds over all their points, by one worker process on one core.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute_with, ignore_progress
+from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, last_core, one_line, open_pool
+from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
+from rotor_mbs.methods.catalogue import find_method, ladders
+from rotor_mbs.methods.ladders import STEP, Ladder
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import horizon, horizon_samples
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.records import Record, write_records
+from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.studies.bench_worker import (
+    BenchScene,
+    Judged,
+    Point,
+    Prepared,
+    Request,
+    StartTimer,
+    ask,
+    prepared_scene,
+)
+from rotor_mbs.studies.run import reference_case, run_scenes
+
+BENCH = "bench"
+SOURCES = ("studies/bench.py", "studies/bench_worker.py", "execution/timing.py")
+
+_REFERENCE_LIMIT_S = 60.0
+# A run longer than this is ended: a hanging engine must not eat the budget of the others.
+_RUN_LIMIT_S = 10.0
+_ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
+
+
+@dataclass(frozen=True)
+class BenchReport:
+    """made: curves measured by this call; kept: scenes of which all curves were stored already; left_out: why."""
+
+    made: list[Outcome]
+    kept: int
+    left_out: list[str]
+
+    @property
+    def measured(self) -> int:
+        """Scenes of which this call measured a curve."""
+        return len({one.case.scene.name for one in self.made})
+
+
+def run_bench(
+    scenes: Sequence[Scene],
+    methods: Sequence[str],
+    output: Path,
+    *,
+    repeats: int,
+    budget_s: float,
+    workers: int,
+    on_progress: OnProgress = ignore_progress,
+) -> BenchReport:
+    """The curves of every scene into the results file `output`; what it has already is kept.
+
+    methods     whose ladders are measured; all where none is named
+    repeats     timed runs of each point at most
+    budget_s    s, for all curves of a scene
+    workers     processes that compute references before the first curve is timed
+
+    Raises InputError for a method without a ladder and for a scene without a usable reference, StoreError.
+    """
+    chosen = ladders(methods)
+    _complete_references(scenes, output, workers)
+    for scene in scenes:  # refused before the first is measured
+        prepared_scene(scene, output)
+    cases, left_out = [], []
+    for scene in scenes:
+        for ladder in chosen:
+            if reason := _refusal(ladder.method, scene):
+                left_out.append(f"{scene.name}: {ladder.curve} left out: {reason}")
+            else:
+                cases.append(_bench_case(scene, ladder, repeats, budget_s))
+    made = execute_with(cases, _time_by_scene, ResultsFile(output), on_progress)
+    report = BenchReport(made, 0, left_out)
+    return BenchReport(made, len(scenes) - report.measured, left_out)
+
+
+def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) -> None:
+    none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
+    report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
+    failed = [*report.failures, *report.not_computed]
+    if failed:
+        raise InputError(
+            f"{one.case.scene.name}: no usable reference ({one.result.status}: {one.result.message}); a bench needs one"
+            for one in failed
+        )
+
+
+def _refusal(method: str, scene: Scene) -> str:
+    """Why `method` cannot represent `scene`, or ""."""
+    try:
+        find_method(method).items(scene)
+    except MethodRefusal as exc:
+        return str(exc)
+    return ""
+
+
+def _bench_case(scene: Scene, ladder: Ladder, repeats: int, budget_s: float) -> Case:
+    rungs = [[rung.setting, sorted(rung.settings.items())] for rung in ladder.rungs(1.0)]
+    options = {"curve": ladder.curve, "rungs": rungs, "repeats": repeats, "budget_s": budget_s}
+    return Case(scene, ladder.method, ladder.choices, BENCH, options, reference_case(scene).key, SOURCES)
+
+
+def _time_by_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
+    for name in dict.fromkeys(job.case.scene.name for job in jobs):
+        own = [job for job in jobs if job.case.scene.name == name]
+        for job, record in zip(own, _measure_scene(own), strict=True):
+            yield Finished(job, store_curve(job, record))
+
+
+def store_curve(job: Job, record: Record) -> Result:
+    """Writes the part of a curve; its points are counted in the message."""
+    write_records(job.part, [record])
+    failed = sum(status not in ("ok", "left_out") for status in record.statuses)
+    counts = f"{len(record.statuses)} points, {failed} failed, {record.statuses.count('left_out')} left out"
+    return Result("ok", counts)
+
+
+def _measure_scene(jobs: Sequence[Job]) -> list[Record]:
+    """Times, judges and collects every point of the curves of one scene."""
+    load_before = os.getloadavg()[0]
+    case, results = jobs[0].case, jobs[0].reference
+    assert results is not None  # every bench case has a reference
+    short, reference = prepared_scene(case.scene, results)
+    by_curve = {ladder.curve: ladder for ladder in ladders()}
+    own = [by_curve[str(job.case.options["curve"])] for job in jobs]
+    points = [_points(ladder, short.duration / (short.samples - 1)) for ladder in own]
+    measured = measure_points(BenchScene(case.scene, results), points, case.options)
+    shared = {
+        "scene_hash": case.scene_hash,
+        "horizon_s": horizon(reference),
+        "uncertainty_rad": _uncertainty(reference),
+        "duration_s": case.scene.duration,
+        "samples": short.samples,
+        "budget_s": case.options["budget_s"],
+        "load_before": load_before,
+        "load_after": os.getloadavg()[0],
+        "pinned_core": -1 if last_core() is None else last_core(),
+    }
+    return [
+        _curve(job.case, ladder, measured.rows(chosen), shared | {"repeatable": measured.is_repeatable(chosen)})
+        for job, ladder, chosen in zip(jobs, own, points, strict=True)
+    ]
+
+
+def _uncertainty(reference: Trajectory) -> float:
+    """rad: the reference's own, over the samples that errors are taken at."""
+    if reference.angle_uncertainty is None:
+        return 0.0
+    return float(reference.angle_uncertainty[: max(horizon_samples(reference), 1)].max())
+
+
+def _points(ladder: Ladder, interval: float) -> list[Point]:
+    return [
+        Point(ladder.curve, ladder.method, i, rung.setting, tuple(sorted(rung.settings.items())))
+        for i, rung in enumerate(ladder.rungs(interval))
+    ]
+
+
+def _curve(case: Case, ladder: Ladder, rows: Sequence[Mapping[str, Any]], shared: Mapping[str, Any]) -> Record:
+    arrays = arrays_of(rows)
+    attributes: dict[str, Any] = {
+        **shared,
+        "method": ladder.method,
+        "choices": json.dumps(dict(ladder.choices), sort_keys=True),
+        "setting_kind": ladder.kind,
+        "run_hash": case.key,
+        "messages": [str(row["message"]) for row in rows],
+    }
+    if ladder.order is not None:
+        attributes["order_expected"] = ladder.order
+    ok = arrays["status"] == STATUSES.index("ok")
+    errors = np.maximum(arrays["angle_error_max"][ok], SMALLEST_ERROR)
+    if ladder.kind == STEP and (order := fitted_order(arrays["setting"][ok], errors)) is not None:
+        attributes["order"] = order
+    return Record(BENCH, case.scene.name, ladder.curve, attributes, arrays)
+
+
+def arrays_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Arrays over the settings of a curve, from what was measured at each."""
+    return {name: np.array([row[name] for row in rows]) for name in rows[0] if name != "message"}
+
+
+@dataclass
+class Measured:
+    """What was measured, by point."""
+
+    timings: Timings[Point] = field(default_factory=Timings)
+    prepared: dict[Point, Prepared] = field(default_factory=dict)
+    judged: dict[Point, Judged] = field(default_factory=dict)
+    unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
+
+    def is_repeatable(self, points: Sequence[Point]) -> bool:
+        """Whether the last run of every point was bit for bit its first one."""
+        return all(self.judged[point].same for point in points if point in self.judged)
+
+    def rows(self, points: Sequence[Point]) -> list[dict[str, Any]]:
+        """Every dataset's value at each point; NaN and 0 where there is none."""
+        return [self._row(point) for point in points]
+
+    def _row(self, point: Point) -> dict[str, Any]:
+        names = ("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s")
+        others = ("setup_time_s", "setup_again_time_s", "output_time_s")
+        row: dict[str, Any] = {"setting": point.setting, **dict.fromkeys((*_ERRORS, *names, *others), np.nan)}
+        row |= {"repeats": 0, "steps": 0, "status": STATUSES.index("left_out"), "false_success": 0, "message": ""}
+        if point in self.timings.left_out:
+            row["message"] = self.timings.left_out[point]
+        elif point in self.unanswered:
+            status, row["message"] = self.unanswered[point]
+            row["status"] = STATUSES.index(status)
+            row["run_time_s"] = self.timings.warm[point].seconds
+        else:
+            times = statistics(self.timings.times[point])
+            values = (times.median, times.minimum, times.lower_quartile, times.upper_quartile)
+            row |= dict(zip(names, values, strict=True))
+            judged, prepared = self.judged[point], self.prepared[point]
+            if judged.status in ("ok", "inaccurate"):  # the errors of a run that broke off are those of its part
+                row |= {name: judged.metrics.get(name, np.nan) for name in _ERRORS}
+            row |= {
+                "setup_time_s": prepared.setup_s,
+                "setup_again_time_s": prepared.setup_again_s,
+                "output_time_s": judged.output_s,
+                "repeats": times.repeats,
+                "steps": judged.steps,
+                "status": STATUSES.index(judged.status),
+                "false_success": int(judged.false_success),
+                "message": judged.message,
+            }
+        return row
+
+
+def measure_points(scene_of: Any, points: Sequence[Sequence[Point]], options: Mapping[str, Any]) -> Measured:
+    """Times all points in rounds, and judges the last run of each; in one worker process on one core.
+
+    scene_of   picklable, from a point to its scene and reference
+    points     by curve, each coarse to fine
+    options    `repeats` and `budget_s`
+    """
+    methods = tuple(dict.fromkeys(point.method for curve in points for point in curve))
+    found = Measured()
+    with open_pool(1, StartTimer(methods, scene_of), last_core()) as pool:
+        limit = min(_RUN_LIMIT_S, options["budget_s"])
+        found.timings = _time(pool, points, options, limit, found)
+        for point in found.timings.warm:
+            if point not in found.unanswered:
+                found.judged[point] = _answer(pool, Request("judge", point), limit)
+    return found
+
+
+def _time(
+    pool: WorkerPool, points: Sequence[Sequence[Point]], options: Mapping[str, Any], limit: float, found: Measured
+) -> Timings[Point]:
+    def warm_up(point: Point) -> Warm:
+        start = time.perf_counter()
+        try:
+            found.prepared[point] = _answer(pool, Request("prepare", point), limit)
+        except TaskLostError as exc:
+            found.unanswered[point] = ("timed_out" if exc.failure == "timed_out" else "solver_failed", str(exc))
+        except Exception as exc:
+            found.unanswered[point] = ("solver_failed", one_line(exc))
+        else:
+            return Warm(found.prepared[point].run_s, returned=True)
+        return Warm(time.perf_counter() - start, returned=False)
+
+    def repeat(point: Point) -> float:
+        return float(_answer(pool, Request("repeat", point), limit))
+
+    return conduct(points, warm_up, repeat, options["budget_s"], options["repeats"], time.perf_counter)
+
+
+def _answer(pool: WorkerPool, request: Request, limit: float) -> Any:
+    return pool.submit(ask, request, limit).result()

@@ -1,0 +1,121 @@
+"""The stability suite: every corrected method on the stiff and extreme scenes, step limits, and conservation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rotor_mbs.analysis.stability import Cell, cells
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
+from rotor_mbs.methods.catalogue import find_method, method_names
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.records import read_records, write_records
+from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.studies.conservation import DRIFT, SYMMETRY, conservation_record
+from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
+from rotor_mbs.studies.step_limits import LIMIT, STEPS, has_limit, ladder_record, limit_record
+
+SUITE = ("stiff", "extreme")
+
+# The method that `run` relies on is given time for the longest scenes: where nothing ends, the map tells nothing.
+_PATIENT_METHOD, _PATIENT_S = "lagrange/taylor", 120.0
+# A ladder takes a few times its longest run; what is over this is stuck.
+_RECORD_LIMIT_S = 40.0
+# Scenes on which conservation is looked at: one without gravity, one regular with it.
+_SYMMETRY_SCENES = ("extreme/zero-gravity", "extreme/light-1e-2")
+_DRIFT_CASE = ("extreme/zero-gravity", "lagrange/taylor")
+_SOURCES = (
+    "studies/step_limits.py", "studies/conservation.py", "analysis/step_limits.py", "analysis/conservation.py",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SuiteReport:
+    """runs: all runs of the file, as they stand on the map; not_computed: cases whose process died."""
+
+    scenes: int
+    runs: list[Cell]
+    not_computed: list[Outcome]
+
+
+def run_suite(
+    names: Sequence[str],
+    output: Path,
+    *,
+    workers: int,
+    timeout_s: float,
+    on_progress: OnProgress = ignore_progress,
+) -> SuiteReport:
+    """The suite on the scenes of these names (all of it where there are none) into the results file `output`.
+
+    What the file has already is kept; records of these scenes that are no longer wanted are dropped. Raises InputError,
+    StoreError.
+    """
+    scenes = find_scenes(names or SUITE)
+    methods = {scene.name: able_methods(scene, method_names(is_corrected=True))[0] for scene in scenes}
+    none: Mapping[str, Sequence[str]] = dict.fromkeys(methods, ())  # references, some of which take long, first
+    patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in methods.items()}
+    lost = []
+    for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (methods, timeout_s)):
+        report = run_scenes(scenes, chosen, output, workers=workers, timeout_s=limit_s, on_progress=on_progress)
+        lost += report.not_computed
+    lost += complete_records(scenes, methods, output, workers, on_progress)
+    return SuiteReport(len(scenes), cells(output), lost)
+
+
+def complete_records(
+    scenes: Sequence[Scene],
+    methods: Mapping[str, Sequence[str]],
+    output: Path,
+    workers: int,
+    on_progress: OnProgress = ignore_progress,
+) -> list[Outcome]:
+    """Step ladders, step limits and conservation of these scenes, where the runs in `output` call for them; those whose
+    process died."""
+    cases = [*_step_cases(scenes, cells(output)), *_conservation_cases(scenes, methods)]
+    store = ResultsFile(output)
+    made = execute(cases, perform_record, store, workers, _RECORD_LIMIT_S, on_progress)
+    names, wanted = {scene.name for scene in scenes}, {case.key for case in cases}
+    records = read_records(output, "steps", "limits", "conservation")
+    stale = {record.key for record in records if record.scene in names} - wanted
+    if stale:
+        store.merge((), without=stale)
+    return [outcome for outcome in made if not outcome.is_computed]
+
+
+def perform_record(job: Job) -> Result:
+    """Computes and stores one record, in a worker process."""
+    case = job.case
+    compute = {STEPS: ladder_record, LIMIT: limit_record, SYMMETRY: conservation_record, DRIFT: conservation_record}
+    record = compute[case.study](job)
+    attributes = {**record.attributes, "scene_hash": case.scene_hash, "run_hash": case.key}
+    write_records(job.part, [replace(record, attributes=attributes)])
+    return Result("ok")
+
+
+def _step_cases(scenes: Sequence[Scene], found: Sequence[Cell]) -> list[Case]:
+    """Ladders where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step."""
+    by_name = {scene.name: scene for scene in scenes}
+    cases = []
+    for run in found:
+        scene = by_name.get(run.scene)
+        if scene is None or not find_method(run.method).fixed_step or not run.has_reference:
+            continue
+        reference = reference_case(scene).key
+        if run.is_stiff_or_light or run.status in ("inaccurate", "diverged", "solver_failed"):
+            cases.append(Case(scene, run.method, study=STEPS, reference=reference, sources=_SOURCES))
+        if has_limit(scene, run.method):
+            cases.append(Case(scene, run.method, study=LIMIT, reference=reference, sources=_SOURCES))
+    return cases
+
+
+def _conservation_cases(scenes: Sequence[Scene], methods: Mapping[str, Sequence[str]]) -> list[Case]:
+    return [
+        Case(scene, method, study=DRIFT if (scene.name, method) == _DRIFT_CASE else SYMMETRY, sources=_SOURCES)
+        for scene in scenes
+        if scene.name in _SYMMETRY_SCENES
+        for method in methods[scene.name]
+    ]
