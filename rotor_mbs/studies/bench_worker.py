@@ -125,7 +125,7 @@ class PointTimer:
         integration = self._last[point]
         scene, reference = self._scene_of(point)
         method = find_method(point.method)
-        run = Solution(scene, method.name, trajectory, integration, dict(point.settings))
+        run = Solution(scene, point.method, trajectory, integration, dict(point.settings))
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
         with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
             judgement = judge(scene, run, reference)

@@ -11,6 +11,7 @@ from support.scenes import paper
 
 from rotor_mbs.execution.timing import Timings, Warm, allot, conduct, statistics
 from rotor_mbs.methods.base import Settings
+from rotor_mbs.scenario.bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Integration, Item, Trajectory
 from rotor_mbs.studies import bench_worker
@@ -39,6 +40,8 @@ class FakeMethod:
     success: bool = True
     rows: int = SCENE.samples
     settings: type[Settings] = Settings
+    is_corrected: bool = True
+    bounds: tuple[Bound, ...] = ()
 
     def items(self, _scene: Scene) -> list[Item]:
         return []
