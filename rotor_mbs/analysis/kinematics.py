@@ -1,4 +1,4 @@
-"""Tip paths and energies by plain rotation of the scene's bodies: worked out once more, so that no model is trusted.
+"""Tip paths and energies by plain rotation of the scene's bodies: computed again, independently of all models.
 
 Knows scenes and samples; no results file, no model.
 """
@@ -13,7 +13,7 @@ from rotor_mbs.solution.record import Array
 
 def tip_paths(scene: Scene, angles: Array) -> Array:
     """(n, blades, 3) m, base frame, of (n, 1 + blades) rad."""
-    return np.stack([_turned(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)], axis=1)
+    return np.stack([_rotated(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)], axis=1)
 
 
 def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
@@ -23,7 +23,7 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
         frames = _frames(scene, angles, i)
         omega = rates[:, 1 + i, None] * frames[:, :, 2]
         omega[:, 1] += rates[:, 0]
-        velocity = np.cross(omega, _turned(frames, blade.centre_of_mass))
+        velocity = np.cross(omega, _rotated(frames, blade.centre_of_mass))
         xx, yy, zz, xy, xz, yz = blade.inertia
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         own = np.einsum("nij,ni->nj", frames, omega)  # ω in the blade's frame
@@ -35,14 +35,14 @@ def potential_energy(scene: Scene, angles: Array) -> Array:
     """(n,) J: of weights, zero at the shaft's height, and of bearing springs (a pitch that cannot move has none)."""
     total = np.zeros(len(angles))
     for i, blade in enumerate(scene.blades):
-        total += blade.mass * scene.gravity * _turned(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
+        total += blade.mass * scene.gravity * _rotated(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
         if scene.bearing_stiffness and blade.has_pitch_inertia:
             total += 0.5 * scene.bearing_stiffness[i] * angles[:, 1 + i] ** 2
     return total
 
 
 def work_of_constant_torque(scene: Scene, angles: Array) -> Array | None:
-    """(n,) J; None where the torque changes or something damps: there the work is no function of the angles."""
+    """(n,) J; None where the torque changes or there is damping: there the work is no function of the angles."""
     if scene.has_damping or not scene.has_constant_torque:
         return None
     return scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
@@ -57,7 +57,7 @@ def _frames(scene: Scene, angles: Array, blade: int) -> Array:
     return np.stack([np.stack(axis, axis=1) for axis in (x_axis, y_axis, z_axis)], axis=2)
 
 
-def _turned(frames: Array, point: tuple[float, float, float]) -> Array:
+def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
     """(n, 3) m."""
-    turned: Array = frames @ np.array(point)
-    return turned
+    rotated: Array = frames @ np.array(point)
+    return rotated

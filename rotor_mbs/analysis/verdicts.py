@@ -1,6 +1,6 @@
 """Verdicts on a results file: each a number against a bound, with what to look at. Reads the store alone.
 
-All is worked out anew from the stored samples; a metric or status in the file is something to check, not a source.
+Every number is computed again from the stored samples; a metric or status in the file is checked, never used.
 """
 
 from __future__ import annotations
@@ -83,9 +83,9 @@ def _motion_ends(scene: StoredScene) -> bool:
 
 
 def _of_run(run: StoredRun, bounds: Bounds, found: Rehydrated, motion_ends: bool) -> Iterator[Verdict]:
-    """A run that stops early and says so is complete where nothing more was to be had of it."""
-    says_so = found.run is not None and run.status not in ("ok", "inaccurate")
-    excused = says_so and (motion_ends or not is_corrected(run.method))
+    """A run that stops early and reports it is complete where the motion ends there."""
+    reports_it = found.run is not None and run.status not in ("ok", "inaccurate")
+    excused = reports_it and (motion_ends or not is_corrected(run.method))
     faults = [] if excused else found.faults
     look = "; ".join(faults) or "every channel, row and number is there"
     if faults and run.status != "ok":
@@ -132,7 +132,7 @@ def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution
 
 def _start_off(scene: Scene, trajectory: Trajectory) -> float:
     angles = np.abs(trajectory.angles[0] - scene.initial_angles)
-    # A pitch without inertia is held: its rate is zero, whatever the scene says.
+    # A pitch without inertia is fixed: its rate is zero, whatever the scene says.
     given = [scene.initial_rates[0]] + [
         rate if blade.has_pitch_inertia else 0.0
         for rate, blade in zip(scene.initial_rates[1:], scene.blades, strict=True)
@@ -175,7 +175,7 @@ def _of_corrected_model(run: StoredRun, bounds: Bounds, found: Rehydrated, traje
     if exact is not None:
         name, angle = exact
         off = float(np.abs(trajectory.angles[:, 0] - angle).max())
-        yield _make("exact", run, "rotor angle", off, bounds, "rad", f"{name}, solved by hand")
+        yield _make("exact", run, "rotor angle", off, bounds, "rad", f"{name}, solved analytically")
 
 
 def _of_quantities(run: StoredRun, bounds: Bounds, scene: Scene, metrics: Metrics) -> Iterator[Verdict]:
@@ -191,10 +191,10 @@ def _of_quantities(run: StoredRun, bounds: Bounds, scene: Scene, metrics: Metric
 def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Verdict]:
     """The reference in the file against the shipped one of the same scene; a file without one cannot be judged."""
     stored = scene.reference
-    look = "a touched reference, or a changed scene or closed form"
+    look = "an altered reference, or a changed scene or closed form"
     if stored is None:
         bound = bounds.of("reference", REFERENCE).value
-        look = "the file has no reference: nothing to hold the runs to"
+        look = "the file has no reference to compare the runs with"
         yield Verdict("reference", scene.name, REFERENCE, "all", math.nan, bound, "rad", look)
     elif shipped is not None:
         for name in ("angles", "rates"):

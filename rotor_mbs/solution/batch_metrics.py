@@ -1,4 +1,4 @@
-"""Runs by the hundred, judged like single ones: what is clearly well is seen at once, the rest goes to `outcome.judge`.
+"""Metrics of many runs at once: those that are clearly ok are found here, the others are left to `judgement.judge`.
 
 Knows arrays only; no engine, no file, no bound of its own.
 """
@@ -48,8 +48,8 @@ def _scales(scenes: Sequence[Scene]) -> Array:
     found: dict[tuple[object, ...], float] = {}
     scales = []
     for scene in scenes:
-        wound = scene.initial_angles if any(scene.bearing_stiffness) else ()
-        key = (scene.rotor_key, wound)
+        spring_angles = scene.initial_angles if any(scene.bearing_stiffness) else ()
+        key = (scene.rotor_key, spring_angles)
         if key not in found:
             angles = np.array([scene.initial_angles])
             found[key] = energy_scale(scene, Trajectory(np.zeros(1), angles, angles))
@@ -58,11 +58,11 @@ def _scales(scenes: Sequence[Scene]) -> Array:
 
 
 def clearly_ok(
-    scenes: Sequence[Scene], method: str, words: Sequence[Integration], samples: Sequence[int], drifts: Array
+    scenes: Sequence[Scene], method: str, integrations: Sequence[Integration], samples: Sequence[int], drifts: Array
 ) -> NDArray[np.bool_]:
-    """(k,) whether `outcome.judge`, without a reference, would certainly call each run ok."""
+    """(k,) whether `judgement.judge`, without a reference, is certain to call each run ok."""
     allowed = allowed_of(method)
-    complete = np.array([word.success and n == scenes[0].samples for word, n in zip(words, samples, strict=True)])
+    complete = np.array([one.success and n == scenes[0].samples for one, n in zip(integrations, samples, strict=True)])
     if allowed is None:
         return complete
     return complete & (drifts <= allowed.energy) & (_start_shares(scenes) > _CLEAR_SHARE)

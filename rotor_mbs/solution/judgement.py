@@ -232,7 +232,7 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
 def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]]:
     """Coefficients of s², c², s c (s, c of the pitch) in S and in the inertia about the shaft (pitches fixed), kg m².
 
-    In exact arithmetic until the end: for a point mass the first vanishes, and its rounding must not pass for inertia.
+    In exact arithmetic until the end: for a point mass the first vanishes, whose rounding is not inertia.
     """
     m = Fraction(blade.mass)
     x, y, z = map(Fraction, blade.centre_of_mass)

@@ -1,4 +1,4 @@
-"""Digests of frozen arrays, in a text file beside each file of references: a touched number is told by its place."""
+"""Digests of frozen arrays, in a text file beside each file of references: a changed number is found and located."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def write_digests(references: Path) -> None:
     hdf5.replace_file(digest_file(references), "".join(lines).encode())
 
 
-def touched(results: Results) -> dict[str, list[str]]:
+def changed_arrays(results: Results) -> dict[str, list[str]]:
     """By scene, the arrays of its reference that are not what was frozen, are new or are gone; [] where all is well.
 
     Raises StoreError where there is no digest file.

@@ -50,7 +50,7 @@ def stored_keys(path: Path) -> set[str]:
     if not path.exists():
         return set()
     with open_results(path) as results:
-        return {key for _, _, _, key in _members(results)}
+        return {key for _, _, _, key in _members(results) if key}
 
 
 def refuse_other_kinds(path: Path) -> None:

@@ -93,7 +93,7 @@ class StoredScene:
 
 @dataclass(frozen=True)
 class Results:
-    """An open results file: its attributes (versions, machine, created) and its scenes by name, in file order."""
+    """An open results file: its attributes (versions, platform, created) and its scenes by name, in file order."""
 
     path: Path
     attributes: dict[str, Any]

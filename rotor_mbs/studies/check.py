@@ -17,7 +17,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method,
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.digests import touched
+from rotor_mbs.store.digests import changed_arrays
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.check_probes import Measured, perform_probe, probes, speed_probes
 from rotor_mbs.studies.frozen import shipped_files
@@ -126,7 +126,7 @@ def judge_frozen(bounds: Bounds) -> list[Verdict]:
     for path in shipped_files():
         with open_results(path) as results:
             try:
-                scenes = touched(results)
+                scenes = changed_arrays(results)
             except StoreError as exc:
                 found.append(Verdict("frozen", path.stem, REFERENCE, "all", math.nan, bound, "arrays", str(exc)))
                 continue

@@ -156,7 +156,7 @@ def test_a_solver_stopped_by_its_own_time_out(method: str, monkeypatch: pytest.M
 
 
 def test_a_body_that_falls_free_of_its_joints() -> None:
-    """An explicit integration of the chain, told not to eliminate the constraints, drops them and returns True.
+    """An explicit integration of the chain, set not to eliminate the constraints, drops them and returns True.
 
     One body, so that its mass matrix is regular without joints: hub and blade fall by g t²/2 and keep their energy.
     """
@@ -262,20 +262,22 @@ _CLASSIFYING = [bound for bound in load_bounds().entries if bound.check in ("agr
 
 
 @pytest.mark.parametrize("bound", _CLASSIFYING, ids=lambda bound: f"{bound.check}-{bound.method}")
-def test_a_bound_of_the_classification_widened_tenfold_is_told(bound: Bound, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bound_of_the_classification_widened_tenfold_is_found(bound: Bound, monkeypatch: pytest.MonkeyPatch) -> None:
     """What this file requires of the shipped numbers does not hold with one of them widened."""
     wide = [replace(one, value=10.0 * one.value) if one == bound else one for one in load_bounds().entries]
-    told = test_an_open_joint_is_caught if bound.check == "gap" else test_the_bounds_are_where_they_are_said_to_be
+    requirement = (
+        test_an_open_joint_is_caught if bound.check == "gap" else test_the_bounds_are_where_they_are_said_to_be
+    )
     methods = [name for name in method_names(is_corrected=True) if load_bounds().find(bound.check, name) == bound]
     assert methods
     judgement.allowed_of.cache_clear()
     for method in methods:
-        told(method)
+        requirement(method)
     monkeypatch.setattr(judgement, "shipped_bounds", lambda: Bounds(wide))
     judgement.allowed_of.cache_clear()
     try:
         for method in methods:
             with pytest.raises(AssertionError):
-                told(method)
+                requirement(method)
     finally:
         judgement.allowed_of.cache_clear()

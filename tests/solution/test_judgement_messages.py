@@ -1,4 +1,4 @@
-"""What is told in words: where a run broke off and what its engine said of it, what the tree is listed as having."""
+"""Messages: where a run broke off and what its engine reported, and the items that the tree is listed with."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ AT_REST = paper("fig05", duration=1.0, samples=11)
 
 
 @pytest.mark.parametrize(
-    ("rows", "success", "said", "told"),
+    ("rows", "success", "reported", "expected"),
     [
         (5, True, "", ("at t = 0.4 s of 1 s", "the engine reported success")),
         (5, False, "", ("at t = 0.4 s of 1 s", "no reason given")),
@@ -28,15 +28,15 @@ AT_REST = paper("fig05", duration=1.0, samples=11)
         (0, False, "no start", ("at the start", "no start")),
     ],
 )
-def test_a_run_that_broke_off_is_told_with_place_and_reason(
-    rows: int, success: bool, said: str, told: tuple[str, ...]
+def test_a_run_that_broke_off_names_time_and_reason(
+    rows: int, success: bool, reported: str, expected: tuple[str, ...]
 ) -> None:
     time = np.linspace(0.0, 1.0, 11)[:rows]
     angles = np.tile(AT_REST.initial_angles, (rows, 1))
     trajectory = Trajectory(time, angles, np.zeros_like(angles))
-    run = Solution(AT_REST, "lagrange/dop853", trajectory, Integration(success, said))
+    run = Solution(AT_REST, "lagrange/dop853", trajectory, Integration(success, reported))
     message = judge(AT_REST, run, None).message
-    assert all(words in message for words in told), message
+    assert all(text in message for text in expected), message
 
 
 BARE = replace(FIG08, gravity=0.0)

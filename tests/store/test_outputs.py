@@ -113,6 +113,6 @@ def test_a_folder_is_no_output(command: list[str], place: str, capsys: pytest.Ca
     with pytest.raises(SystemExit) as caught:
         main([*command, place])
     assert caught.value.code == 2
-    told = capsys.readouterr().err.strip()
-    assert "allowed: a file's name, not a folder" in told
-    assert "\n" not in told
+    message = capsys.readouterr().err.strip()
+    assert "allowed: a file's name, not a folder" in message
+    assert "\n" not in message

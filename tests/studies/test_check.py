@@ -310,7 +310,7 @@ def test_a_touched_reference_in_the_file_fails(copy: Path, capsys: pytest.Captur
     with h5py.File(copy, "r+") as file:
         _with("angles", 50, 1.2345)(file["check/held/reference"])
     lines = told(capsys, copy, status=1)
-    named(lines, "FAIL reference: check/held reference angles", "a touched reference")
+    named(lines, "FAIL reference: check/held reference angles", "an altered reference")
 
 
 @pytest.fixture
