@@ -1,0 +1,116 @@
+"""The one place that imports MuJoCo: compiles a model, advances it, reads poses and velocities. Knows no rotor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods import time_limit
+from rotor_mbs.solution.record import Array
+
+# The engine's types are compiled. Without this, it writes its warnings to a file in the working folder.
+_engine: Any = mujoco
+_engine.set_mju_user_warning(lambda _message: None)
+
+# Its warnings of a state that means nothing.
+_WARNINGS = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+
+# Steps in one call, a few hundredths of a second: the engine looks for no signal and no time limit in between.
+_PORTION = 10_000
+
+
+@dataclass
+class Poses:
+    """Every body and site at n states, world frame; world body left out.
+
+    centre    (n, bodies, 3) m, centres of mass
+    velocity  (n, bodies, 3) m/s, of the centres of mass
+    spin      (n, bodies, 3) rad/s, along the principal axes
+    site      (n, sites, 3) m
+    acceleration  (n, coordinates) rad/s²
+    """
+
+    centre: Array
+    velocity: Array
+    spin: Array
+    site: Array
+    acceleration: Array
+
+
+class Engine:
+    """A compiled model and its state. Masses and moments of `least` (kg, kg m²) or less are set to zero once compiled.
+
+    Raises MethodRefusal, with MuJoCo's reason, where it does not take the model.
+    """
+
+    def __init__(self, mjcf: str, least: float) -> None:
+        try:
+            self._model = _engine.MjModel.from_xml_string(mjcf)
+        except ValueError as exc:
+            raise MethodRefusal(f"MuJoCo does not take this model: {' '.join(str(exc).split())[:300]}") from exc
+        for values in (self._model.body_mass, self._model.body_inertia):
+            values[values <= least] = 0.0
+        self._data = _engine.MjData(self._model)
+        self.masses: Array = np.array(self._model.body_mass[1:])
+        self.moments: Array = np.array(self._model.body_inertia[1:])
+
+    def start(self, angles: Sequence[float], rates: Sequence[float]) -> None:
+        """To the initial state, (coordinates,) rad and rad/s; nothing of an earlier run is left."""
+        _engine.mj_resetData(self._model, self._data)
+        self._data.qpos[:], self._data.qvel[:] = angles, rates
+
+    def advance(self, step: float, steps: int, torques: Sequence[float], slopes: Sequence[float]) -> tuple[int, str]:
+        """So many equal steps of `step` s; torques N m at the start and slopes N m/s, by actuator.
+
+        Returns the steps taken, and why it ended before all were: the time limit, or a state that is not finite; "".
+        """
+        model, data = self._model, self._data
+        model.opt.timestep = step
+        if torques:
+            data.act[:], data.ctrl[:] = torques, slopes
+        taken = 0
+        while taken < steps:
+            if time_limit.is_over():
+                return taken, time_limit.words()
+            portion = min(steps - taken, _PORTION)
+            _engine.mj_step(model, data, nstep=portion)
+            taken += portion
+            if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+                return taken, self._warning() or "MuJoCo: the state is not finite"
+        return taken, ""
+
+    def _warning(self) -> str:
+        """What it warns of, in one line; "" where of nothing."""
+        for name in _WARNINGS:
+            warning = getattr(_engine.mjtWarning, name)
+            if self._data.warning[warning].number:
+                return f"MuJoCo: {_engine.mju_warningText(warning, self._data.warning[warning].lastinfo)}"
+        return ""
+
+    @property
+    def state(self) -> tuple[Array, Array]:
+        """(coordinates,) rad and rad/s."""
+        return self._data.qpos, self._data.qvel
+
+    def poses(self, angles: Array, rates: Array, torques: Array) -> Poses:
+        """At given states, (n, coordinates) rad and rad/s, (n, actuators) N m."""
+        model, data = self._model, self._data
+        n, bodies = len(angles), model.nbody - 1
+        out = Poses(
+            *(np.empty((n, bodies, 3)) for _ in range(3)), np.empty((n, model.nsite, 3)), np.empty((n, model.nv))
+        )
+        six = np.empty(6)
+        for k in range(n):
+            data.qpos[:], data.qvel[:] = angles[k], rates[k]
+            data.act[:] = torques[k]
+            _engine.mj_forward(model, data)
+            out.centre[k], out.site[k], out.acceleration[k] = data.xipos[1:], data.site_xpos, data.qacc
+            for body in range(bodies):
+                _engine.mj_objectVelocity(model, data, _engine.mjtObj.mjOBJ_BODY, 1 + body, six, 1)
+                out.spin[k, body], out.velocity[k, body] = six[:3], six[3:]
+        return out

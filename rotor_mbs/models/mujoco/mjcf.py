@@ -1,0 +1,147 @@
+"""The rotor as a model in MuJoCo's own format (MJCF), from raw scene data. Knows no engine.
+
+World frame: z up, shaft along y. The hub turns about y by the hinge "rotor"; blade i is a child of the hub, mounted at
+its phase about y, and turns about its own z by the hinge "pitch i". Hinge angles are the scene's angles, unwrapped.
+A blade without inertia about its pitch axis has no hinge: it is welded to the hub at its initial pitch.
+
+Torques are actuators with the activation dynamics da/dt = u: the activation a is the torque in N m, the control u its
+slope in N m/s. So a torque that is linear in time enters every stage of a step at the stage's own time.
+
+Least inertia
+-------------
+MuJoCo refuses a moving body whose mass or one of whose principal moments is 1e-15 or less. A point mass, and a hub
+without inertia, get `LEAST` = 2e-15 kg or kg m² instead. The error this makes in the motion is about LEAST / J relative,
+J being the smallest moment of the joint about its axis: 2e-17 for the paper's blade (J = 110 kg m²), below round-off;
+1e-15 · J⁻¹ in general, so that blades of J < 1 kg m² lose digits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from rotor_mbs.models.mujoco.loads import loaded, segments
+from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.record import Item
+
+LEAST = 2e-15  # kg, kg m²
+
+INTEGRATORS = {"rk4": "RK4", "implicitfast": "implicitfast"}
+
+
+def moving(scene: Scene) -> tuple[int, ...]:
+    """Coordinates that have a hinge, in the order of the engine's: 0 for the rotor, i for the pitch of blade i."""
+    return (0, *(i for i, blade in enumerate(scene.blades, start=1) if blade.has_pitch_inertia))
+
+
+def joint_name(coordinate: int) -> str:
+    """Name of the hinge of a coordinate: "rotor", or "pitch i"."""
+    return f"pitch {coordinate}" if coordinate else "rotor"
+
+
+def model(scene: Scene, integrator: str, step: float) -> ET.Element:
+    """The MJCF element tree. integrator: a key of `INTEGRATORS`; step: time step in s."""
+    root = ET.Element("mujoco", model=scene.name or "rotor")
+    ET.SubElement(root, "compiler", angle="radian")
+    option = ET.SubElement(
+        root, "option", timestep=_text(step), integrator=INTEGRATORS[integrator], gravity=_text(0.0, 0.0, -scene.gravity)
+    )
+    # No contacts or limits in the model; a state that overflows must end the run, not restart it.
+    ET.SubElement(option, "flag", constraint="disable", contact="disable", autoreset="disable")
+    world = ET.SubElement(root, "worldbody")
+    hub = ET.SubElement(world, "body", name="hub")
+    _joint(hub, 0, "0 1 0", 0.0, scene.shaft_damping)
+    half = 0.5 * scene.hub_inertia  # a thin disc about the shaft: the other two moments are never felt
+    _inertial(hub, 0.0, (0.0, 0.0, 0.0), (half, scene.hub_inertia, half, 0.0, 0.0, 0.0))
+    for number in range(1, len(scene.blades) + 1):
+        _blade(hub, scene, number)
+    tables = loaded(scene)
+    actuators = ET.SubElement(root, "actuator") if tables else None
+    for coordinate in tables:
+        assert actuators is not None
+        ET.SubElement(
+            actuators, "general", name=f"torque {joint_name(coordinate)}", joint=joint_name(coordinate),
+            dyntype="integrator", gainprm="1",
+        )  # fmt: skip
+    return root
+
+
+def text(root: ET.Element) -> str:
+    """The model as XML text, indented."""
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def items(scene: Scene) -> list[Item]:
+    """What is built for the scene, in order."""
+    return list(_items(model(scene, "rk4", 1.0)))
+
+
+def _items(root: ET.Element) -> Iterator[Item]:
+    for element in root.iter():
+        kind = _KINDS.get(element.tag)
+        if kind:
+            shown = (f"{key} {value}" for key, value in element.attrib.items() if key not in ("name", "type"))
+            detail = f"{element.get('type', element.tag)}: {', '.join(shown)}" if len(element.attrib) > 1 else element.tag
+            yield Item(kind, element.get("name", element.tag), detail)
+
+
+_KINDS = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
+
+
+def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
+    blade, phase = scene.blades[number - 1], scene.phases[number - 1]
+    pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
+    body = ET.SubElement(hub, "body", name=f"blade {number}", quat=_text(*_quaternion(phase, pitch)))
+    if blade.has_pitch_inertia:
+        stiffness = scene.bearing_stiffness[number - 1] if scene.bearing_stiffness else 0.0
+        damping = scene.bearing_damping[number - 1] if scene.bearing_damping else 0.0
+        _joint(body, number, "0 0 1", stiffness, damping)
+    _inertial(body, blade.mass, blade.centre_of_mass, blade.inertia)
+    if scene.wants("tip"):
+        ET.SubElement(body, "site", name=f"tip {number}", pos=_text(*blade.tip))
+
+
+def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, damping: float) -> None:
+    joint = ET.SubElement(body, "joint", name=joint_name(coordinate), type="hinge", axis=axis)
+    if stiffness:
+        joint.set("stiffness", _text(stiffness))
+    if damping:
+        joint.set("damping", _text(damping))
+
+
+def _quaternion(about_shaft: float, pitch: float) -> tuple[float, float, float, float]:
+    """Of Ry(about_shaft) Rz(pitch), angles in rad; scalar part first."""
+    c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    return c * cp, s * sp, s * cp, c * sp
+
+
+def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: Blade.inertia) -> None:
+    """Mass and principal moments; inertia: xx yy zz xy xz yz about the centre of mass, kg m²."""
+    element = ET.SubElement(body, "inertial", pos=_text(*centre), mass=_text(max(mass, LEAST)))
+    xx, yy, zz, xy, xz, yz = inertia
+    if not (xy or xz or yz):
+        element.set("diaginertia", _text(*_possible([xx, yy, zz])))
+        return
+    moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    element.set("diaginertia", _text(*_possible(moments.tolist())))
+    element.set("xyaxes", _text(*axes[:, 0].tolist(), *axes[:, 1].tolist()))
+
+
+def _possible(moments: list[float]) -> list[float]:
+    """Three principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others.
+
+    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.physics`).
+    """
+    least = [max(moment, LEAST) for moment in moments]
+    total = sum(least)
+    return [min(moment, total - moment) for moment in least]
+
+
+def _text(*numbers: float) -> str:
+    """Numbers with all their digits."""
+    return " ".join(repr(float(number)) for number in numbers)

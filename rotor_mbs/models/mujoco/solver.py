@@ -1,0 +1,174 @@
+"""The rotor in the engine: runs it from sample to sample, then reads energies and tips off the engine's bodies.
+
+Loads the engine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rotor_mbs.methods import time_limit
+from rotor_mbs.models.mujoco import mjcf
+from rotor_mbs.models.mujoco.adapter import Engine, Poses
+from rotor_mbs.models.mujoco.loads import (
+    Interval,
+    Segment,
+    intervals,
+    loaded,
+    sample_times,
+    segments,
+    steps_and_rows,
+)
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Array, Integration, Trajectory
+
+# Evaluations of the equations of motion in a step.
+_STAGES = {"rk4": 4, "implicitfast": 1}
+
+
+@dataclass
+class _Rows:
+    """States in order of time. Where a torque jumps there are two rows, one with the segment before, one after.
+
+    angles, rates   (coordinates,) rad and rad/s each
+    samples         indices of the rows that are samples
+    """
+
+    times: list[float] = field(default_factory=list)
+    angles: list[Array] = field(default_factory=list)
+    rates: list[Array] = field(default_factory=list)
+    segments: list[Segment] = field(default_factory=list)
+    samples: list[int] = field(default_factory=list)
+
+    def add(self, time: float, state: tuple[Array, Array], segment: Segment, is_sample: bool) -> None:
+        if is_sample:
+            self.samples.append(len(self.times))
+        self.times.append(time)
+        self.angles.append(state[0].copy())
+        self.rates.append(state[1].copy())
+        self.segments.append(segment)
+
+
+class MujocoSolver:
+    """See `rotor_mbs.methods.base.Solver`. integrator: a key of `mjcf.INTEGRATORS`; step: largest time step in s.
+
+    Raises MethodRefusal, with the engine's reason, where the engine does not take the model.
+    """
+
+    def __init__(self, scene: Scene, integrator: str, step: float) -> None:
+        self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
+        self._moving = list(mjcf.moving(scene))
+        self._intervals = intervals(scene)
+        self._rows_between = scene.wants("energy") and _work_needs_rows(scene)
+        self._rows = _Rows()
+        self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
+
+    def integrate(self) -> Integration:
+        """From the initial state, every time; bit for bit the same."""
+        scene, rows = self._scene, _Rows()
+        self._rows = rows
+        self.engine.start(*([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates)))
+        rows.add(0.0, self.engine.state, self._intervals[0].segment, is_sample=True)
+        steps, message = 0, ""
+        with time_limit.polled():
+            for interval in self._intervals:
+                if interval.segment is not rows.segments[-1]:
+                    rows.add(interval.start, self.engine.state, interval.segment, is_sample=False)
+                taken, message = self._advance(interval)
+                steps += taken
+                if message:
+                    break
+        out_of_time = message == time_limit.words()
+        return Integration(not message, message, rows.times[-1], steps, steps * self._stages, out_of_time)
+
+    def _advance(self, interval: Interval) -> tuple[int, str]:
+        """Over one interval: steps taken, and why it ended early."""
+        span, segment = interval.end - interval.start, interval.segment
+        steps, count = steps_and_rows(span, self._step, self._rows_between)
+        total = 0
+        for row in range(1, count + 1):
+            torques = segment.at(interval.start + span * (row - 1) / count)
+            taken, message = self.engine.advance(span / steps, steps // count, torques, segment.slope)
+            total += taken
+            if message:
+                return total, message
+            time = interval.end if row == count else interval.start + span * row / count
+            self._rows.add(time, self.engine.state, segment, interval.is_sample and row == count)
+        return total, ""
+
+    def observe(self) -> Trajectory:
+        """Samples of the last integration, cut before the first that is not finite."""
+        scene, rows = self._scene, self._rows
+        angles, rates, at = np.array(rows.angles), np.array(rows.rates), rows.samples
+        fields = {
+            "angles": _all_coordinates(angles[at], self._moving, scene.initial_angles),
+            "rates": _all_coordinates(rates[at], self._moving, (0.0,) * len(scene.initial_rates)),
+        }
+        with np.errstate(over="ignore", invalid="ignore"):
+            if scene.wants("tip") or scene.wants("energy"):
+                torques = np.array([segment.at(t) for segment, t in zip(rows.segments, rows.times, strict=True)])
+                poses = self.engine.poses(angles, rates, torques)
+            if scene.wants("tip"):
+                fields["tip"] = poses.site[at]
+            if scene.wants("energy"):
+                fields["kinetic_energy"] = self._kinetic_energy(poses)[at]
+                fields["potential_energy"] = self._potential_energy(poses)[at] + _spring_energy(scene, fields["angles"])
+                fields["work"] = self._work(angles, rates, poses.acceleration, torques)[at]
+        finite = np.all([np.isfinite(table.reshape(len(at), -1)).all(axis=1) for table in fields.values()], axis=0)
+        n = len(at) if finite.all() else int(np.argmin(finite))
+        return Trajectory(time=sample_times(scene)[:n], **{name: table[:n] for name, table in fields.items()})
+
+    def _kinetic_energy(self, poses: Poses) -> Array:
+        """(n,) J of the bodies, by the engine's masses and principal moments."""
+        masses, moments = self.engine.masses, self.engine.moments
+        moving = masses[:, None] * poses.velocity**2 + moments * poses.spin**2
+        return np.asarray(0.5 * moving.sum(axis=(1, 2)))
+
+    def _potential_energy(self, poses: Poses) -> Array:
+        """(n,) J of the weights; zero at the height of the shaft."""
+        return np.asarray(self._scene.gravity * (poses.centre[:, :, 2] @ self.engine.masses))
+
+    def _work(self, angles: Array, rates: Array, accelerations: Array, torques: Array) -> Array:
+        """(n,) J of the torques, less what the dampers took; from rows of rad, rad/s, rad/s², (n, loads) N m.
+
+        Constant torques: torque times angle. Otherwise the power is integrated from row to row by the trapezoidal rule
+        with its end correction, ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here.
+        """
+        columns = [self._moving.index(coordinate) for coordinate in loaded(self._scene)]
+        if not _work_needs_rows(self._scene):
+            turned = angles[:, columns] - angles[:1, columns]
+            return np.asarray((torques * turned).sum(axis=1))
+        dampings = np.array(_dampings(self._scene))[self._moving]
+        slopes = np.array([segment.slope for segment in self._rows.segments]).reshape(torques.shape)
+        power = (torques * rates[:, columns]).sum(axis=1) - (dampings * rates**2).sum(axis=1)
+        change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
+        change -= 2.0 * (dampings * rates * accelerations).sum(axis=1)
+        h = np.diff(self._rows.times)
+        parts = 0.5 * h * (power[1:] + power[:-1]) + h * h / 12.0 * (change[:-1] - change[1:])
+        return np.concatenate([[0.0], np.cumsum(parts)])
+
+
+def _work_needs_rows(scene: Scene) -> bool:
+    """Whether the work has to be integrated along the path: it is exact for constant torques without dampers."""
+    return scene.has_damping or len(segments(scene)) > 1 or any(segments(scene)[0].slope)
+
+
+def _dampings(scene: Scene) -> tuple[float, ...]:
+    """(1 + blades,) N m s/rad."""
+    return (scene.shaft_damping, *(scene.bearing_damping or (0.0,) * len(scene.blades)))
+
+
+def _spring_energy(scene: Scene, angles: Array) -> Array:
+    """(n,) J of the bearing springs, from (n, 1 + blades) rad."""
+    stiffness = [k if k and i in mjcf.moving(scene) else 0.0 for i, k in enumerate(scene.bearing_stiffness, start=1)]
+    return np.asarray(0.5 * (np.array(stiffness) * angles[:, 1:] ** 2).sum(axis=1)) if stiffness else np.zeros(len(angles))
+
+
+def _all_coordinates(states: Array, moving: list[int], fixed: tuple[float, ...]) -> Array:
+    """(n, 1 + blades): the columns that move, and the fixed value where a blade cannot pitch."""
+    out = np.empty((len(states), len(fixed)))
+    out[:] = fixed
+    out[:, moving] = states
+    return out
