@@ -101,9 +101,8 @@ class Engine:
         """At given states, (n, coordinates) rad and rad/s, (n, actuators) N m."""
         model, data = self._model, self._data
         n, bodies = len(angles), model.nbody - 1
-        out = Poses(
-            *(np.empty((n, bodies, 3)) for _ in range(3)), np.empty((n, model.nsite, 3)), np.empty((n, model.nv))
-        )
+        centre, velocity, spin = np.empty((3, n, bodies, 3))
+        out = Poses(centre, velocity, spin, np.empty((n, model.nsite, 3)), np.empty((n, model.nv)))
         six = np.empty(6)
         for k in range(n):
             data.qpos[:], data.qvel[:] = angles[k], rates[k]

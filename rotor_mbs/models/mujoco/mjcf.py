@@ -9,22 +9,23 @@ slope in N m/s. So a torque that is linear in time enters every stage of a step 
 
 Least inertia
 -------------
-MuJoCo refuses a moving body whose mass or one of whose principal moments is 1e-15 or less. A point mass, and a hub
-without inertia, get `LEAST` = 2e-15 kg or kg m² instead. The error this makes in the motion is about LEAST / J relative,
-J being the smallest moment of the joint about its axis: 2e-17 for the paper's blade (J = 110 kg m²), below round-off;
-1e-15 · J⁻¹ in general, so that blades of J < 1 kg m² lose digits.
+MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less. In this text a point
+mass, and a hub without inertia, therefore have `LEAST` = 2e-15 kg or kg m². `adapter.Engine` sets these values to zero
+in the compiled model, where they are allowed, so this package's runs have no such error. A file that MuJoCo itself
+loads keeps them: relative to the moment J of a blade about its pitch axis that is LEAST / J, 2e-17 and below
+round-off for the paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from rotor_mbs.models.mujoco.loads import loaded, segments
-from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.models.mujoco.loads import loaded
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Item
 
 LEAST = 2e-15  # kg, kg m²
@@ -47,7 +48,11 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
     root = ET.Element("mujoco", model=scene.name or "rotor")
     ET.SubElement(root, "compiler", angle="radian")
     option = ET.SubElement(
-        root, "option", timestep=_text(step), integrator=INTEGRATORS[integrator], gravity=_text(0.0, 0.0, -scene.gravity)
+        root,
+        "option",
+        timestep=_text(step),
+        integrator=INTEGRATORS[integrator],
+        gravity=_text(0.0, 0.0, -scene.gravity),
     )
     # No contacts or limits in the model; a state that overflows must end the run, not restart it.
     ET.SubElement(option, "flag", constraint="disable", contact="disable", autoreset="disable")
@@ -85,7 +90,9 @@ def _items(root: ET.Element) -> Iterator[Item]:
         kind = _KINDS.get(element.tag)
         if kind:
             shown = (f"{key} {value}" for key, value in element.attrib.items() if key not in ("name", "type"))
-            detail = f"{element.get('type', element.tag)}: {', '.join(shown)}" if len(element.attrib) > 1 else element.tag
+            detail = (
+                f"{element.get('type', element.tag)}: {', '.join(shown)}" if len(element.attrib) > 1 else element.tag
+            )
             yield Item(kind, element.get("name", element.tag), detail)
 
 
@@ -120,7 +127,7 @@ def _quaternion(about_shaft: float, pitch: float) -> tuple[float, float, float, 
     return c * cp, s * sp, s * cp, c * sp
 
 
-def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: Blade.inertia) -> None:
+def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: Sequence[float]) -> None:
     """Mass and principal moments; inertia: xx yy zz xy xz yz about the centre of mass, kg m²."""
     element = ET.SubElement(body, "inertial", pos=_text(*centre), mass=_text(max(mass, LEAST)))
     xx, yy, zz, xy, xz, yz = inertia

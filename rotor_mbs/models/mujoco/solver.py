@@ -69,7 +69,9 @@ class MujocoSolver:
         """From the initial state, every time; bit for bit the same."""
         scene, rows = self._scene, _Rows()
         self._rows = rows
-        self.engine.start(*([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates)))
+        self.engine.start(
+            *([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates))
+        )
         rows.add(0.0, self.engine.state, self._intervals[0].segment, is_sample=True)
         steps, message = 0, ""
         with time_limit.polled():
@@ -163,7 +165,9 @@ def _dampings(scene: Scene) -> tuple[float, ...]:
 def _spring_energy(scene: Scene, angles: Array) -> Array:
     """(n,) J of the bearing springs, from (n, 1 + blades) rad."""
     stiffness = [k if k and i in mjcf.moving(scene) else 0.0 for i, k in enumerate(scene.bearing_stiffness, start=1)]
-    return np.asarray(0.5 * (np.array(stiffness) * angles[:, 1:] ** 2).sum(axis=1)) if stiffness else np.zeros(len(angles))
+    return (
+        np.asarray(0.5 * (np.array(stiffness) * angles[:, 1:] ** 2).sum(axis=1)) if stiffness else np.zeros(len(angles))
+    )
 
 
 def _all_coordinates(states: Array, moving: list[int], fixed: tuple[float, ...]) -> Array:

@@ -1,0 +1,293 @@
+"""The MuJoCo model against the quad reference, a closed form written anew, exact solutions, and its own order."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import references
+from support.rotors import (
+    AXIAL,
+    FIG11,
+    MIXED,
+    SLIM,
+    STOUT,
+    blade_points,
+    closed_form,
+    energies,
+    make_scene,
+    pendulum,
+)
+from support.rotors import (
+    PAPER as PAPER_BLADE,
+)
+from support.scenes import PAPER, paper
+
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.time_limit import time_limit
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples
+from rotor_mbs.solution.record import Trajectory
+
+pytest.importorskip("mujoco")
+
+from rotor_mbs.models.mujoco import loads, mjcf
+from rotor_mbs.models.mujoco.adapter import Engine
+from rotor_mbs.models.mujoco.solver import MujocoSolver
+
+RK4_STEP = 2.5e-4
+
+# Three scenes that nothing was tuned on: full inertia, springs, dampers, torque with kinks and jumps between samples.
+ONE_BLADE = make_scene(
+    [2.0, 0.7], [0.4, -1.1], (SLIM,), gravity=3.7, duration=1.2, samples=61, hub_inertia=90.0,
+    bearing_stiffness=(700.0,), bearing_damping=(11.0,), shaft_damping=35.0,
+    rotor_torque=((0.0, 300.0), (0.5055, -900.0), (0.5055, 1200.0), (1.1, 0.0)),
+)  # fmt: skip
+TWO_BLADES = make_scene(
+    [-1.0, 0.2, 0.9], [3.0, 0.0, -2.0], (STOUT, SLIM), gravity=0.0, duration=1.0, samples=51, hub_inertia=0.0,
+    bearing_stiffness=(900.0, 4000.0), rotor_torque=((0.0, -2500.0),),
+)  # fmt: skip
+FOUR_BLADES = make_scene(
+    [0.5, -0.4, 0.3, 1.3, 2.9], [-0.8, 0.6, 0.0, 1.0, -0.5], (SLIM, STOUT, STOUT, SLIM), duration=1.0, samples=51,
+    hub_inertia=12.5, bearing_damping=(3.0, 0.0, 9.0, 1.0), shaft_damping=150.0, rotor_torque=((0.2, 0.0), (0.9, 7e3)),
+)  # fmt: skip
+OWN = {"mixed": MIXED, "one blade": ONE_BLADE, "two blades": TWO_BLADES, "four blades": FOUR_BLADES}
+
+
+def run(scene: Scene, integrator: str = "rk4", step: float = RK4_STEP) -> Trajectory:
+    solver = MujocoSolver(scene, integrator, step)
+    integration = solver.integrate()
+    assert integration.success, integration.message
+    found = solver.observe()
+    assert len(found.time) == scene.samples
+    return found
+
+
+def energy_drift(scene: Scene, found: Trajectory) -> float:
+    return compare(scene, found, None)["energy_drift_max"]
+
+
+def up_to_horizon(name: str) -> tuple[Scene, Trajectory]:
+    """The scene and its reference, cut at the horizon."""
+    whole = references.reference(f"paper/{name}")
+    rows = max(horizon_samples(whole), 2)
+    scene = paper(name, duration=float(whole.time[rows - 1]), samples=rows)
+    return scene, whole.replace(
+        **{part: whole.get(part)[:rows] for part in ("time", *whole.quantities, "angles", "rates")}
+    )
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_the_scenes_of_the_paper_up_to_the_horizon(name: str) -> None:
+    """Fourth order at four times the default step: seen 2e-11 per unit of error growth, 256 times the default's."""
+    scene, exact = up_to_horizon(name)
+    metrics = compare(scene, run(scene, step=1e-3), exact)
+    assert metrics["angle_error_per_growth"] <= 1e-10
+    assert metrics["energy_drift_max"] <= 1e-8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAPER)
+def test_the_scenes_of_the_paper_at_the_default_step(name: str) -> None:
+    metrics = compare(paper(name), run(paper(name)), references.reference(f"paper/{name}"))
+    assert metrics["angle_error_per_growth"] <= 1e-12
+    assert metrics["energy_drift_max"] <= 1e-10
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_full_inertia_springs_dampers_and_torque_follow_the_closed_form(name: str) -> None:
+    scene = OWN[name]
+    found, motion = run(scene, step=1e-4), closed_form(scene)
+    n = 1 + len(scene.blades)
+    assert np.abs(found.angles - motion[:, :n]).max() < 1e-11
+    assert np.abs(found.rates - motion[:, n:]).max() < 1e-9
+    kinetic, potential = energies(scene, motion)
+    scale = max(kinetic.max(), np.abs(potential).max())
+    assert np.abs(found.kinetic_energy - kinetic).max() < 1e-10 * scale
+    assert np.abs(found.potential_energy - potential).max() < 1e-10 * scale
+    assert energy_drift(scene, found) < 1e-10  # the quadrature of the work
+    for i, blade in enumerate(scene.blades):
+        assert np.abs(found.tip[:, i] - blade_points(scene, motion, i, blade.tip)).max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("integrator", "order", "steps"),
+    [("rk4", 4, [2e-3, 1e-3, 5e-4]), ("implicitfast", 1, [5e-4, 2.5e-4, 1.25e-4])],
+)
+@pytest.mark.parametrize("name", ["point masses", "mixed"])
+def test_order_of_convergence(name: str, integrator: str, order: int, steps: list[float]) -> None:
+    """With torques over time and jumps between samples, too: no step runs over a kink or with a frozen torque."""
+    scene = MIXED if name == "mixed" else replace(FIG11, duration=1.0, samples=101)
+    motion = closed_form(scene)
+    errors = [np.abs(run(scene, integrator, step).angles - motion[:, :4]).max() for step in steps]
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.2)
+
+
+def test_pendulum() -> None:
+    """Blades whose mass is on the pitch axis: welded to the hub; one mass, one hinge."""
+    scene = paper("fig04b")
+    blade = scene.blades[0]
+    found = run(scene, step=1e-3)
+    exact = pendulum(scene.initial_angles[0], blade.centre_of_mass[2], 0.0, scene.gravity, found.time)
+    assert np.abs(found.angles[:, 0] - exact).max() < 1e-11
+    assert (found.angles[:, 1] == scene.initial_angles[1]).all()
+
+
+def test_torque_ramp_on_a_balanced_rotor() -> None:
+    """J q'' = a + b t, with a jump: cubic pieces, which the fourth order integrates without error."""
+    jump, inertia = 0.3137, 3 * (PAPER_BLADE.mass * (PAPER_BLADE.centre_of_mass[0] ** 2 + 15.42**2)) + 2e6
+    scene = make_scene(
+        [0.1, 0, 0, 0], [0.2, 0, 0, 0], gravity=0.0, hub_inertia=2e6,
+        bearing_stiffness=(1e12,) * 3, rotor_torque=((0.0, 1e5), (jump, 4e5), (jump, -2e5)),
+    )  # fmt: skip
+    # Blades on the axis cannot pitch: the rotor is one rigid body.
+    axial = replace(PAPER_BLADE, centre_of_mass=(0.0, 0.0, 15.42))
+    inertia = 3 * axial.mass * 15.42**2 + 2e6
+    scene = replace(scene, blades=(axial,) * 3)
+    found = run(scene, step=5e-3)
+    t = found.time
+    slope = 3e5 / jump
+    at_jump = 0.1 + 0.2 * jump + (1e5 * jump**2 / 2 + slope * jump**3 / 6) / inertia
+    rate_at_jump = 0.2 + (1e5 * jump + slope * jump**2 / 2) / inertia
+    before = 0.1 + 0.2 * t + (1e5 * t**2 / 2 + slope * t**3 / 6) / inertia
+    after = at_jump + rate_at_jump * (t - jump) - 1e5 * (t - jump) ** 2 / inertia
+    assert np.abs(found.angles[:, 0] - np.where(t < jump, before, after)).max() < 1e-13
+    work = 0.5 * inertia * (found.rates[:, 0] ** 2 - 0.2**2)
+    assert np.abs(found.work - work).max() < 1e-11 * np.abs(work).max()
+
+
+def test_spring_and_damper_on_a_pitch_axis() -> None:
+    """A blade balanced about its pitch axis swings like any damped oscillator, whatever the rotor does."""
+    stiffness, damping = 4000.0, 30.0
+    scene = make_scene(
+        [0.0, 0.5], [0.0, 0.0], (AXIAL,), gravity=0.0, bearing_stiffness=(stiffness,), bearing_damping=(damping,)
+    )
+    found = run(scene)
+    inertia = AXIAL.inertia[2]
+    decay = damping / (2 * inertia)
+    rate = np.sqrt(stiffness / inertia - decay**2)
+    t = found.time
+    exact = 0.5 * np.exp(-decay * t) * (np.cos(rate * t) + decay / rate * np.sin(rate * t))
+    assert np.abs(found.angles[:, 1] - exact).max() < 1e-10
+    assert not found.angles[:, 0].any()
+
+
+def test_steady_rotation_without_loads() -> None:
+    found = run(make_scene([0.3, 0, 0, 0], [2.0, 0, 0, 0], gravity=0.0))
+    assert np.abs(found.angles[:, 0] - (0.3 + 2.0 * found.time)).max() < 1e-12
+    assert not found.angles[:, 1:].any()
+
+
+def test_point_masses_have_no_inertia_that_the_scene_does_not_give() -> None:
+    """The toy of 1 g would be 8e-7 per unit of error growth off with the least inertia that MuJoCo compiles."""
+    solver = MujocoSolver(paper("fig11"), "rk4", RK4_STEP)
+    assert not solver.engine.moments.any()
+    assert solver.engine.masses.tolist() == [0.0, 15000.0, 15000.0, 15000.0]
+    scene = references.scene("extreme/toy")
+    metrics = compare(scene, run(scene, step=1e-4), references.reference("extreme/toy"))
+    assert metrics["angle_error_per_growth"] < 1e-9
+
+
+def test_an_inertia_at_the_limit_of_the_triangle_inequality() -> None:
+    """Flat and thin bodies, one with the rounding of its ten digits: MuJoCo itself would refuse the last."""
+    flat = replace(STOUT, inertia=(10.0, 30.0, 40.0, 0.0, 0.0, 0.0))
+    rod = replace(STOUT, inertia=(30.0, 30.0, 0.0, 0.0, 0.0, 0.0))
+    rounded = replace(STOUT, inertia=(10.0, 30.0, 40.0 * (1 + 1e-10), 0.0, 0.0, 0.0))
+    for blade, bound in ((flat, 1e-11), (rod, 1e-11), (rounded, 1e-9)):
+        scene = make_scene([0.4, 0.3], [1.0, 0.5], (blade,), duration=0.5, samples=51)
+        assert np.abs(run(scene).angles - closed_form(scene)[:, :2]).max() < bound
+
+
+def test_zero_pitch_that_is_unstable_stays_zero_in_a_symmetric_start() -> None:
+    scene, exact = up_to_horizon("fig05")
+    assert not run(scene).angles[:, 1:].any()
+    assert angle_error(run(scene), exact).max() < 1e-12
+
+
+def test_kinks_are_stops_of_the_engine_and_samples_are_met() -> None:
+    stops = loads.intervals(ONE_BLADE)
+    assert [stop.end for stop in stops if not stop.is_sample] == [0.5055]
+    assert [stop.end for stop in stops if stop.is_sample] == np.linspace(0.0, 1.2, 61)[1:].tolist()
+    on_sample = replace(ONE_BLADE, rotor_torque=((0.0, 1.0), (0.1 + 1e-14, 5.0), (0.1 + 1e-14, 2.0)))
+    assert all(stop.is_sample for stop in loads.intervals(on_sample))
+    first, second = loads.segments(on_sample)
+    assert first.at(first.end) == pytest.approx([5.0])
+    assert second.at(second.end) == [2.0]
+
+
+def test_repeats_are_bit_identical() -> None:
+    solver = MujocoSolver(MIXED, "rk4", 1e-3)
+    first_report, first = solver.integrate(), solver.observe()
+    second_report, second = solver.integrate(), solver.observe()
+    assert first_report == second_report
+    for name in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
+        assert np.array_equal(first.get(name), second.get(name)), name
+
+
+def test_an_overflow_ends_the_run_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    solver = MujocoSolver(make_scene([0.3, 0.1], [1e100, 0.0]), "rk4", RK4_STEP)
+    integration = solver.integrate()
+    assert not integration.success
+    assert re.match(r"MuJoCo: Nan, Inf or huge value in Q\w+ at DOF 0", integration.message)
+    assert len(solver.observe().time) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_time_limit_keeps_the_samples_that_were_reached() -> None:
+    scene = make_scene([0.3, 0.1], [0.0, 0.0], duration=1e6, samples=1001)
+    solver = MujocoSolver(scene, "rk4", RK4_STEP)
+    with time_limit(0.3):
+        integration = solver.integrate()
+    assert integration.out_of_time
+    assert 1 <= len(solver.observe().time) < 1001
+
+
+def test_what_the_engine_does_not_compile_is_refused_with_its_reason() -> None:
+    with pytest.raises(MethodRefusal, match=r"MuJoCo does not take this model: .*unrecognized element"):
+        Engine("<mujoco><rotor/></mujoco>", 0.0)
+
+
+def test_only_what_the_scene_asks_for_is_built() -> None:
+    kinds = [item.kind for item in mjcf.items(MIXED)]
+    assert {kind: kinds.count(kind) for kind in kinds} == {"object": 4, "node": 4, "marker": 3, "load": 1}
+    less = replace(MIXED, outputs=("angles", "rates"), rotor_torque=())
+    assert {item.kind for item in mjcf.items(less)} == {"object", "node"}
+    found = run(less)
+    assert found.tip is None
+    assert found.work is None
+
+
+def test_it_runs_without_any_other_engine_or_model(request: pytest.FixtureRequest) -> None:
+    code = f"""
+import sys
+blocked = ["exudyn", "heyoka", "scipy"]
+for name in blocked:
+    sys.modules[name] = None
+sys.path.insert(0, {str(request.path.parents[1])!r})
+from support.scenes import paper
+from rotor_mbs.models.mujoco.solver import MujocoSolver
+solver = MujocoSolver(paper("fig08", duration=0.5, samples=11), "rk4", 1e-3)
+assert solver.integrate().success and len(solver.observe().time) == 11
+assert not any(name.startswith("rotor_mbs.models.") and "mujoco" not in name for name in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_turned_rotor_with_renamed_blades_moves_the_same() -> None:
+    scene = make_scene([0.2, 0.3, -0.6, 0.9], [0.5, 0.1, 0.2, -0.3], (STOUT, SLIM, PAPER_BLADE), duration=0.3)
+    turned = replace(
+        scene,
+        blades=(SLIM, PAPER_BLADE, STOUT),
+        initial_angles=(0.2 + 2 * pi / 3, -0.6, 0.9, 0.3),
+        initial_rates=(0.5, 0.2, -0.3, 0.1),
+    )
+    back = run(turned).angles[:, [0, 3, 1, 2]] - [2 * pi / 3, 0, 0, 0]
+    assert np.abs(run(scene).angles - back).max() < 1e-12
