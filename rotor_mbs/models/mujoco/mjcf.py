@@ -50,9 +50,9 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
     option = ET.SubElement(
         root,
         "option",
-        timestep=_text(step),
+        timestep=numbers(step),
         integrator=INTEGRATORS[integrator],
-        gravity=_text(0.0, 0.0, -scene.gravity),
+        gravity=numbers(0.0, 0.0, -scene.gravity),
     )
     # No contacts or limits in the model; a state that overflows must end the run, not restart it.
     ET.SubElement(option, "flag", constraint="disable", contact="disable", autoreset="disable")
@@ -102,22 +102,22 @@ _KINDS = {"body": "object", "joint": "node", "site": "marker", "general": "load"
 def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     blade, phase = scene.blades[number - 1], scene.phases[number - 1]
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
-    body = ET.SubElement(hub, "body", name=f"blade {number}", quat=_text(*_quaternion(phase, pitch)))
+    body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(*_quaternion(phase, pitch)))
     if blade.has_pitch_inertia:
         stiffness = scene.bearing_stiffness[number - 1] if scene.bearing_stiffness else 0.0
         damping = scene.bearing_damping[number - 1] if scene.bearing_damping else 0.0
         _joint(body, number, "0 0 1", stiffness, damping)
     _inertial(body, blade.mass, blade.centre_of_mass, blade.inertia)
     if scene.wants("tip"):
-        ET.SubElement(body, "site", name=f"tip {number}", pos=_text(*blade.tip))
+        ET.SubElement(body, "site", name=f"tip {number}", pos=numbers(*blade.tip))
 
 
 def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, damping: float) -> None:
     joint = ET.SubElement(body, "joint", name=joint_name(coordinate), type="hinge", axis=axis)
     if stiffness:
-        joint.set("stiffness", _text(stiffness))
+        joint.set("stiffness", numbers(stiffness))
     if damping:
-        joint.set("damping", _text(damping))
+        joint.set("damping", numbers(damping))
 
 
 def _quaternion(about_shaft: float, pitch: float) -> tuple[float, float, float, float]:
@@ -129,14 +129,14 @@ def _quaternion(about_shaft: float, pitch: float) -> tuple[float, float, float, 
 
 def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: Sequence[float]) -> None:
     """Mass and principal moments; inertia: xx yy zz xy xz yz about the centre of mass, kg m²."""
-    element = ET.SubElement(body, "inertial", pos=_text(*centre), mass=_text(max(mass, LEAST)))
+    element = ET.SubElement(body, "inertial", pos=numbers(*centre), mass=numbers(max(mass, LEAST)))
     xx, yy, zz, xy, xz, yz = inertia
     if not (xy or xz or yz):
-        element.set("diaginertia", _text(*_possible([xx, yy, zz])))
+        element.set("diaginertia", numbers(*_possible([xx, yy, zz])))
         return
     moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    element.set("diaginertia", _text(*_possible(moments.tolist())))
-    element.set("xyaxes", _text(*axes[:, 0].tolist(), *axes[:, 1].tolist()))
+    element.set("diaginertia", numbers(*_possible(moments.tolist())))
+    element.set("xyaxes", numbers(*axes[:, 0].tolist(), *axes[:, 1].tolist()))
 
 
 def _possible(moments: list[float]) -> list[float]:
@@ -149,6 +149,6 @@ def _possible(moments: list[float]) -> list[float]:
     return [min(moment, total - moment) for moment in least]
 
 
-def _text(*numbers: float) -> str:
+def numbers(*values: float) -> str:
     """Numbers with all their digits."""
-    return " ".join(repr(float(number)) for number in numbers)
+    return " ".join(repr(float(value)) for value in values)

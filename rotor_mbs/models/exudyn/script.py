@@ -1,0 +1,190 @@
+"""A scene as a Python script for Exudyn that needs nothing of this package: the kinematic tree, the same step.
+
+Knows the tree's parts and the engine's names as words only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.models.exudyn import tree
+from rotor_mbs.models.exudyn.blueprint import Part, Ref
+from rotor_mbs.models.exudyn.geometry import pitching
+from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.scenario.scene import Scene
+
+STEP = 6.7e-4  # s: the default of exudyn_tree/rk67
+
+_KINDS = ("node", "object", "marker", "load")
+
+_COMMENTS = {
+    "node": "joint angles (rad) and rates (rad/s) that move, and their initial values",
+    "object": "hub and blades; masses kg, centres of mass m, inertia about them kg m^2; springs N m/rad, dampers N m s/rad",
+    "marker": "where the torque acts",
+    "load": "torque, N m",
+}
+
+
+def exudyn_script(scene: Scene, step: float = STEP) -> str:
+    """The text of the script. step: largest time step in s."""
+    torque = RotorTorque(scene)
+    parts = [part for part in tree.parts(scene, torque) if part.kind in _KINDS]
+    moving = [0, *(1 + i for i in pitching(scene))]
+    return _SCRIPT.substitute(
+        title=(scene.title or scene.name).replace("\\", "/").replace('"', "'"),
+        step=repr(float(step)),
+        types=", ".join(dict.fromkeys(part.type for part in parts)),
+        duration=repr(float(scene.duration)),
+        samples=scene.samples,
+        torque=_value([list(map(float, row)) for row in scene.rotor_torque]),
+        labels=_value(list(scene.coordinate_labels)),
+        angles=_value(list(map(float, scene.initial_angles))),
+        rates=_value([float(rate) if i in moving else 0.0 for i, rate in enumerate(scene.initial_rates)]),
+        moving=_value(moving),
+        parts="\n".join(_lines(part) for part in parts),
+    )
+
+
+def _lines(part: Part) -> str:
+    arguments = "".join(f"    {key}={_argument(key, value)},\n" for key, value in part.parameters.items())
+    call = f"number[{part.kind!r}, {part.name!r}] = mbs.Add{part.kind.capitalize()}({part.type}("
+    return f"# {_COMMENTS[part.kind]}\n{call}\n{arguments}))"
+
+
+def _argument(key: str, value: object) -> str:
+    if isinstance(value, Ref):
+        return f"number[{value.kind!r}, {value.name!r}]"
+    if callable(value):
+        return "lambda system, time, load: now.torque + now.slope * (time - now.start)"
+    return _TYPES.get(key, "{}").format(_joint_types(value) if key == "jointTypes" else _value(value))
+
+
+def _joint_types(names: Any) -> str:
+    return "[" + ", ".join(f"exu.JointType.{name}" for name in names) + "]"
+
+
+# What the engine wants in its own types, by the name of the argument.
+_TYPES: Mapping[str, str] = {
+    "jointTransformations": "exu.Matrix3DList({})",
+    "linkInertiasCOM": "exu.Matrix3DList({})",
+    "jointOffsets": "exu.Vector3DList({})",
+    "linkCOMs": "exu.Vector3DList({})",
+}
+
+
+def _value(value: object) -> str:
+    """Numbers with all their digits; matrices as arrays, a row of a list on its own line where it is nested."""
+    if isinstance(value, np.ndarray):
+        return f"np.array({value.tolist()!r})"
+    if isinstance(value, np.generic):
+        return repr(value.item())
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return repr(value)
+    items = [_value(item) for item in value]
+    if any(isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in value):
+        return "[\n" + "".join(f"        {item},\n" for item in items) + "    ]"
+    return "[" + ", ".join(items) + "]"
+
+
+_SCRIPT = Template('''"""$title
+
+A rotor as a kinematic tree in Exudyn: the hub turns about y, each blade about its own z, z is up. SI units, rad.
+Needs exudyn and numpy. Writes time, angles and rates at the samples:
+
+    python THIS_FILE [OUTPUT.csv]     (default: trajectory.csv)
+"""
+
+import csv
+import itertools
+import math
+import sys
+from types import SimpleNamespace
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import $types
+
+DURATION, SAMPLES = $duration, $samples  # s, both ends included
+STEP = $step  # s, largest time step of Butcher's Runge-Kutta method of order 6 with 7 stages
+
+# Rotor torque, N m, over time, s: linear between rows, constant outside; two rows with one time are a jump.
+TORQUE = $torque
+
+LABELS = $labels
+MOVING = $moving  # coordinates that move; a blade without inertia about its pitch axis stays at its initial pitch
+INITIAL_ANGLES = $angles  # rad
+INITIAL_RATES = $rates  # rad/s
+
+# The torque of the segment that is being integrated.
+now = SimpleNamespace(start=0.0, torque=0.0, slope=0.0)
+
+system = exu.SystemContainer()
+mbs = system.AddSystem()
+number = {}
+
+$parts
+
+mbs.Assemble()
+
+
+def line(start, end):
+    """Torque at `start`, and its slope until `end`; no row of the table lies between them."""
+    before = [row for row in TORQUE if row[0] <= start]
+    after = [row for row in TORQUE if row[0] >= end]
+    if not TORQUE:
+        return 0.0, 0.0
+    if not before or not after:
+        return (before[-1] if before else after[0])[1], 0.0
+    (t0, torque0), (t1, torque1) = before[-1], after[0]
+    slope = (torque1 - torque0) / (t1 - t0)
+    return torque0 + slope * (start - t0), slope
+
+
+def advance(start, end):
+    """From one stop to the next: samples and kinks of the torque, over which no step may run."""
+    now.start = start
+    now.torque, now.slope = line(start, end)
+    integration.startTime, integration.endTime = start, end
+    integration.numberOfSteps = max(1, math.ceil((end - start) / STEP * (1.0 - 1e-9)))
+    # The end of one interval is the start of the next.
+    mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.RK67, updateInitialValues=True)
+
+
+def row(time):
+    """Time, all angles, all rates."""
+    data = mbs.systemData
+    angles, rates = np.array(INITIAL_ANGLES), np.zeros(len(LABELS))
+    angles[MOVING] = data.GetODE2Coordinates()
+    rates[MOVING] = data.GetODE2Coordinates_t()
+    return [time, *angles.tolist(), *rates.tolist()]
+
+
+settings = exu.SimulationSettings()
+settings.solution.file.write = False
+settings.show.statistics = settings.show.computationTime = False
+integration = settings.timeIntegration
+integration.verboseMode = 0
+integration.adaptiveStep = False
+integration.explicit.computeEndOfStepAccelerations = False
+integration.explicit.useLieGroupIntegration = False
+
+samples = np.linspace(0.0, DURATION, SAMPLES).tolist()
+spacing = DURATION / (SAMPLES - 1)
+kinks = {time for time, _ in TORQUE if 0.0 < time < DURATION and min(time % spacing, -time % spacing) > 1e-6 * spacing}
+stops = sorted({*samples, *kinks})
+
+rows = [[0.0, *INITIAL_ANGLES, *INITIAL_RATES]]
+for start, end in itertools.pairwise(stops):
+    advance(start, end)
+    if end not in kinks:
+        rows.append(row(end))
+
+with open(sys.argv[1] if len(sys.argv) > 1 else "trajectory.csv", "w", newline="") as output:
+    writer = csv.writer(output)
+    writer.writerow(["time [s]", *(f"{label} [rad]" for label in LABELS), *(f"{label} rate [rad/s]" for label in LABELS)])
+    writer.writerows([repr(value) for value in values] for values in rows)
+''')
