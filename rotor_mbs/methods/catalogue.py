@@ -24,6 +24,7 @@ _BUILT_IN: Mapping[str, tuple[str, ...]] = {
     "rotor_mbs.models.printed.methods:METHODS": ("printed",),
     "rotor_mbs.models.lagrange.methods:METHODS": ("lagrange", REFERENCE),
     "rotor_mbs.models.exudyn.methods:METHODS": ("exudyn",),
+    "rotor_mbs.models.mujoco.methods:METHODS": ("mujoco",),
 }
 
 _UNKNOWN_LOOK = Look("#666666", ":", "D")

@@ -53,6 +53,9 @@ def probes() -> list[Case]:
     return [
         probe("symmetry", "paper/fig11", "lagrange/taylor"),
         probe("symmetry", "paper/fig11", "exudyn_tree/rk67"),
+        probe("symmetry", "paper/fig11", "mujoco/rk4"),
+        probe("order", "paper/fig11", "mujoco/rk4", 4.0),
+        probe("order", "paper/fig11", "mujoco/implicitfast", 1.0),
         probe("order", "paper/fig11", "exudyn_tree/rk44", 4.0),
         probe("order", "paper/fig11", "exudyn_chain/generalized_alpha", 2.0),
         probe("reference", "paper/fig08", REFERENCE),

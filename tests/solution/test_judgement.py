@@ -38,6 +38,8 @@ BOUNDS = {
     "exudyn_tree/generalized_alpha": (1e-5, 1e-5),
     "exudyn_chain/generalized_alpha": (5e-6, 1e-5),
     "exudyn_chain/newmark_index2": (5e-6, 1e-5),
+    "mujoco/rk4": (1e-8, 1e-8),
+    "mujoco/implicitfast": (2e-4, 2e-4),
 }
 GAPS = {"exudyn_chain/generalized_alpha": 1e-7, "exudyn_chain/newmark_index2": 1e-5}  # of the longest arm
 

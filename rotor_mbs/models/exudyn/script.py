@@ -23,7 +23,7 @@ _KINDS = ("node", "object", "marker", "load")
 
 _COMMENTS = {
     "node": "joint angles (rad) and rates (rad/s) that move, and their initial values",
-    "object": "hub and blades; masses kg, centres of mass m, inertia about them kg m^2; springs N m/rad, dampers N m s/rad",
+    "object": "hub and blades: kg, m, inertia about centres of mass kg m^2; springs N m/rad, dampers N m s/rad",
     "marker": "where the torque acts",
     "load": "torque, N m",
 }
@@ -185,6 +185,7 @@ for start, end in itertools.pairwise(stops):
 
 with open(sys.argv[1] if len(sys.argv) > 1 else "trajectory.csv", "w", newline="") as output:
     writer = csv.writer(output)
-    writer.writerow(["time [s]", *(f"{label} [rad]" for label in LABELS), *(f"{label} rate [rad/s]" for label in LABELS)])
+    rates = [f"{label} rate [rad/s]" for label in LABELS]
+    writer.writerow(["time [s]", *(f"{label} [rad]" for label in LABELS), *rates])
     writer.writerows([repr(value) for value in values] for values in rows)
 ''')

@@ -46,13 +46,13 @@ def mjcf_file(scene: Scene, integrator: str = "rk4", step: float = STEP) -> str:
 def _header(scene: Scene, steps: int) -> str:
     lines = [
         scene.title or scene.name,
-        f"SI units, angles in rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from one to the next.",
+        f"SI units, rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from one to the next.",
         "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then mj_step(model, data, nstep=...).",
     ]
     if loaded(scene):
         lines += [
             "An actuator's activation is its torque in N m, its control the slope of the torque in N m/s.",
-            "At the start of each segment (custom numerics: time, torques, slopes) set data.act and data.ctrl to its values.",
+            "At the start of each segment (custom numerics: time, torques, slopes) set data.act and data.ctrl to them.",
             "Where a segment starts between two steps, shorten model.opt.timestep to stop there.",
         ]
     lines.append("Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about the centre of mass.")

@@ -1,0 +1,82 @@
+"""The methods of this package: one model with two of the engine's integrators. Importing this does not load MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.methods.base import Look, Method, Solver, stability_polynomial
+from rotor_mbs.methods.ladders import step_ladder
+from rotor_mbs.methods.settings import Settings, number
+from rotor_mbs.models.mujoco import mjcf
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Item
+
+_HINT = "pip install 'rotor_mbs[mujoco]'"
+_MOST_STEPS = 1e10
+_BROWN, _GREY = "#7f4f24", "#a68a64"
+
+
+def _step(default: float) -> Any:
+    return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
+
+
+@dataclass(frozen=True)
+class Rk4Settings(Settings):
+    step: float = _step(2.5e-4)
+
+
+@dataclass(frozen=True)
+class ImplicitFastSettings(Settings):
+    step: float = _step(5e-5)
+
+
+def _items(scene: Scene) -> list[Item]:
+    """Raises MethodRefusal, with the way to get it, where MuJoCo is not installed."""
+    if not METHODS[0].is_installed:
+        raise MethodRefusal(f"MuJoCo is not installed: {_HINT}")
+    return mjcf.items(scene)
+
+
+def _build(integrator: str) -> Callable[[Scene, Any], Solver]:
+    def build(scene: Scene, settings: Rk4Settings | ImplicitFastSettings) -> Solver:
+        _items(scene)
+        if scene.duration / settings.step > _MOST_STEPS:
+            raise InputError(f"setting step: {settings.step:g} s makes more than {_MOST_STEPS:g} steps")
+        from rotor_mbs.models.mujoco.solver import MujocoSolver
+
+        return MujocoSolver(scene, integrator, settings.step)
+
+    return build
+
+
+def _method(integrator: str, label: str, **facts: Any) -> Method:
+    return Method(
+        name=f"mujoco/{integrator}",
+        label=f"MuJoCo, {label}",
+        build=_build(integrator),
+        items=_items,
+        distributions=("mujoco",),
+        hint=_HINT,
+        fixed_step=True,
+        relative_cost=10.0,
+        load=lambda: import_module("rotor_mbs.models.mujoco.adapter"),
+        **facts,
+    )
+
+
+METHODS = (
+    _method(
+        "rk4", "RK4", look=Look(_BROWN, "--", "X"), settings=Rk4Settings, order=4,
+        stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
+        ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
+    ),
+    # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
+    _method(
+        "implicitfast", "implicit fast", look=Look(_GREY, ":", "h"), settings=ImplicitFastSettings, order=1,
+        ladders=(step_ladder(12),), cost_scaling={"step": 1e-3},
+    ),
+)  # fmt: skip
