@@ -17,7 +17,7 @@ from rotor_mbs.solution.record import Item
 
 _HINT = "pip install 'rotor_mbs[mujoco]'"
 _MOST_STEPS = 1e10
-_BROWN, _GREY = "#7f4f24", "#a68a64"
+_PURPLE = "#cc79a7"
 
 
 def _step(default: float) -> Any:
@@ -70,13 +70,13 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
 
 METHODS = (
     _method(
-        "rk4", "RK4", look=Look(_BROWN, "--", "X"), settings=Rk4Settings, order=4,
+        "rk4", "RK4", look=Look(_PURPLE, "--", "X"), settings=Rk4Settings, order=4,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
         ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
     ),
     # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
     _method(
-        "implicitfast", "implicit fast", look=Look(_GREY, ":", "h"), settings=ImplicitFastSettings, order=1,
+        "implicitfast", "implicit fast", look=Look(_PURPLE, "-.", "h"), settings=ImplicitFastSettings, order=1,
         ladders=(step_ladder(12),), cost_scaling={"step": 1e-3},
     ),
 )  # fmt: skip
