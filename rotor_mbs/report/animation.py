@@ -1,7 +1,4 @@
-"""A scene as an animated WebP or GIF, or as MP4 where ffmpeg is found: printed and right model side by side.
-
-The only file that knows Pillow and ffmpeg.
-"""
+"""A scene as an animated WebP or GIF, or as MP4 with ffmpeg: the printed model beside the corrected one."""
 
 from __future__ import annotations
 
@@ -31,17 +28,17 @@ Array = NDArray[Any]
 SUFFIXES = (".webp", ".gif", ".mp4")
 RATE = 20  # frames a second, in real time
 _LONGEST = 600  # frames: a longer scene is shown faster
-_SIDE, _TOP, _FINE = 420, 40, 2  # pixels of a square, of the line of text above; drawn twice as large, then made small
+_SIDE, _TOP, _FINE = 420, 40, 2  # pixels of a square, of the line of text above; drawn at twice the size, then reduced
 _PATH_POINTS = 4  # along a path, from one frame to the next
 _INK, _FAINT = "#1b1f24", "#d5dae0"
 
 
 def write_animation(results: Path, name: str, output: Path, magnified: float | None = None) -> Path:
-    """`magnified`: how many times the tip's distance from the pitch axis is drawn; it is told in the picture.
+    """Write the scene `name` of a results file as an animation; the suffix of `output` gives the format.
 
-    None: as many times as it takes to see it.
-
-    Raises InputError for a scene that the file does not have or a suffix that cannot be made here, StoreError.
+    magnified: how many times the tip's distance from the pitch axis is drawn (stated in the picture); None: so many
+    times that it is visible. Returns `output`. Raises InputError for a scene that the file does not have and for a
+    format that cannot be made, StoreError where a file cannot be read or written.
     """
     kind = output.suffix.lower()
     if kind not in SUFFIXES:
@@ -137,13 +134,13 @@ def _picture(drawn: Mapping[str, Wires], frame: int, time: float, magnified: flo
         over = f", ended at {time * last / frame:.2f} s" if frame > last else ""
         pen.text((left + 12 * _FINE, 4 * _FINE), f"{name}{over}", _INK, font)
         _rotor(pen, wire, last, (left + _FINE * _SIDE / 2, _FINE * (_TOP + _SIDE / 2)))
-    told = f"t = {time:.2f} s" + (f", offset drawn ×{magnified:g}" if magnified != 1.0 else "")
-    pen.text((12 * _FINE, 22 * _FINE), told, GREY, font)
+    text = f"t = {time:.2f} s" + (f", offset drawn ×{magnified:g}" if magnified != 1.0 else "")
+    pen.text((12 * _FINE, 22 * _FINE), text, GREY, font)
     return image.resize(size, Image.Resampling.LANCZOS)
 
 
 def _rotor(pen: ImageDraw.ImageDraw, wire: Wires, frame: int, centre: tuple[float, float]) -> None:
-    """Paths up to the frame, then the blades upon them."""
+    """Paths up to the frame, then the blades."""
     scale = 0.5 * _FINE * _SIDE / (1.08 * wire.reach)
 
     def at(point: Array) -> tuple[float, float]:
@@ -182,6 +179,8 @@ def _film(pictures: Iterator[Image.Image], step: float, output: Path) -> None:
         for picture in (first, *pictures):
             ffmpeg.stdin.write(picture.tobytes())
         ffmpeg.stdin.close()
-        told = ffmpeg.stderr.read().decode(errors="replace").strip()
+        message = ffmpeg.stderr.read().decode(errors="replace").strip()
     if ffmpeg.returncode:
-        raise StoreError(f"{output}: ffmpeg could not make it: {told.splitlines()[-1] if told else 'no reason given'}")
+        raise StoreError(
+            f"{output}: ffmpeg could not make it: {message.splitlines()[-1] if message else 'no reason given'}"
+        )

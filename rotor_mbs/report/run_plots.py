@@ -113,9 +113,7 @@ def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> 
 
 def _with_legend(picture: Panels, runs: Iterable[Solution]) -> Drawing:
     looks = {label_of(run.method): look_of(run.method) for run in runs}
-    canvas.legend_inside(
-        picture.axes[0], [(label, look.colour, look.line, look.marker) for label, look in looks.items()]
-    )
+    canvas.legend_inside(picture.axes[0], list(looks.items()))
     return Drawing(picture.figure)
 
 

@@ -1,6 +1,6 @@
-"""Verdicts for a person, a script, a CI server and a pull request. Decides nothing.
+"""Verdicts as lines of text, JSON, JUnit XML, and annotations of GitHub.
 
-Names and messages come from files that anybody may have made: what is not printable is shown as an escape.
+Names and messages come from files of any origin: what is not printable is written as an escape.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from rotor_mbs.analysis.verdicts import Verdict
 
 def line(verdict: Verdict) -> str:
     """One line: outcome, what was checked where, the value, the bound, the margin; of a failure what to look at."""
-    word = "pass" if verdict.passed else "FAIL"
+    outcome = "pass" if verdict.passed else "FAIL"
     margin = "inf" if math.isinf(verdict.margin) else f"{verdict.margin:.3g}"
     unit = f" {verdict.unit}" if verdict.unit else ""
     look_at = "" if verdict.passed else f"; {verdict.look_at}"
     return printable(
-        f"{word} {verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}: {verdict.value:.2e}, "
+        f"{outcome} {verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}: {verdict.value:.2e}, "
         f"bound {verdict.bound:.2e}{unit}, margin {margin}{look_at}"
     )
 
@@ -91,5 +91,5 @@ def _add_suite(root: ElementTree.Element, scene: str, mine: Sequence[Verdict]) -
 
 
 def printable(text: str) -> str:
-    """One line with nothing in it that steers a terminal or that XML forbids: control characters, lone surrogates."""
+    """`text` with escapes for what controls a terminal or is not allowed in XML: control characters, surrogates."""
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)

@@ -1,4 +1,4 @@
-"""The report from made files: what is drawn, what is left out, what is escaped, where it is written."""
+"""The report of synthetic files: what is drawn, what is left out, what is escaped, where it is written."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def test_embedding_moves_no_point_and_changes_no_label() -> None:
 
 def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> None:
     found = page(report)
-    assert found.sections == ["said", "paths", "motion", "difference", "energy", "metrics", "file"]
+    assert found.sections == ["paper", "paths", "motion", "difference", "energy", "metrics", "file"]
     headings = [tag for tag in found.tags if re.fullmatch(r"h\d", tag)]
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
     assert found.tags.count("figcaption") == found.tags.count("figure") == 3 + 1 + 3 + 2
@@ -180,7 +180,7 @@ def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> No
     assert len(images) == found.tags.count("figure") + found.tags.count("canvas")
 
 
-def test_the_index_tells_the_finding(report: Path) -> None:
+def test_the_index_states_the_finding(report: Path) -> None:
     found = page(report, "index.html")
     assert "1 of 1 published number is reproduced to every printed digit" in found.words
     # The fixture's scene: 9.8 m/s² and 10 s, as the paper's own.
@@ -211,7 +211,7 @@ def test_matched_numbers_are_marked_on_every_page(tmp_path: Path) -> None:
         assert page(folder, name).words.count("chosen to match") >= times, name
 
 
-def test_energy_of_runs_that_broke_off_is_not_the_largest_of_the_finding(tmp_path: Path) -> None:
+def test_energy_of_runs_that_ended_early_is_not_the_largest_of_the_finding(tmp_path: Path) -> None:
     broken = {"status": "solver_failed", "message": "gave up"}
     away = replace(FIG11, name="paper/fig12")
     runs = [

@@ -1,6 +1,6 @@
-"""The only file that knows matplotlib: panels to draw on, one style for all, SVG text with the same bytes every time.
+"""The only module that imports matplotlib: panels, the styles of pages and manuscripts, reproducible output.
 
-Uses Figure directly: no pyplot, hence no global state and no window. Knows no run and no quantity.
+Uses Figure directly: no pyplot, hence no global state and no window.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rotor_mbs.report.core.numbers import power
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
-PRINT_STYLE: Any = matplotlib.rc_params_from_file(  # what the file says, and no more
+PRINT_STYLE: Any = matplotlib.rc_params_from_file(  # without matplotlib's defaults
     Path(__file__).with_name("print.mplstyle"), use_default_template=False
 )
 _STYLE: Any = {
@@ -91,7 +91,7 @@ def grid(rows: int, columns: int, height: float, *, for_print: bool = False) -> 
 
 @contextmanager
 def style(*, for_print: bool = False) -> Iterator[None]:
-    """Whatever is drawn inside is drawn in the style of the pages, or in that for manuscripts."""
+    """A context in which figures are drawn in the style of the pages, or in that of manuscripts."""
     with matplotlib.rc_context(PRINT_STYLE if for_print else _STYLE):
         yield
 
@@ -109,11 +109,11 @@ def legend_below(figure: Figure, labelled: Sequence[tuple[str, Look]]) -> None:
         figure.legend(lines, names, loc="lower center", ncols=min(len(lines), 5), handlelength=2.6)
 
 
-def legend_inside(axes: Any, labelled: Sequence[tuple[str, str, Any, str]]) -> None:
-    """(label, colour, line, marker) of each curve, where the axes have most room."""
-    with matplotlib.rc_context(_STYLE):
-        lines = [Line2D([], [], color=c, linestyle=line, marker=mark) for _, c, line, mark in labelled]
-        axes.legend(lines, [label for label, *_ in labelled], loc="best", fontsize=8.0)
+def legend_inside(axes: Any, labelled: Sequence[tuple[str, Look]]) -> None:
+    """An entry per (label, look), where the axes have most room."""
+    with style():
+        lines = [Line2D([], [], color=look.colour, ls=look.line, marker=look.marker) for _, look in labelled]
+        axes.legend(lines, [label for label, _ in labelled], loc="best", fontsize=8.0)
 
 
 KINDS = ("pdf", "svg", "png")
@@ -151,7 +151,7 @@ def svg_text(figure: Figure) -> str:
 
 
 def colour_bar(figure: Figure, axes: Any, drawn: Any, label: str) -> None:
-    """What the colours of `drawn` mean, to the right of its axes."""
+    """A scale of the colours of `drawn`, to the right of its axes."""
     with style():
         bar = figure.colorbar(drawn, ax=axes)
         bar.set_label(label)

@@ -1,4 +1,4 @@
-"""File names from scene names, and pages into a folder: own old pages replaced, foreign files left alone."""
+"""File names of pages, and writing of pages: earlier pages of a report are replaced, other files stay."""
 
 from __future__ import annotations
 
@@ -62,6 +62,6 @@ def _replace(path: Path, text: str) -> None:
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether the page says that this program made it."""
+    """Whether the page names this program as its generator."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return f'<meta name="generator" content="{GENERATOR}">' in file.read(2000)

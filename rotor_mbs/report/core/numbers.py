@@ -1,4 +1,4 @@
-"""Numbers for human eyes: few digits, powers of ten, SI prefixes, a true minus sign. Knows no quantity's meaning."""
+"""Numbers as text: few digits, powers of ten, SI prefixes, a true minus sign."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def power(exponent: int) -> str:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """`digits` significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰; a dash for None, NaN in words."""
+    """`digits` significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰; a dash for None, "not finite" for NaN."""
     if value is None:
         return NOTHING
     if not math.isfinite(value):
@@ -38,7 +38,7 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def quantity(value: float | None, unit: str, digits: int = 2) -> str:
-    """A number with its unit, held together."""
+    """A number with its unit, without a line break between them."""
     return number(value, digits) if value is None else f"{number(value, digits)}{SPACE}{unit}"
 
 

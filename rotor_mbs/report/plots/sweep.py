@@ -1,4 +1,4 @@
-"""The pictures of a sweep as SVG text: spread of nearby starts, stability map. Draws what analysis found, no more."""
+"""The pictures of a sweep as SVG text: divergence of nearby initial states, stability map."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rotor_mbs.analysis.sweep_spread import Spread
 from rotor_mbs.report.core.canvas import colour_bar, log_axis, panels, svg_text
 
 _INK, _ACCENT = "#0072b2", "#d55e00"  # Okabe-Ito blue and vermillion
-_MOST_GROWTH = 1e4  # beyond it the pitch has long gone round; the colours end there
+_MOST_GROWTH = 1e4  # the colours end there: the pitch has turned many times
 
 
 def spread_figure(spread: Spread, title: str) -> str:
