@@ -43,9 +43,9 @@ def stability_map(sweep: StoredSweep, start: float) -> StabilityMap:
     if not start > 0.0:
         raise InputError("map: every pitch starts at zero and nothing could grow; allowed: a small pitch at the start")
     rows, columns = sweep.shape
-    parameters = sweep.column("parameters")[: rows * columns].reshape(rows, columns, 2)
+    y, x = (sweep.parameter(key)[: rows * columns].reshape(rows, columns) for key in sweep.keys)
     largest = sweep.column("pitch_max")[: rows * columns].reshape(rows, columns)
     return StabilityMap(
         sweep.keys[1], sweep.keys[0], sweep.units[1], sweep.units[0],
-        parameters[0, :, 1], parameters[:, 0, 0], largest / start,
+        x[0], y[:, 0], largest / start,
     )  # fmt: skip

@@ -44,7 +44,7 @@ class Spread:
 
 def spread_of(sweep: StoredSweep) -> Spread:
     """From the runs that ended well. Raises StoreError without angles, InputError where nothing grows."""
-    time = sweep.scale("time")
+    time = sweep.column("time")
     separations = _separations(sweep)
     low, median, high = np.percentile(separations, [10.0, 50.0, 90.0], axis=0)
     growth = np.exp(np.log(np.maximum(separations, np.finfo(float).tiny)).mean(axis=0))

@@ -1,31 +1,84 @@
-"""`sweep`: starts the workers, which load their code while this process loads its own and reads the file."""
+"""`sweep`: a parameter study into one dataset. The workers load their code while this process reads the file."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import signal
+import sys
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.execution.engines import open_engine
 from rotor_mbs.execution.pool import ImportedCall, TaskPool
 
+if TYPE_CHECKING:
+    from rotor_mbs.scenario.sweep import Sweep
+    from rotor_mbs.studies.sweep import SweepResult
+    from rotor_mbs.studies.sweep_plan import SweepPlan
+
+_MANY = 1_000_000  # runs that are not started without --yes
+
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """A parameter study into one dataset, which any kind of interruption leaves able to go on."""
-    with _interruptible(), _engine(arguments) as engine:
-        from rotor_mbs.cli.sweep_study import sweep_on
+    """1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
+    with _interruptible(), _opened(arguments) as pool:
+        from rotor_mbs.scenario.sweep import load_sweep
+        from rotor_mbs.studies.sweep_plan import plan_sweep
 
-        return sweep_on(engine, arguments)
+        study = load_sweep(arguments.file)
+        plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
+        if arguments.dry_run:
+            return _show_estimate(plan, pool, arguments)
+        runs = plan.last - plan.first
+        if runs > _MANY and not arguments.yes:
+            raise InputError(f"{arguments.file}: {runs:,} runs; allowed without --yes: at most {_MANY:,}")
+        return _run(study, pool, arguments)
+
+
+def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
+    from rotor_mbs.cli.sweep_meter import Meter
+    from rotor_mbs.studies.sweep import run_sweep
+
+    output = arguments.output or Path(f"{study.name}.h5")
+    meter = Meter(as_json=arguments.json)
+    try:
+        result = run_sweep(
+            study,
+            output,
+            methods=arguments.method or (),
+            engine=pool,
+            part=arguments.part,
+            timeout_s=arguments.timeout,
+            on_progress=meter,
+        )
+    except StoreError as exc:  # the disk, not the input: what is stored stays, the same command continues
+        meter.close()
+        print(exc, file=sys.stderr)
+        return 1
+    finally:
+        meter.close()
+    _summarize(result, as_json=arguments.json)
+    if study.picture and arguments.part == (1, 1):
+        from rotor_mbs.cli.sweep_picture import draw
+
+        line = draw(study, result.path, output.with_suffix(".svg"))
+        print(line, file=sys.stderr if arguments.json else sys.stdout)
+    return 0 if result.is_ok else 1
 
 
 @contextmanager
-def _engine(arguments: argparse.Namespace) -> Iterator[TaskPool]:
-    engine = open_engine(arguments.engine, arguments.jobs, ImportedCall("rotor_mbs.studies.sweep_work:prepare"))
+def _opened(arguments: argparse.Namespace) -> Iterator[TaskPool]:
+    prepare = ImportedCall("rotor_mbs.studies.sweep_work:prepare")
+    pool = open_engine(arguments.engine, arguments.jobs, prepare)
     try:
-        yield engine
+        yield pool
     finally:
-        engine.close()
+        pool.close()
 
 
 @contextmanager
@@ -40,3 +93,42 @@ def _interruptible() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _summarize(result: SweepResult, *, as_json: bool) -> None:
+    if as_json:
+        facts = {"runs": result.runs, "made": result.made, "statuses": result.statuses, "files": [str(result.path)]}
+        print(json.dumps({"event": "end", **facts, "seconds": round(result.seconds, 3)}))
+        return
+    by_status = ", ".join(f"{count} {status}" for status, count in Counter(result.statuses).most_common())
+    rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
+    print(f"{result.path}: {result.runs} runs: {by_status}; {result.made} made in {result.seconds:.1f} s{rate}")
+
+
+def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
+    from rotor_mbs.studies.sweep import estimate_seconds
+
+    runs = plan.last - plan.first
+    size, seconds = runs * plan.layout.row.itemsize, estimate_seconds(plan, pool)
+    if arguments.json:
+        facts = {"runs": runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
+        print(json.dumps(facts))
+        return 0
+    print(f"{runs:,} runs by {', '.join(plan.methods)}: about {_readable(seconds)} on {arguments.engine}")
+    print(f"{_size(size)} in 1 file")
+    return 0
+
+
+def _readable(seconds: float) -> str:
+    for length, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 2.0 * length:
+            return f"{seconds / length:.1f} {unit}"
+    return f"{seconds:.1f} seconds"
+
+
+def _size(count: float) -> str:
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if count < 1000.0:
+            return f"{count:.4g} {unit}"
+        count /= 1000.0
+    return f"{count:.4g} TB"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from rotor_mbs.analysis.sweep_map import stability_map
@@ -13,23 +12,22 @@ from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.store.sweep_read import StoredSweep
 
 
-def draw(sweep: Sweep, files: Sequence[Path], output: Path) -> str:
-    """Writes the picture beside the dataset; returns a line about it. Raises InputError, StoreError."""
-    stored = StoredSweep(files)
-    path = output.with_suffix(".svg")
+def draw(sweep: Sweep, dataset: Path, path: Path) -> str:
+    """Writes the picture to `path`; returns a line about it. Raises InputError, StoreError."""
+    stored = StoredSweep(dataset)
     if sweep.picture == "spread":
         spread = spread_of(stored)
         text = spread_figure(spread, sweep.title)
-        told = (
+        line = (
             f"largest Lyapunov exponent {spread.exponent:.3f} ± {spread.uncertainty:.3f} per s "
             f"({spread.pairs} pairs, {spread.start:.2f} to {spread.end:.2f} s)"
         )
     else:
         found = stability_map(stored, max(abs(angle) for angle in sweep.base.initial_angles[1:]))
         text = map_figure(found, sweep.title)
-        told = f"the pitches grow tenfold in {found.unstable.sum()} of {found.growth.size} runs"
+        line = f"the pitches grow tenfold in {found.unstable.sum()} of {found.growth.size} runs"
     try:
         path.write_text(text)
     except OSError as exc:
         raise StoreError(f"{path}: cannot be written: {exc.strerror}") from exc
-    return f"{path}: {told}"
+    return f"{path}: {line}"

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from io import RawIOBase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.solution.quantities import Quantity
-from rotor_mbs.store.chunk_index import ChunkIndex
 from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Column
 
 if TYPE_CHECKING:
@@ -40,12 +38,12 @@ def new_file(path: Path) -> Iterator[Any]:
     replace_file(path, image)
 
 
-def new_file_in(memory: RawIOBase) -> Any:
-    """A new HDF5 file in an object that reads, writes, seeks and truncates like a file."""
-    return _begun(memory)
+def new_file_at(path: Path) -> Any:
+    """A new HDF5 file on the disk, where it must not fill up: for files too large to be made in memory."""
+    return _begun(str(path))
 
 
-def _begun(place: str | RawIOBase, **driver: object) -> Any:
+def _begun(place: str, **driver: object) -> Any:
     file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
     file.attrs["Conventions"] = CONVENTIONS
     file.attrs["format"] = FORMAT
@@ -166,16 +164,20 @@ def is_group(item: Any) -> bool:
     return isinstance(item, h5py.Group)
 
 
-def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity) -> Any:
-    """A dataset whose numbers get their places in the file now, and are put there by others (see `places`).
+def put_empty(
+    group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity, fill: int | None = None
+) -> Any:
+    """A contiguous dataset that has its place in the file now (see `offset_of`) and is written by others.
 
-    Chunked by its first dimension where it has others. Scales as in `put`.
+    fill   its first value; without one it is what the file system makes of a new file, zeros. Scales as in `put`.
     """
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    layout.set_layout(h5py.h5d.CONTIGUOUS)
     layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-    chunks = (1, *shape[1:]) if len(shape) > 1 else None
-    dataset = group.create_dataset(name, shape, kind, chunks=chunks, dcpl=layout)
+    layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
+    if fill is not None:
+        layout.set_fill_value(np.array(fill, kind))
+    dataset = group.create_dataset(name, shape, kind, dcpl=layout)
     dataset.attrs["units"] = quantity.units
     dataset.attrs["long_name"] = quantity.long_name
     for axis, dimension in enumerate(quantity.dimensions):
@@ -183,19 +185,22 @@ def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity
     return dataset
 
 
-def places(dataset: Any, index: ChunkIndex) -> NDArray[np.int64]:
-    """(rows,) where in the file each row of a dataset of `put_empty` begins, in bytes; index: of the file, flushed."""
-    if dataset.chunks is None:
-        return np.arange(len(dataset)) * int(dataset.dtype.itemsize) + int(dataset.id.get_offset())
-    first = dataset.id.get_chunk_info_by_coord((0,) * dataset.ndim).byte_offset
-    found = index.places(first, len(dataset), dataset.ndim)
-    return _told_places(dataset) if found is None else found
+def put_flags(dataset: Any, meanings: Sequence[str]) -> None:
+    """Marks integer codes from 0 up as the CF conventions do; no meaning may contain a blank."""
+    dataset.attrs["flag_values"] = np.arange(len(meanings), dtype=dataset.dtype)
+    dataset.attrs["flag_meanings"] = " ".join(meanings)
 
 
-def _told_places(dataset: Any) -> NDArray[np.int64]:
-    """The same of any chunked dataset, by the library."""
-    chunks: list[Any] = []
-    dataset.id.chunk_iter(chunks.append)
-    found = np.empty(len(dataset), np.int64)
-    found[[chunk.chunk_offset[0] for chunk in chunks]] = [chunk.byte_offset for chunk in chunks]
-    return found
+def offset_of(dataset: Any) -> int:
+    """Bytes from the beginning of the file to a contiguous dataset."""
+    return int(dataset.id.get_offset())
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes a new or replaced name in `folder` durable, where the system can."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

@@ -1,9 +1,9 @@
-"""A sweep's files read back, run by run across all of them. Needs no engine."""
+"""A sweep's dataset read back, column by column. Needs no engine."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,50 +11,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.store.hdf5 import attributes_of
-from rotor_mbs.store.read import open_results
+from rotor_mbs.store.hdf5 import attributes_of, open_file
+from rotor_mbs.store.sweep_layout import parameter_name
 
 
 class StoredSweep:
-    """The files of one sweep, in the order of their runs. Raises StoreError where one is missing or no sweep."""
+    """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none.
 
-    def __init__(self, files: Sequence[Path]) -> None:
-        self._files = files
-        with open_results(files[0]) as results:
-            if "parameters" not in results.root:
-                raise StoreError(f"{files[0]}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
-            self.attributes = results.attributes
-            told = attributes_of(results.root["parameters"])
-        self.keys: list[str] = told["labels"]
-        self.units: list[str] = told["label_units"]
+    keys, units   of the varied parameters
+    attributes    of the file
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with open_file(path) as file:
+            self.attributes = attributes_of(file)
+            if "sweep_identity" not in self.attributes:
+                raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
+            self.keys: list[str] = self.attributes["parameter_keys"]
+            self.units = [str(attributes_of(file[parameter_name(key)])["units"]) for key in self.keys]
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Values along every axis of its grid, slowest first."""
         return tuple(json.loads(self.attributes["shape"]))
 
-    def scale(self, name: str) -> NDArray[np.float64]:
-        """What all runs share, such as `time`. Raises StoreError."""
-        with open_results(self._files[0]) as results:
-            return self._array(results.root, name)
+    def parameter(self, key: str) -> NDArray[np.float64]:
+        """(runs,) the values of a varied parameter. Raises StoreError."""
+        return self.column(parameter_name(key))
 
     def column(self, name: str) -> NDArray[Any]:
-        """(runs, ...) a dataset whole: for metrics and parameters. Raises StoreError."""
-        return np.concatenate(list(self.pieces(name, 1 << 20)))
+        """A dataset whole, such as `status` or `time`. Raises StoreError where there is none of that name."""
+        with open_file(self._path) as file:
+            values: NDArray[Any] = self._dataset(file, name)[()]
+            return values
 
     def pieces(self, name: str, runs: int) -> Iterator[NDArray[Any]]:
         """The same in pieces of at most `runs` runs: for trajectories."""
-        for path in self._files:
-            with open_results(path) as results:
-                dataset = self._dataset(results.root, name)
-                for first in range(0, len(dataset), runs):
-                    yield dataset[first : first + runs]
+        with open_file(self._path) as file:
+            dataset = self._dataset(file, name)
+            for first in range(0, len(dataset), runs):
+                yield dataset[first : first + runs]
 
-    def _array(self, root: Any, name: str) -> NDArray[Any]:
-        values: NDArray[Any] = self._dataset(root, name)[()]
-        return values
+    def message(self, run: int) -> str:
+        """Why the run (counted in this file) did not end well; "" where it did."""
+        with open_file(self._path) as file:
+            return bytes(file["message"][run]).rstrip(b"\0").decode(errors="replace")
 
-    def _dataset(self, root: Any, name: str) -> Any:
-        if name not in root:
-            raise StoreError(f"{self._files[0]}: does not hold {name}; allowed: a sweep whose outputs have it")
-        return root[name]
+    def _dataset(self, file: Any, name: str) -> Any:
+        if name not in file:
+            raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")
+        return file[name]

@@ -1,10 +1,9 @@
-"""From a sweep file and the command line to what is to be done: runs, chunks, the dataset's facts, an estimate."""
+"""What is to be done for a sweep: its runs by method, cut into chunks, and the layout of its dataset."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,27 +14,26 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.environment import machine, numerics_fingerprint, versions
-from rotor_mbs.execution.pool import TaskPool
 from rotor_mbs.methods.catalogue import check_names, find_method
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.sweep_design import validation_rows
 from rotor_mbs.scenario.variants import Variants
-from rotor_mbs.store.sweep_layout import Plan
-from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, perform
+from rotor_mbs.store.sweep_layout import SweepLayout
+from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk
 
 # Runs handed to a worker at once by the fast path: an eighth of a second of work, fewer towards the end, so that all
 # workers end together. The least is a full batch on any processor.
-_ENSEMBLE_RUNS = 128
+ENSEMBLE_RUNS = 128
 _LEAST_RUNS = 8
 _CHUNK_BYTES = 1 << 23
 
-_FORMAT = 2  # of rows and columns: a sweep begun by another version is not gone on with
+_FORMAT = 3  # of rows and columns: a sweep begun by another version is not continued
 
 
 @dataclass(frozen=True)
-class Work:
-    """A sweep, or one part of several, by its methods.
+class SweepPlan:
+    """The runs of a sweep, or of one part of several, by its methods.
 
     first, last   of its runs; run r is row r mod rows of the design, by method r div rows
     """
@@ -51,21 +49,23 @@ class Work:
         return self.sweep.design.count
 
     @cached_property
-    def plan(self) -> Plan:
+    def layout(self) -> SweepLayout:
         sweep = self.sweep
         splits = validation_rows(self.rows, sweep.validation, sweep.design.seed) if sweep.validation else None
-        return Plan(
-            self._identity(),
-            self._attributes(),
-            sweep.base,
-            sweep.outputs,
-            sweep.precision,
-            sweep.keys,
-            sweep.units,
-            self.methods,
-            self.rows,
-            self.values,
-            splits,
+        return SweepLayout(
+            identity=self._identity(),
+            attributes=self._attributes(),
+            scene=sweep.base,
+            outputs=sweep.outputs,
+            precision=sweep.precision,
+            keys=sweep.keys,
+            units=sweep.units,
+            methods=self.methods,
+            variants=self.rows,
+            parameters=self.values,
+            splits=splits,
+            first=self.first,
+            last=self.last,
         )
 
     def values(self, first: int, last: int) -> NDArray[np.float64]:
@@ -78,7 +78,7 @@ class Work:
 
     def chunks(self, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
         """The runs of `gaps`, cut into what one of `workers` does at once."""
-        variants, row = self.sweep.variants(), self.plan.row
+        variants, row = self.sweep.variants(), self.layout.row
         for first, _ in gaps[:1]:
             variants.prepare(self.values(first, first + 1)[0].tolist())
         left = sum(last - first for first, last in gaps)
@@ -99,7 +99,7 @@ class Work:
     def _chunk_size(method: str, row_bytes: int, share: int) -> int:
         if method != ENSEMBLE_METHOD:
             return 1
-        return max(min(_CHUNK_BYTES // row_bytes, share, _ENSEMBLE_RUNS) // _LEAST_RUNS, 1) * _LEAST_RUNS
+        return max(min(_CHUNK_BYTES // row_bytes, share, ENSEMBLE_RUNS) // _LEAST_RUNS, 1) * _LEAST_RUNS
 
     def _by_method(self, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Spans of runs cut where the method changes."""
@@ -161,7 +161,7 @@ def _chosen(sweep: Sweep, methods: Sequence[str]) -> tuple[str, ...]:
         raise InputError([sweep.problem(("methods",), f"methods: {words}") for words in exc.problems]) from exc
 
 
-def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> Work:
+def plan_sweep(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> SweepPlan:
     """The runs of part k of n (1, 1 for all). Raises InputError, MethodRefusal where a method cannot do them."""
     chosen = _chosen(sweep, methods)
     known = {key for method in chosen for key in find_method(method).defaults}
@@ -175,28 +175,4 @@ def plan_work(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_
             find_method(method).items(sweep.base)
     total = sweep.design.count * len(chosen)
     number, parts = part
-    return Work(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)
-
-
-def estimate_seconds(work: Work, engine: TaskPool) -> float:
-    """How long all runs will take, from one chunk of each method; infinite where one did not end in its time."""
-    seconds = 0.0
-    for k in range(len(work.methods)):
-        runs = max(min(work.last, (k + 1) * work.rows) - max(work.first, k * work.rows), 0)
-        if runs:
-            seconds += runs * _seconds_per_run(work, k * work.rows, engine) / engine.workers
-    return seconds
-
-
-def _seconds_per_run(work: Work, first: int, engine: TaskPool) -> float:
-    chunk = next(work.chunks([(first, first + min(work.rows, _ENSEMBLE_RUNS))]))
-    try:
-        # The first one loads and compiles, which all others find done.
-        engine.submit(perform, chunk.part(0, 1), work.time_limit_s).result()
-        start = time.perf_counter()
-        engine.submit(perform, chunk, work.time_limit_s).result()
-    except Exception as error:
-        if engine.failure(error) == "error":
-            raise
-        return float("inf")
-    return (time.perf_counter() - start) / len(chunk.values)
+    return SweepPlan(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)

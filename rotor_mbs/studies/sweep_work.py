@@ -1,5 +1,4 @@
-"""A chunk of a sweep's runs, from parameters to rows, in a worker process; and where it shares the disk, to their
-places in the file. What counts as stored, the parent says."""
+"""A chunk of a sweep's runs in a worker process: from parameters to rows, and into the file where it sees the file."""
 
 from __future__ import annotations
 
@@ -22,8 +21,9 @@ from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_e
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Array, Integration
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.sweep_layout import MESSAGE_BYTES, METRICS_AND_MESSAGE, SWEEP_STATUSES, empty_rows
-from rotor_mbs.store.sweep_rows import MESSAGE, Places, Receipt, Rows
+from rotor_mbs.solution.status import code_of
+from rotor_mbs.store.sweep_columns import Rows, RunColumns
+from rotor_mbs.store.sweep_layout import MESSAGE_BYTES, METRICS, empty_rows
 
 ENSEMBLE_METHOD = "lagrange/taylor"
 
@@ -35,7 +35,7 @@ class Chunk:
     values        (runs, keys) the varied numbers
     row           the type of a stored row
     time_limit_s  of one run
-    places        where the rows are to be put; None where they are to be returned
+    columns       where the rows are to be written; None where they are to be returned
     """
 
     variants: Variants
@@ -45,22 +45,19 @@ class Chunk:
     first: int
     values: NDArray[np.float64]
     time_limit_s: float
-    places: Places | None = None
+    columns: RunColumns | None = None
 
     @property
     def last(self) -> int:
         """The run after its last one."""
         return self.first + len(self.values)
 
-    def parts(self) -> list[Chunk]:
+    def split(self) -> list[Chunk]:
         """Its runs one by one; [] where it is one run."""
-        if len(self.values) == 1:
-            return []
-        return [self.part(i, i + 1) for i in range(len(self.values))]
+        return [self.part(i, i + 1) for i in range(len(self.values))] if len(self.values) > 1 else []
 
     def part(self, start: int, end: int) -> Chunk:
-        places = self.places.part(start, end) if self.places else None
-        return replace(self, first=self.first + start, values=self.values[start:end], places=places)
+        return replace(self, first=self.first + start, values=self.values[start:end])
 
 
 def prepare() -> None:
@@ -69,11 +66,13 @@ def prepare() -> None:
     is_available()
 
 
-def perform(chunk: Chunk) -> Rows | Receipt:
-    """The runs' rows, or the receipt for them. Raises InputError, MethodRefusal, StoreError; a run's failure is in its
-    row."""
+def perform(chunk: Chunk) -> Rows | NDArray[np.int8]:
+    """Computes the runs; returns their rows, or their statuses where the rows have been written.
+
+    Raises InputError, MethodRefusal, StoreError; a run's own failure is in its row.
+    """
     rows = rows_of(chunk)
-    return chunk.places.put(rows) if chunk.places else rows
+    return rows if chunk.columns is None else chunk.columns.write(chunk.first, rows)
 
 
 def rows_of(chunk: Chunk) -> Rows:
@@ -84,14 +83,6 @@ def rows_of(chunk: Chunk) -> Rows:
     rows = empty_rows(len(scenes), chunk.row)
     for i, scene in enumerate(scenes):
         _put_run(rows, i, scene, _solved(chunk, scene))
-    return rows
-
-
-def lost(chunk: Chunk, status: str, message: str) -> Rows:
-    """Rows of runs that left nothing: their process died, or was ended."""
-    rows = empty_rows(len(chunk.values), chunk.row)
-    rows["status"][:], rows[MESSAGE][:] = SWEEP_STATUSES.index(status), message.encode()[:MESSAGE_BYTES]
-    rows["time_reached"][:] = 0.0
     return rows
 
 
@@ -115,7 +106,7 @@ def _solved(chunk: Chunk, scene: Scene) -> Solution | str:
 
 def _put_run(rows: Rows, i: int, scene: Scene, run: Solution | str) -> None:
     if isinstance(run, str):
-        rows["status"][i], rows[MESSAGE][i] = SWEEP_STATUSES.index("timed_out"), run.encode()[:MESSAGE_BYTES]
+        rows["status"][i], rows["message"][i] = code_of("timed_out"), run.encode()[:MESSAGE_BYTES]
         rows["time_reached"][i] = 0.0
         return
     _put_verdict(rows, i, scene, run)
@@ -125,20 +116,20 @@ def _put_run(rows: Rows, i: int, scene: Scene, run: Solution | str) -> None:
         if name in rows:
             rows[name][i, :n] = values
     _put_extremes(rows, slice(i, i + 1), trajectory.angles[None], trajectory.rates[None])
-    _put_words(rows, i, run.integration, float(trajectory.time[-1]) if n else 0.0)
+    _put_effort(rows, i, run.integration, float(trajectory.time[-1]) if n else 0.0)
 
 
 def _put_verdict(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
     verdict = judge(scene, run, None)
-    rows["status"][i] = SWEEP_STATUSES.index(verdict.status)
-    rows[MESSAGE][i] = verdict.message.encode()[:MESSAGE_BYTES]
+    rows["status"][i] = code_of(verdict.status)
+    rows["message"][i] = verdict.message.encode()[:MESSAGE_BYTES]
     rows["energy_drift_max"][i] = verdict.metrics.get("energy_drift_max", np.nan)
 
 
-def _put_words(rows: Rows, i: int, word: Integration, time_reached: float) -> None:
+def _put_effort(rows: Rows, i: int, integration: Integration, time_reached: float) -> None:
     rows["time_reached"][i] = time_reached
-    rows["steps"][i] = -1 if word.steps is None else word.steps
-    rows["rhs_evaluations"][i] = -1 if word.rhs_evaluations is None else word.rhs_evaluations
+    rows["steps"][i] = -1 if integration.steps is None else integration.steps
+    rows["rhs_evaluations"][i] = -1 if integration.rhs_evaluations is None else integration.rhs_evaluations
 
 
 def _put_extremes(rows: Rows, runs: slice, angles: Array, rates: Array) -> None:
@@ -158,16 +149,16 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     errors = energy_errors(block.kinetic_energy, block.potential_energy, block.work)
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
     ok = clearly_ok(scenes, chunk.method, block.words, block.samples, drifts)
-    rows = empty_rows(len(scenes), chunk.row, METRICS_AND_MESSAGE)
+    rows = empty_rows(len(scenes), chunk.row, METRICS)
     for name in chunk.row.names or ():
         if name not in rows:
             values = errors if name == "energy_error" else getattr(block, name)
             rows[name] = np.ascontiguousarray(values, chunk.row[name].base)
-    rows["status"][ok] = SWEEP_STATUSES.index("ok")
+    rows["status"][ok] = code_of("ok")
     rows["energy_drift_max"] = drifts
     _put_extremes(rows, slice(None), block.angles, block.rates)
-    for i, word in enumerate(block.words):
-        _put_words(rows, i, word, word.time_reached)
+    for i, integration in enumerate(block.words):
+        _put_effort(rows, i, integration, integration.time_reached)
     for i in np.flatnonzero(~ok).tolist():
         run = Solution(scenes[i], chunk.method, block.trajectory(i), block.words[i], settings.as_dict())
         _put_verdict(rows, i, scenes[i], run)

@@ -15,7 +15,8 @@ from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_errors
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.sweep_layout import SWEEP_STATUSES, row_type
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.sweep_layout import row_type
 from rotor_mbs.studies.sweep_work import Chunk, perform, rows_of
 
 pytest.importorskip("heyoka")
@@ -238,7 +239,7 @@ def test_a_loose_tolerance_is_found_out_run_by_run() -> None:
     statuses = {}
     for tolerance in (1e-6, 1e-15):
         rows = perform(Chunk(variants, "lagrange/taylor", {"tolerance": tolerance}, row, 5, values, 60.0))
-        statuses[tolerance] = [SWEEP_STATUSES[code] for code in rows["status"]]
+        statuses[tolerance] = [STATUSES[code] for code in rows["status"]]
         assert rows["angles"].dtype == np.float32
         assert (rows["steps"] > 10).all()
     assert statuses == {1e-6: ["inaccurate"] * 3, 1e-15: ["ok"] * 3}

@@ -17,21 +17,21 @@ from rotor_mbs.cli.sweep_picture import draw
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
+from rotor_mbs.store.sweep_dataset import SweepDataset
 from rotor_mbs.store.sweep_read import StoredSweep
-from rotor_mbs.store.sweep_store import SweepStore
-from rotor_mbs.studies.sweep_plan import plan_work
-from rotor_mbs.studies.sweep_work import perform
+from rotor_mbs.studies.sweep_plan import plan_sweep
+from rotor_mbs.studies.sweep_work import rows_of
 
 
 def _run(folder: Path, text: str) -> tuple[Sweep, Path]:
     """A sweep in this process: no pool is needed for a few runs."""
     (folder / "s.toml").write_text(text)
     sweep = load_sweep(folder / "s.toml")
-    work = plan_work(sweep, (), (1, 1), 60.0)
+    plan = plan_sweep(sweep, (), (1, 1), 60.0)
     output = folder / "s.h5"
-    with SweepStore(output, work.plan, 0, work.last, sweep.file_bytes) as store:
-        for chunk in work.chunks(store.missing()):
-            store.add([(chunk.first, perform(chunk))])
+    with SweepDataset(output, plan.layout) as dataset:
+        for chunk in plan.chunks(dataset.missing()):
+            dataset.write(chunk.first, rows_of(chunk))
     return sweep, output
 
 
@@ -74,7 +74,7 @@ def test_nearby_starts_of_fig11_part_as_the_variational_equations_say(tmp_path: 
             f'[[axis]]\nkey = "initial.angles[{i}]"\nnormal = ["pi/{n}", 1e-9]\n' for i, n in enumerate((6, 4, 6, 2))
         ),
     )
-    spread = spread_of(StoredSweep([output]))
+    spread = spread_of(StoredSweep(output))
     growth = heyoka_reference.error_growth(replace(paper("fig11"), samples=401))
     # The largest growth of any error bounds that of these, which are random in the angles alone (three times: the
     # ninetieth percentile of a normal start against its mean). It is not much larger either: by the number of
@@ -85,7 +85,7 @@ def test_nearby_starts_of_fig11_part_as_the_variational_equations_say(tmp_path: 
     assert (spread.high[inside] <= 3.0 * growth[inside] * start).all()
     ratio = np.log(spread.growth[inside] / start / growth[inside])
     assert abs(np.median(ratio)) < math.log(8.0 * math.e * math.sqrt(GRAVITY / OFFSET))
-    picture = draw(sweep, [output], output)
+    picture = draw(sweep, output, output.with_suffix(".svg"))
     assert "largest Lyapunov exponent" in picture
     assert output.with_suffix(".svg").read_text().startswith("<?xml")
 
@@ -104,7 +104,7 @@ def test_the_map_is_that_of_mathieus_equation(tmp_path: Path, stiffness: float, 
         + f'[[axis]]\nkey = "bearing.stiffness"\nvalues = [{stiffness}]\n'
         + f'[[axis]]\nkey = "initial.rates[0]"\nvalues = [{speed}]\n',
     )
-    found = stability_map(StoredSweep([output]), 1e-8)
+    found = stability_map(StoredSweep(output), 1e-8)
     largest = 0.0
     times = np.linspace(0.0, 4.0, 2001)
     for i in range(3):
@@ -145,4 +145,4 @@ def test_a_map_needs_two_axes_and_a_pitch_that_can_grow(tmp_path: Path) -> None:
         'title = "t"\nscene = "paper/fig06"\nsamples = 3\noutputs = []\n[[axis]]\nkey = "gravity"\nvalues = [1, 2]\n',
     )
     with pytest.raises(InputError, match="1 axes; allowed: a grid of two"):
-        stability_map(StoredSweep([output]), 1.0)
+        stability_map(StoredSweep(output), 1.0)

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from support.sweeps import stored_runs
 
 from rotor_mbs.cli import main
 
@@ -69,8 +70,7 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
     path.write_text(_SWEEP)
     command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(remote), "--engine", f"dask:{address}"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as sweep:
-        journal = tmp_path / "dask.h5.parts" / "0001.journal"
-        while sweep.poll() is None and not (journal.exists() and journal.stat().st_size > 400):
+        while sweep.poll() is None and stored_runs(remote) < 5:
             time.sleep(0.01)
         assert sweep.poll() is None, sweep.communicate()
         workers[0].kill()

@@ -35,7 +35,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.system import build_system
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep_plan import plan_work
+from rotor_mbs.studies.sweep_plan import plan_sweep
 from rotor_mbs.studies.sweep_work import Chunk, rows_of
 
 pytestmark = pytest.mark.slow
@@ -193,7 +193,7 @@ def _own_time(path: Path, samples: int, draws: int) -> float:
 def test_a_fast_run_is_integration_and_arrays_but_for_a_tenth(tmp_path: Path) -> None:
     """In a worker, from parameters to rows: scenes, tips, energies, judgement; and in the parent, what a run costs."""
     _skip_where_busy()
-    work = plan_work(load_sweep(_file(tmp_path, 201, _RUNS, "lagrange/taylor")), ("lagrange/taylor",), (1, 1), 60.0)
+    work = plan_sweep(load_sweep(_file(tmp_path, 201, _RUNS, "lagrange/taylor")), ("lagrange/taylor",), (1, 1), 60.0)
     chunks = list(work.chunks([(0, _RUNS)], 2))[::4]  # large ones, and small ones at the end, as two workers have them
     runs = sum(len(chunk.values) for chunk in chunks)
     engine = open_engine("local", 1)

@@ -1,6 +1,6 @@
 """Sweeps in bounded memory: what a worker grows by, and what a parent of 100,000 runs takes.
 
-python -m pytest -m slow -s tests/store/test_sweep_memory.py
+python -m pytest -m slow -s tests/studies/test_sweep_memory.py
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import pytest
 
 from rotor_mbs.execution.engines import open_engine
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep_plan import plan_work
+from rotor_mbs.studies.sweep_plan import plan_sweep
 from rotor_mbs.studies.sweep_work import perform
 
 pytestmark = [
@@ -60,7 +60,7 @@ def _resident(_: object) -> float:
 )
 def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, duration: float) -> None:
     """10,000 runs after the first thousand: at most 20 MB."""
-    work = plan_work(load_sweep(_file(tmp_path, method, 11_000, samples, duration)), (), (1, 1), 60.0)
+    work = plan_sweep(load_sweep(_file(tmp_path, method, 11_000, samples, duration)), (), (1, 1), 60.0)
     engine = open_engine("local", 1)
     try:
         before = 0.0

@@ -1,0 +1,182 @@
+"""The dataset of a sweep, which is its own journal: laid out first, then filled in any order. Judges nothing.
+
+All space is taken before the first run. From then on no HDF5 metadata changes, so that the file is valid at every
+moment and can be read while the sweep goes on. A run's numbers are written to their offsets, its status last, after a
+sync: a run is stored where its status is not -1 and its checksum is right.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store import hdf5, sweep_layout
+from rotor_mbs.store.layout import Column
+from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns
+from rotor_mbs.store.sweep_layout import COLUMNS, CRC32, METRICS, SPLITS, SweepLayout
+
+_HEAD_BYTES = 1 << 17  # of a file beside its runs, at most: descriptions and texts
+
+
+class SweepDataset:
+    """The runs of a sweep in the file `output`; a context manager that locks it against other processes.
+
+    Raises
+    ------
+    InputError
+        Where the output is another file, or another process is writing it.
+    StoreError
+        Where it cannot be read or written, or the disk has no room for all runs.
+    """
+
+    def __init__(self, output: Path, layout: SweepLayout) -> None:
+        self.path = output.resolve() if output.is_symlink() else output  # a link stays one
+        self._layout = layout
+        self._lock = FileLock(self.path.with_name(f".{self.path.name}.lock"))
+        self.statuses = np.full(layout.last - layout.first, MISSING, np.int8)
+        self.columns: RunColumns
+
+    def __enter__(self) -> SweepDataset:
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._lock.acquire(timeout=0)
+        except Timeout:
+            raise InputError(
+                f"{self.path}: another sweep is writing it now; allowed: wait for its end, or another output file"
+            ) from None
+        except OSError as exc:
+            raise StoreError(f"{self.path}: cannot be written: {exc.strerror}") from exc
+        try:
+            self._open()
+        except BaseException:
+            self._release()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if (self.statuses == MISSING).all():
+            with suppress(OSError):  # a sweep that stored nothing leaves nothing
+                self.path.unlink()
+        self._release()
+
+    def missing(self) -> list[tuple[int, int]]:
+        """(first, last) of every gap."""
+        edges = np.flatnonzero(np.diff(self.statuses == MISSING, prepend=False, append=False))
+        return [(int(first), int(last)) for first, last in self._layout.first + edges.reshape(-1, 2)]
+
+    def write(self, first: int, rows: Rows) -> NDArray[np.int8]:
+        """Stores runs that were returned to this process. Raises StoreError."""
+        return self.note(first, self.columns.write(first, rows))
+
+    def note(self, first: int, statuses: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Counts runs that a worker has stored; returns their statuses."""
+        start = first - self._layout.first
+        self.statuses[start : start + len(statuses)] = statuses
+        return statuses
+
+    def _open(self) -> None:
+        if not self.path.exists():
+            _lay_out(self.path, self._layout)
+        with hdf5.open_file(self.path) as file:
+            facts = hdf5.attributes_of(file)
+            if (facts.get("sweep_identity"), facts.get("runs")) != (self._layout.identity, len(self.statuses)):
+                raise InputError(
+                    f"{self.path}: holds something else than this sweep (or a sweep of another version); allowed: "
+                    "another output file, or remove that one"
+                )
+            row = self._layout.row
+            offsets = {name: hdf5.offset_of(file[name]) for name in (*(row.names or ()), "crc32")}
+            marked = file["status"][()] != MISSING
+        inode = self.path.stat().st_ino
+        self.columns = RunColumns(self.path, inode, self._layout.first, offsets, row)
+        self.statuses = self.columns.stored(len(self.statuses))
+        self.columns.forget(self._layout.first + np.flatnonzero(marked & (self.statuses == MISSING)))
+
+    def _release(self) -> None:
+        with suppress(OSError):
+            Path(self._lock.lock_file).unlink()
+        self._lock.release()
+
+
+def _lay_out(path: Path, layout: SweepLayout) -> None:
+    """The file without its runs, with room for all of them; complete under its name, or not there. Raises StoreError.
+
+    The space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins.
+    """
+    temporary = path.with_name(f".{path.name}.tmp")
+    count = layout.last - layout.first
+    expected = _HEAD_BYTES + count * (layout.row.itemsize + 8 * (4 + len(layout.keys)))
+    try:
+        _reserve(temporary, expected)
+        with hdf5.new_file_at(temporary) as file:
+            hdf5.put_attributes(file, {**layout.attributes, "sweep_identity": layout.identity, "runs": count})
+            _put_run_columns(file, layout)
+            _put_result_columns(file, layout)
+        _reserve(temporary, temporary.stat().st_size)
+        temporary.replace(path)
+    except OSError as exc:
+        with suppress(OSError):
+            temporary.unlink()
+        room = f"{expected:.2g} bytes for {count} runs"
+        raise StoreError(f"{path}: cannot be written: {exc.strerror} ({room}); nothing stored before is lost") from exc
+    hdf5.sync_folder(path.parent)
+
+
+def _reserve(path: Path, size: int) -> None:
+    """Takes the space on the disk, where the system and the file system can: not on macOS and Windows, where a disk
+    that fills up is reported by the run that finds it full. Raises OSError."""
+    file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file, 0, size)
+        os.fsync(file)
+    except OSError as exc:
+        if exc.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
+            raise
+    finally:
+        os.close(file)
+
+
+def _put_run_columns(file: Any, layout: SweepLayout) -> None:
+    """What is known of the runs before they are computed."""
+    runs = np.arange(layout.first, layout.last)
+    hdf5.put(file, "run", runs, COLUMNS["run"])
+    hdf5.put(file, "message_byte", np.arange(sweep_layout.MESSAGE_BYTES, dtype=np.int16), COLUMNS["message_byte"])
+    hdf5.put_attributes(file, {"parameter_keys": list(layout.keys)})
+    values = layout.parameters(layout.first, layout.last)
+    for i, (key, unit) in enumerate(zip(layout.keys, layout.units, strict=True)):
+        column = Column(("run",), unit, f"varied parameter {key}")
+        hdf5.put(file, sweep_layout.parameter_name(key), np.ascontiguousarray(values[:, i]), column)
+    hdf5.put(file, "variant", runs % layout.variants, COLUMNS["variant"])
+    solver = hdf5.put(file, "solver", (runs // layout.variants).astype(np.int8), COLUMNS["solver"])
+    hdf5.put_flags(solver, layout.methods)
+    if layout.splits is not None:
+        split = hdf5.put(file, "split", layout.splits[runs % layout.variants], COLUMNS["split"])
+        hdf5.put_flags(split, SPLITS)
+
+
+def _put_result_columns(file: Any, layout: SweepLayout) -> None:
+    """Scales, then room for metrics and trajectories."""
+    for name, (values, scale) in sweep_layout.scales(layout.scene, layout.outputs).items():
+        dataset = hdf5.put(file, name, values, scale)
+        if name == "time":
+            hdf5.put_attributes(dataset, {"standard_name": "time"})
+        if name == "coordinate":
+            hdf5.put_attributes(dataset, {"labels": layout.scene.coordinate_labels})
+    count, row = layout.last - layout.first, layout.row
+    for name, column in {**METRICS, **sweep_layout.trajectories(layout.outputs)}.items():
+        kind, shape = row[name].base, (count, *row[name].shape)
+        if name == "message":
+            kind, shape = np.dtype("u1"), (count, sweep_layout.MESSAGE_BYTES)
+        hdf5.put_empty(file, name, shape, kind, column, fill=MISSING if name == "status" else None)
+    hdf5.put_empty(file, "crc32", (count,), np.dtype("<u4"), CRC32)
+    hdf5.put_flags(file["status"], STATUSES)
