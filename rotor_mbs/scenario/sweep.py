@@ -5,6 +5,7 @@ Importing this module costs 0.2 s (pydantic).
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,9 +111,17 @@ class SweepTable(Table):
     draws: int | None = Field(None, ge=1, le=MAX_COUNT, description="a whole number from 1 up, with random axes")
     seed: int = Field(0, ge=0, le=2**63 - 1, description="a whole number from 0 up")
     validation: Number | None = Field(None, gt=0, lt=1, description="a share between 0 and 1")
-    file_bytes: Number = Field(4e9, ge=1e5, description="a number of at least 1e5, the most bytes of one file")
+    test: Number | None = Field(None, gt=0, lt=1, description="a share between 0 and 1, less than 1 with validation")
+    file_bytes: Number | None = Field(None, ge=1e5, description="a number of at least 1e5, without effect")
     picture: Literal["spread", "map"] | None = Field(None, description='"spread" or "map"')
     axis: list[AxisTable] = Field(min_length=1, description="one or more [[axis]] tables")
+
+    @field_validator("test")
+    @classmethod
+    def _leaves_rows_for_training(cls, test: float | None, info: ValidationInfo) -> float | None:
+        if test is not None and test + (info.data.get("validation") or 0.0) >= 1.0:
+            raise invalid("validation and test leave no rows for training")
+        return test
 
     @field_validator("axis")
     @classmethod
@@ -142,7 +151,7 @@ class Sweep:
     base        the scene with the sweep's own changes, before any axis
     units       of every axis' key
     outputs     what is stored of each run's samples; () for metrics alone
-    validation  share of the rows marked for validation, 0 for no mark
+    validation, test   shares of the rows marked for them, 0 for no mark
     text        the TOML text it was read from; path: of the file, as it is shown
     """
 
@@ -156,7 +165,7 @@ class Sweep:
     outputs: tuple[str, ...]
     precision: str
     validation: float
-    file_bytes: int
+    test: float
     picture: str | None
     text: str
     path: str
@@ -187,11 +196,54 @@ def load_sweep(path: Path) -> Sweep:
     return _Reader(path, text, validate_file(SweepTable, tables, text, shown_path(path))).sweep()
 
 
+def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
+    """A sweep made without a file.
+
+    Parameters
+    ----------
+    axes
+        By the key of a number of the scene: a list of values, or a table as an [[axis]] of a sweep file has it.
+    options
+        The other keys of a sweep file, such as samples, outputs, draws or validation.
+
+    Raises
+    ------
+    InputError
+        With a line for each error; line numbers are those of the sweep's `text`.
+
+    Examples
+    --------
+    >>> from rotor_mbs.scenario.catalogue import find_scenes
+    >>> scene = find_scenes(["paper/fig11"])[0]
+    >>> sweep = sweep_of(scene, {"bearing.stiffness": [0, 1e3], "gravity": {"uniform": [9, 10]}}, draws=5)
+    >>> sweep.design.count, sweep.units
+    (10, ('N m/rad', 'm/s^2'))
+    """
+    tables: dict[str, object] = {"title": scene.title, "scene": scene.name, **options}
+    listed: list[dict[str, object]] = []
+    for key, values in axes.items():
+        plain = values.tolist() if isinstance(values, np.ndarray) else values
+        listed.append({"key": key, **(plain if isinstance(plain, Mapping) else {"values": plain})})
+    parts = [_toml(tables), *("\n[[axis]]\n" + _toml(axis) for axis in listed)]
+    text, tables["axis"] = "".join(parts), listed
+    return _Reader(Path("sweep"), text, validate_file(SweepTable, tables, text, "sweep"), scene).sweep()
+
+
+def _toml(table: Mapping[str, object]) -> str:
+    return "".join(f"{key} = {_toml_value(value)}\n" for key, value in table.items())
+
+
+def _toml_value(value: object) -> str:
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{json.dumps(key)} = {_toml_value(entry)}' for key, entry in value.items())}}}"
+    return json.dumps(value)
+
+
 class _Reader:
     """What the file's model cannot check: the base scene, the keys of the axes in it, and how many rows there are."""
 
-    def __init__(self, path: Path, text: str, table: SweepTable) -> None:
-        self._path, self._text, self._table = path, text, table
+    def __init__(self, path: Path, text: str, table: SweepTable, base: Scene | None = None) -> None:
+        self._path, self._text, self._table, self._given = path, text, table, base
         self._lines = find_lines(text)
 
     def sweep(self) -> Sweep:
@@ -209,7 +261,7 @@ class _Reader:
             outputs=base.outputs if table.outputs is None else tuple(table.outputs),
             precision=table.precision,
             validation=table.validation or 0.0,
-            file_bytes=int(table.file_bytes),
+            test=table.test or 0.0,
             picture=table.picture,
             text=self._text,
             path=shown_path(self._path),
@@ -221,6 +273,8 @@ class _Reader:
         return f"{shown_path(self._path)}:{line_of(self._lines, key)}: {message}"
 
     def _base(self) -> Scene:
+        if self._given is not None:
+            return self._given
         asked = self._table.scene
         is_shipped = (scenarios_folder() / f"{asked}.toml").is_file()
         try:

@@ -118,9 +118,10 @@ def _sobol(axes: Sequence[Axis], seed: int) -> dict[str, Array]:
     return {axis.key: points[:, i] for i, axis in enumerate(chosen)}
 
 
-def validation_rows(count: int, share: float, seed: int) -> NDArray[np.int8]:
-    """(count,) 1 for the rows set aside for validation, `share` of them to the nearest one, drawn by `seed`."""
-    chosen = np.random.default_rng([seed, 2**32]).permutation(count)[: round(share * count)]
-    marks = np.zeros(count, np.int8)
-    marks[chosen] = 1
-    return marks
+def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
+    """(count,) 0 for training, 1 for validation, 2 for testing; shares to the nearest row, rows drawn by `seed`."""
+    drawn = np.random.default_rng([seed, 2**32]).permutation(count)
+    first, second = round(validation * count), round(validation * count) + round(test * count)
+    codes = np.zeros(count, np.int8)
+    codes[drawn[:first]], codes[drawn[first:second]] = 1, 2
+    return codes

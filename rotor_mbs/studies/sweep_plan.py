@@ -17,7 +17,7 @@ from rotor_mbs.execution.environment import machine, numerics_fingerprint, versi
 from rotor_mbs.methods.catalogue import check_names, find_method
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.scenario.sweep_design import validation_rows
+from rotor_mbs.scenario.sweep_design import split_rows
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.store.sweep_layout import SweepLayout
 from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk
@@ -51,7 +51,9 @@ class SweepPlan:
     @cached_property
     def layout(self) -> SweepLayout:
         sweep = self.sweep
-        splits = validation_rows(self.rows, sweep.validation, sweep.design.seed) if sweep.validation else None
+        splits = None
+        if sweep.validation or sweep.test:
+            splits = split_rows(self.rows, sweep.validation, sweep.test, sweep.design.seed)
         return SweepLayout(
             identity=self._identity(),
             attributes=self._attributes(),
@@ -121,7 +123,7 @@ class SweepPlan:
             dict(sweep.settings),
             sweep.outputs,
             sweep.precision,
-            sweep.validation,
+            [sweep.validation, sweep.test],
             sweep.design.seed,
             [self.first, self.last],
             versions(),
@@ -144,6 +146,7 @@ class SweepPlan:
             "shape": json.dumps(sweep.design.shape),
             "seed": sweep.design.seed,
             "validation_share": sweep.validation,
+            "test_share": sweep.test,
             "settings": json.dumps(dict(sweep.settings), sort_keys=True),
             "runs_of_all_parts": self.rows * len(self.methods),
             **versions(),

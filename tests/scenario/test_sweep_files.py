@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import list_scenes
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.resources import sweeps_folder
 from rotor_mbs.scenario.scene_file import scene_tables
-from rotor_mbs.scenario.sweep import Sweep, load_sweep
-from rotor_mbs.scenario.sweep_design import Axis, Design, validation_rows
+from rotor_mbs.scenario.sweep import Sweep, load_sweep, sweep_of
+from rotor_mbs.scenario.sweep_design import Axis, Design, split_rows
 from rotor_mbs.scenario.variants import Variants, parse_key, put_value, unit_of
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
@@ -69,11 +69,32 @@ def test_draws_have_the_distribution_that_was_asked_for() -> None:
     assert np.histogram(sobol, 4096, (2.0, 3.0))[0].tolist() == [1] * 4096
 
 
-def test_the_share_for_validation_is_exact_and_drawn() -> None:
-    marks = validation_rows(1000, 0.2, 3)
-    assert marks.sum() == 200
-    assert not marks[:200].all()
-    assert (marks != validation_rows(1000, 0.2, 4)).any()
+def test_the_shares_for_validation_and_test_are_exact_and_drawn() -> None:
+    codes = split_rows(1000, 0.2, 0.1, 3)
+    assert np.bincount(codes).tolist() == [700, 200, 100]
+    assert len(set(codes[:200].tolist())) == 3
+    assert (codes != split_rows(1000, 0.2, 0.1, 4)).any()
+    np.testing.assert_array_equal(codes == 1, split_rows(1000, 0.2, 0.0, 3) == 1)
+
+
+def test_validation_and_test_leave_rows_for_training(tmp_path: Path) -> None:
+    axis = '[[axis]]\nkey = "gravity"\nvalues = [1, 2]\n'
+    assert _load(tmp_path, f"validation = 0.5\ntest = 0.25\n{axis}").test == 0.25
+    with pytest.raises(InputError, match=r"s\.toml:4: test: .* leave no rows for training; allowed: a share"):
+        _load(tmp_path, f"validation = 0.5\ntest = 0.5\n{axis}")
+
+
+def test_a_sweep_without_a_file_is_that_of_its_text(tmp_path: Path) -> None:
+    scene = find_scenes(["paper/fig11"])[0]
+    axes = {"gravity": np.array([9.0, 10.0]), "initial.angles[1]": {"linear": {"start": 0, "end": 1, "count": 3}}}
+    made = sweep_of(scene, axes, samples=21, outputs=["angles"], validation=0.5)
+    (tmp_path / "s.toml").write_text(made.text)
+    read = load_sweep(tmp_path / "s.toml")
+    assert (made.base, made.design, made.outputs, made.text) == (read.base, read.design, read.outputs, read.text)
+    with pytest.raises(InputError, match=r"sweep:.*gravitas"):
+        sweep_of(scene, {"gravitas": [1.0]})
+    with pytest.raises(InputError, match=r"sweep:.*values"):
+        sweep_of(scene, {"gravity": [float("nan")]})
 
 
 @pytest.mark.parametrize(
