@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.execution.engines import open_engine
 from rotor_mbs.execution.pool import Finished, ImportedCall, TaskPool, run_in
+from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.solution.judgement import is_held
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.sweep_columns import Rows
 from rotor_mbs.store.sweep_layout import lost_rows
@@ -40,7 +40,7 @@ class SweepResult:
     runs, made   in the dataset, and by this call
     statuses     how many runs have each status
     seconds      of this call
-    is_ok        whether every run is ok whose method claims to be right
+    is_ok        whether every run is ok whose method claims the correct equations
     """
 
     path: Path
@@ -142,9 +142,9 @@ def _hard_limit(chunk: Chunk) -> float:
 
 
 def _is_ok(plan: SweepPlan, statuses: NDArray[np.int8]) -> bool:
-    is_held_to = [is_held(method) for method in plan.methods]
+    is_corrected_by_number = [is_corrected(method) for method in plan.methods]
     failed = np.flatnonzero(statuses != code_of("ok")) + plan.first
-    return not any(is_held_to[number] for number in set((failed // plan.rows).tolist()))
+    return not any(is_corrected_by_number[number] for number in set((failed // plan.rows).tolist()))
 
 
 def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
