@@ -109,11 +109,12 @@ def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint
     metrics = np.empty(len(rows["status"]), np.dtype([(name, row[name]) for name in flat]))
     for name in flat:
         metrics[name] = rows[name]
-    arrays = [metrics, *(rows[name] for name in names if row[name].shape)]
+    arrays = [metrics.view(np.uint8), *(rows[name] for name in names if row[name].shape)]
+    arrays = [np.ascontiguousarray(array).reshape(len(metrics), -1) for array in arrays]
     found = np.empty(len(metrics), np.uint32)
     for i in range(len(found)):
         checksum = first + i & 0xFFFFFFFF
         for array in arrays:
-            checksum = zlib.crc32(array[i].tobytes(), checksum)
+            checksum = zlib.crc32(array[i], checksum)
         found[i] = checksum
     return found
