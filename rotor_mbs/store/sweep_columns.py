@@ -69,7 +69,7 @@ class RunColumns:
                 found[runs] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
         return found
 
-    def forget(self, runs: NDArray[np.int64]) -> None:
+    def mark_missing(self, runs: NDArray[np.int64]) -> None:
         """Makes runs missing. Raises StoreError."""
         with self._opened(os.O_WRONLY) as file:
             for run in runs.tolist():

@@ -99,7 +99,7 @@ class SweepDataset:
         inode = self.path.stat().st_ino
         self.columns = RunColumns(self.path, inode, self._layout.first, offsets, row)
         self.statuses = self.columns.stored(len(self.statuses))
-        self.columns.forget(self._layout.first + np.flatnonzero(marked & (self.statuses == MISSING)))
+        self.columns.mark_missing(self._layout.first + np.flatnonzero(marked & (self.statuses == MISSING)))
 
     def _release(self) -> None:
         with suppress(OSError):

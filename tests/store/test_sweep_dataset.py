@@ -129,7 +129,7 @@ def test_columns_written_without_their_status_do_not_count(tmp_path: Path) -> No
     layout, path = _layout(), tmp_path / "s.h5"
     with SweepDataset(path, layout) as dataset:
         _fill(dataset, layout, [0, 4])
-        dataset.columns.forget(np.array([5]))
+        dataset.columns.mark_missing(np.array([5]))
     with SweepDataset(path, layout) as dataset:
         assert dataset.missing() == [(5, 6), (8, _RUNS)]
 
