@@ -5,7 +5,6 @@ Importing this module costs 0.2 s (pydantic).
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import scene_tables
 from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
 from rotor_mbs.scenario.sweep_design import Axis, Design
-from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path
+from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path, toml_value
 from rotor_mbs.scenario.validation import Line, Number, Table, invalid, validate_file
 from rotor_mbs.scenario.variants import KEY_FORM, Variants, is_key, parse_key, unit_of
 
@@ -230,13 +229,7 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
 
 
 def _toml(table: Mapping[str, object]) -> str:
-    return "".join(f"{key} = {_toml_value(value)}\n" for key, value in table.items())
-
-
-def _toml_value(value: object) -> str:
-    if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{json.dumps(key)} = {_toml_value(entry)}' for key, entry in value.items())}}}"
-    return json.dumps(value)
+    return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
 class _Reader:
