@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.outputs import ENTRY_POINT_GROUP
 from rotor_mbs.scenario.scene import Scene
 
 Array = NDArray[np.float64]
-
-ENTRY_POINTS = "rotor_mbs.quantities"
 
 
 class Samples(Protocol):
@@ -223,11 +222,11 @@ def find_quantity(name: str, outputs: Iterable[str] = ()) -> Quantity | None:
 @functools.cache
 def installed(output: str) -> tuple[Quantity, ...]:
     """What the entry point called `output` brings."""
-    found = entry_points(group=ENTRY_POINTS, name=output)
+    found = entry_points(group=ENTRY_POINT_GROUP, name=output)
     if not found:
         raise InputError(
             f"unknown output {output!r}; allowed: {', '.join(sorted(_OUTPUTS - {''}))}, or the name of an entry point "
-            f"in the group {ENTRY_POINTS}"
+            f"in the group {ENTRY_POINT_GROUP}"
         )
     point = next(iter(found))
     where = f"output {output!r}, from {point.value}"

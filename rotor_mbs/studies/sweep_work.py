@@ -13,6 +13,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.models.lagrange.ensemble_samples import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
@@ -152,7 +153,7 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     rows = empty_rows(len(scenes), chunk.row, METRICS)
     for name in chunk.row.names or ():
         if name not in rows:
-            values = errors if name == "energy_error" else getattr(block, name)
+            values = errors if name == "energy_error" else _quantity(block, scenes, name)
             rows[name] = np.ascontiguousarray(values, chunk.row[name].base)
     rows["status"][ok] = code_of("ok")
     rows["energy_drift_max"] = drifts
@@ -163,3 +164,15 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         run = Solution(scenes[i], chunk.method, block.trajectory(i), block.words[i], settings.as_dict())
         _put_verdict(rows, i, scenes[i], run)
     return rows
+
+
+def _quantity(block: Block, scenes: Sequence[Scene], name: str) -> Array:
+    """(runs, samples, ...) of a quantity: the block's own, or its producer's of each run; NaN after a run broke off."""
+    values: Array | None = getattr(block, name, None)
+    if values is None:
+        runs = enumerate(scenes)
+        made = [Solution(scene, ENSEMBLE_METHOD, block.trajectory(i), block.words[i])[name] for i, scene in runs]
+        values = np.full((len(scenes), scenes[0].samples, *made[0].shape[1:]), np.nan)
+        for row, found in zip(values, made, strict=True):
+            row[: len(found)] = found
+    return values
