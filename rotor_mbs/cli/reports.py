@@ -1,4 +1,4 @@
-"""`report`, and the report at the end of `reproduce`: HTML pages from a results file, with no model loaded."""
+"""`report`, `figures` and `animate`: pages and pictures from a results file; no model is loaded."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ import os
 from pathlib import Path
 
 from rotor_mbs.execution.environment import fingerprint
-from rotor_mbs.report.build import write_report
-from rotor_mbs.report.core.files import INDEX
-from rotor_mbs.report.pages.bench import write_bench_report
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.records import read_records
@@ -20,9 +17,28 @@ _STAMP = ".made-from"
 
 def report(arguments: argparse.Namespace) -> int:
     """Pages from `arguments.file` into `arguments.output`."""
+    from rotor_mbs.report.build import write_report
+    from rotor_mbs.report.pages.bench import write_bench_report
+
     print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
     if read_records(arguments.file, "bench"):
         print(write_bench_report(arguments.file, arguments.output / "bench"))
+    return 0
+
+
+def figures(arguments: argparse.Namespace) -> int:
+    """The paper's figures as files for a manuscript into `arguments.output`."""
+    from rotor_mbs.report.manuscript import write_figures
+
+    print(*write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ()), sep="\n")
+    return 0
+
+
+def animate(arguments: argparse.Namespace) -> int:
+    """`arguments.scene` of `arguments.file`, moving, into `arguments.output`."""
+    from rotor_mbs.report.animation import write_animation
+
+    print(write_animation(arguments.file, arguments.scene, arguments.output, arguments.offset))
     return 0
 
 
@@ -31,6 +47,9 @@ def render_if_changed(results: Path, output: Path, jobs: int) -> Path:
 
     Raises StoreError.
     """
+    from rotor_mbs.report.build import write_report
+    from rotor_mbs.report.core.files import INDEX
+
     made_from = _digest(results)
     stamp = output / _STAMP
     if not (stamp.is_file() and stamp.read_text() == made_from and (output / INDEX).is_file()):

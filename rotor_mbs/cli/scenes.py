@@ -1,4 +1,4 @@
-"""`list` and `show`: the scenes, and what each model would build for one."""
+"""`list`, `show` and `new`: the scenes, what each model would build for one, and a file for one of your own."""
 
 from __future__ import annotations
 
@@ -27,8 +27,21 @@ def list_all(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def new(arguments: argparse.Namespace) -> int:
+    """A commented scene file; never in the place of another file."""
+    from rotor_mbs.scenario.scene_file import new_scene_text
+
+    try:
+        with arguments.file.open("x", encoding="utf-8") as file:
+            file.write(new_scene_text())
+    except OSError as exc:
+        raise InputError(f"{arguments.file}: cannot be created: {exc.strerror}") from exc
+    print(f"{arguments.file}: edit it, then: rotor-mbs run {arguments.file}")
+    return 0
+
+
 def show(arguments: argparse.Namespace) -> int:
-    """One scene's data, then the items of each model."""
+    """One scene's data and the methods of each model; with --build its items."""
     found = find_scenes([arguments.scene])
     if len(found) != 1:
         raise InputError(f"{arguments.scene}: {len(found)} scenes; allowed: one scene's name or file")
@@ -45,7 +58,7 @@ def show(arguments: argparse.Namespace) -> int:
         print(f"\n{model.name}  ({', '.join(model.methods)})")
         if model.refused:
             print(f"  cannot represent this scene: {model.refused}")
-        for item in model.items:
+        for item in model.items if arguments.build else ():
             print(f"  {item.kind:9} {item.name:28} {item.detail}".rstrip())
     return 0
 

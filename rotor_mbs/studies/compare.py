@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
+import weakref
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.errors import MethodRefusal
@@ -42,8 +43,6 @@ class Comparison:
     scene: Scene
     file: Path
     rows: tuple[ComparedRun, ...]
-    # Where no output was asked for, the file is removed with the last reference to this object.
-    _folder: Any = field(default=None, repr=False, compare=False)
 
     def solutions(self) -> dict[str, Solution]:
         """The runs with their samples, by method; those without any sample are left out."""
@@ -66,7 +65,7 @@ def compare(
     """The scene by several methods and its reference, each computed unless `output` has it already.
 
     methods      by name; where none is named, those that the rule selects for the scene
-    output       results file; a temporary one where it is None
+    output       results file; None: a temporary one, removed with the last reference to what is returned
     settings     of every method, in place of its defaults
     workers      parallel processes; 0: all in this process
     timeout_s    a run over this ends itself with the status timed_out
@@ -77,10 +76,18 @@ def compare(
     chosen, reasons = (asked_methods([scene], check_names(methods)), []) if methods else selected_methods([scene])
     if not chosen[scene.name]:
         raise MethodRefusal("; ".join(reasons))
-    folder = tempfile.TemporaryDirectory() if output is None else None
-    path = output or Path(folder.name if folder else "") / "compare.h5"
-    run_scenes([scene], chosen, path, workers=workers, timeout_s=timeout_s, settings=settings, on_progress=on_progress)
-    return Comparison(scene, path, _rows(path, scene, chosen[scene.name]), folder)
+    if output is None:
+        folder = Path(tempfile.mkdtemp(prefix="rotor-mbs-"))
+        found = compare(
+            scene, methods, folder / "compare.h5", settings=settings, workers=workers, timeout_s=timeout_s,
+            on_progress=on_progress,
+        )  # fmt: skip
+        weakref.finalize(found, shutil.rmtree, folder)
+        return found
+    run_scenes(
+        [scene], chosen, output, workers=workers, timeout_s=timeout_s, settings=settings, on_progress=on_progress
+    )
+    return Comparison(scene, output, _rows(output, scene, chosen[scene.name]))
 
 
 def _rows(path: Path, scene: Scene, methods: Sequence[str]) -> tuple[ComparedRun, ...]:

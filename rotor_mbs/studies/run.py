@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method,
 from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
@@ -87,6 +87,43 @@ def run_scenes(
     return RunReport(made, len(cases) - len(made))
 
 
+def solve_judged(
+    scene: Scene,
+    method: str,
+    settings: Mapping[str, object] | None = None,
+    *,
+    compute_reference: bool = False,
+    time_limit_s: float = float("inf"),
+) -> Solution:
+    """One run in this process, with status, message and metrics; nothing is stored.
+
+    It is judged against the shipped reference of the scene. Where there is none, one is computed with
+    `compute_reference`, which can take much longer than the run; else energy and constraints alone decide.
+
+    Raises InputError for an unknown method or setting, MethodRefusal where the method cannot represent the scene.
+
+    Examples
+    --------
+    >>> from rotor_mbs.scenario.catalogue import find_scenes
+    >>> run = solve_judged(find_scenes(["paper/fig03"])[0], "lagrange/dop853")
+    >>> run.status, run.metrics["angle_error_max"] < 1e-9
+    ('ok', True)
+    """
+    reference = None
+    number = scene_hash(scene)
+    if frozen_file(number) is not None:
+        reference = frozen_solution(scene, number)[0].trajectory
+    elif compute_reference:
+        reference = solve(REFERENCE, scene, {}).trajectory
+    try:
+        run = solve(method, scene, settings or {}, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
+    except OutOfTimeError as exc:
+        run = _without_samples(scene, method, str(exc), settings or {})
+        return replace(run, status="timed_out", message=str(exc))
+    judgement = judge(scene, run, reference)
+    return replace(run, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
+
+
 def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
     """The reference of a scene: the shipped one, where there is one and it may be used, or one to be computed."""
     case = Case(scene, REFERENCE)
@@ -135,12 +172,16 @@ def perform_run(job: Job) -> Result:
 def store_failure(job: Job, status: str, message: str) -> Result:
     """Stores a run that left no samples."""
     case = job.case
-    columns = 1 + len(case.scene.blades)
-    trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
-    run = Solution(case.scene, case.method, trajectory, Integration(False, message), dict(case.settings))
+    run = _without_samples(case.scene, case.method, message, case.settings)
     attributes = {"status": status, "message": message, "false_success": False, "run_hash": case.key}
     write_run(job.part, case.scene_hash, run, attributes)
     return Result(status, message)
+
+
+def _without_samples(scene: Scene, method: str, message: str, settings: Mapping[str, object]) -> Solution:
+    columns = 1 + len(scene.blades)
+    trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
+    return Solution(scene, method, trajectory, Integration(False, message), dict(settings))
 
 
 def _store_time_out(job: Job, message: str) -> Result:

@@ -56,11 +56,33 @@ def test_list_and_show(tmp_path: Path) -> None:
     listed = rotor_mbs("list", cwd=tmp_path)
     assert listed.returncode == 0
     assert "paper/fig11" in listed.stdout
-    shown = rotor_mbs("show", "paper/fig15-1kNm", cwd=tmp_path)
+    shown = rotor_mbs("show", "paper/fig15-1kNm", "--build", cwd=tmp_path)
     assert shown.returncode == 0
     assert "rotor torque" in shown.stdout
     assert "exudyn_chain" in shown.stdout
-    assert "rotor torque" not in rotor_mbs("show", "paper/fig05", cwd=tmp_path).stdout
+    assert "rotor torque" not in rotor_mbs("show", "paper/fig05", "--build", cwd=tmp_path).stdout
+    assert "(exudyn_chain/generalized_alpha" in rotor_mbs("show", "paper/fig05", cwd=tmp_path).stdout
+
+
+def test_a_new_scene_file_runs_and_replaces_no_other(tmp_path: Path) -> None:
+    assert rotor_mbs("new", "mine.toml", cwd=tmp_path).returncode == 0
+    assert rotor_mbs("show", "mine.toml", cwd=tmp_path).returncode == 0
+    again = rotor_mbs("new", "mine.toml", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "File exists" in again.stderr
+
+
+def test_settings_are_stored_and_unknown_ones_refused(tmp_path: Path, quick: Path) -> None:
+    command = ("run", quick, "-m", "lagrange/dop853", "-o", "r.h5", "--set")
+    assert rotor_mbs(*command, "relative_tolerance=1e-6", cwd=tmp_path).returncode == 1  # inaccurate
+    with open_results(tmp_path / "r.h5") as results:
+        assert results.scenes["quick"].runs["lagrange/dop853"].settings["relative_tolerance"] == 1e-6
+    assert "1 runs made" in rotor_mbs(*command, "relative_tolerance=1e-7", cwd=tmp_path).stdout
+    for wrong, says in (("tolerence=1e-3", "tolerence"), ("relative_tolerance=-1", "-1"), ("x", "NAME=VALUE")):
+        refused = rotor_mbs(*command, wrong, cwd=tmp_path)
+        assert refused.returncode == 2
+        assert says in refused.stderr
+        assert len(refused.stderr.splitlines()) == 1
 
 
 def test_run_writes_every_run_and_a_second_one_has_nothing_to_do(tmp_path: Path, quick: Path) -> None:
