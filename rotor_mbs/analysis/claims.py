@@ -24,7 +24,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ClaimResult:
     """The result for one model. holds: None where the file cannot decide; ended_early: scenes whose run did."""
 
     holds: bool | None
@@ -38,8 +38,8 @@ class Claim:
     """A number or claim of the paper with the results of the printed and of the corrected model."""
 
     published: Published
-    printed: Outcome
-    corrected: Outcome
+    printed: ClaimResult
+    corrected: ClaimResult
 
     @property
     def is_decided(self) -> bool:
@@ -69,13 +69,13 @@ class _Runs:
         return None if run is None else measure(run, asked)
 
 
-def _outcome(item: Published, runs: _Runs) -> Outcome:
+def _outcome(item: Published, runs: _Runs) -> ClaimResult:
     early = tuple(sorted(scene for scene in item.scenes if _ended_early(runs.of(scene))))
     if item.of is not None:
         value = runs.value(item.of)
-        return Outcome(None if value is None else rounds_to(value, item.value, item.decimals), value, (), early)
+        return ClaimResult(None if value is None else rounds_to(value, item.value, item.decimals), value, (), early)
     readings = tuple(_read(test, runs) for test in item.tests)
-    return Outcome(_all_hold(readings), None, readings, early)
+    return ClaimResult(_all_hold(readings), None, readings, early)
 
 
 def rounds_to(value: float, printed: float, decimals: int) -> bool:

@@ -22,7 +22,7 @@ from rotor_mbs.report.pages.walk import WalkFigure, WalkPage
 from rotor_mbs.scenario.names import natural_order
 from rotor_mbs.store.read import Results, StoredScene, open_results
 
-_PARTS = 2  # per worker
+_BATCHES = 2  # per worker
 _TIMEOUT_S = 600.0
 
 
@@ -41,7 +41,7 @@ class Context:
 
 
 @dataclass(frozen=True)
-class Part:
+class PageBatch:
     """Some scenes and some figures of the paper, to be rendered by one task."""
 
     scenes: tuple[str, ...]
@@ -99,15 +99,15 @@ def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
 def _render(context: Context, figures: tuple[str, ...], jobs: int) -> Rendered:
     """All scenes and figures, in `jobs` processes (in this one where it is 1)."""
     workers = min(jobs, len(context.files) + len(figures))
-    work = partial(render_part, context)
+    work = partial(render_batch, context)
     scenes = tuple(context.files)
     if workers <= 1:
-        return work(Part(scenes, figures))
-    # More parts than workers, so that none waits long for the last one; each part opens the file.
-    count = _PARTS * workers
-    parts = [Part(scenes[start::count], figures[start::count]) for start in range(count)]
+        return work(PageBatch(scenes, figures))
+    # More batches than workers, so that none waits long for the last one; each batch opens the file.
+    count = _BATCHES * workers
+    batches = [PageBatch(scenes[start::count], figures[start::count]) for start in range(count)]
     found = Rendered({}, [])
-    for finished in run_tasks(work, parts, workers, _TIMEOUT_S):
+    for finished in run_tasks(work, batches, workers, _TIMEOUT_S):
         if finished.value is None:
             raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")
         found.pages.update(finished.value.pages)
@@ -115,7 +115,7 @@ def _render(context: Context, figures: tuple[str, ...], jobs: int) -> Rendered:
     return found
 
 
-def render_part(context: Context, part: Part) -> Rendered:
+def render_batch(context: Context, batch: PageBatch) -> Rendered:
     """The task of a worker. Raises StoreError."""
     from rotor_mbs.report.pages.scene import scene_page  # late: matplotlib, in the workers alone
     from rotor_mbs.report.pages.walk import walk_figure
@@ -124,7 +124,7 @@ def render_part(context: Context, part: Part) -> Rendered:
     neighbours = dict(zip(names, zip(["", *names], [*names[1:], ""], strict=False), strict=True))
     found = Rendered({}, [])
     with open_results(context.results) as opened:
-        for name in part.scenes:
+        for name in batch.scenes:
             previous, following = (context.files.get(other, "") for other in neighbours[name])
             own = [claim for claim in context.claims if name in claim.published.scenes]
             page = scene_page(
@@ -133,6 +133,6 @@ def render_part(context: Context, part: Part) -> Rendered:
             )  # fmt: skip
             found.pages[name] = render("scene", page)
         for figure in paper_figures.available(opened.scenes):
-            if figure.number in part.figures:
+            if figure.number in batch.figures:
                 found.figures.append(walk_figure(figure, opened.scenes, context.claims, context.files))
     return found

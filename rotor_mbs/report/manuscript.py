@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.paper_figures import HEADINGS, PATHS, PaperFigure, available, draw, legend, panel_runs
+from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import StoredScene, open_results
 
 
@@ -26,7 +27,9 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
             allowed = ", ".join(have) or "none: it has no scene of the paper"
             raise InputError(f"{results}: figure {', '.join(unknown) or 'of the paper'}: not in it; allowed: {allowed}")
         made = {f"fig{int(n):02d}.{kind}": canvas.encoded(composed(have[n], opened.scenes).figure, kind) for n in asked}
-    return [_written(folder / name, content) for name, content in made.items()]
+    for name, content in made.items():
+        replace_file(folder / name, content)
+    return [folder / name for name in made]
 
 
 def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
@@ -59,12 +62,3 @@ def _tidy(table: list[list[Any]], letters: list[str]) -> None:
                 axes.set_ylabel("")
     for row, letter in zip(table, letters, strict=False):
         row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
-
-
-def _written(path: Path, content: bytes) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    except OSError as exc:
-        raise StoreError(f"{path}: cannot be written: {exc.strerror or exc}") from exc
-    return path

@@ -22,6 +22,7 @@ from rotor_mbs.report.plots.time_histories import Motion, Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store.hdf5 import replace_file
 
 
 @dataclass(frozen=True)
@@ -34,13 +35,13 @@ class Drawing:
         return canvas.svg_text(self.figure)
 
     def save(self, path: str | Path) -> None:
-        """As PDF, SVG or PNG, by the ending of `path`."""
+        """As PDF, SVG or PNG, by the ending of `path`. Raises InputError for another one, StoreError."""
         kind = Path(path).suffix.removeprefix(".")
         if kind not in canvas.KINDS:
             raise InputError(
                 f"{path}: no such kind of picture; allowed: a name that ends in .{', .'.join(canvas.KINDS)}"
             )
-        Path(path).write_bytes(canvas.encoded(self.figure, kind))
+        replace_file(Path(path), canvas.encoded(self.figure, kind))
 
 
 class RunPlots:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from pathlib import Path
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.store.hdf5 import replace_file
 
 GENERATOR = "rotor_mbs report"
 INDEX, ERRATA, WALK = "index.html", "errata.html", "figures.html"
@@ -42,23 +41,12 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in pages.items():
-            _replace(folder / name, text)
+            replace_file(folder / name, text.encode("utf-8"))
         for old in folder.glob("*.html"):
             if old.name not in pages and _is_ours(old):
                 old.unlink()
     except OSError as exc:
         raise StoreError(f"{folder}: the report cannot be written: {exc.strerror or exc}") from exc
-
-
-def _replace(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-        temporary.replace(path)
-    except OSError:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
 
 
 def _is_ours(path: Path) -> bool:

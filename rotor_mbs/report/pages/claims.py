@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from rotor_mbs.analysis.claims import Claim, Outcome, Reading
+from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
 from rotor_mbs.analysis.published import TrajectoryNumber
 from rotor_mbs.report.core.elements import PageTable, TableCell
 from rotor_mbs.report.core.numbers import fixed, number, quantity
@@ -85,7 +85,7 @@ def _verdict(holds: bool | None, yes: str, no: str) -> TableCell:
     return TableCell(yes if holds else no, tone="good" if holds else "bad")
 
 
-def _evidence(outcome: Outcome) -> str:
+def _evidence(outcome: ClaimResult) -> str:
     """The reading that decides: the first that fails, or the first of all where none does."""
     failed = [reading for reading in outcome.readings if reading.holds is False]
     shown = failed or list(outcome.readings)
