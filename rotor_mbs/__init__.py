@@ -5,7 +5,7 @@ The Python API. Everything is loaded when it is first used: importing this packa
     scenes, scene, load      names of the shipped scenes; one of them; a scene of one's own from a TOML file
     run                      one scene by one method: a `Run`
     compare                  one scene by several methods, against its reference: a `Comparison`
-    sweep                    one scene over the values of its parameters: a `Sweep`
+    sweep                    one scene over the values of its parameters: a `SweepData`
     open                     a results file: runs by their path; the dataset of a sweep
 
 Examples
@@ -28,12 +28,14 @@ if TYPE_CHECKING:
     from rotor_mbs.api import Comparison as Comparison
     from rotor_mbs.api import ResultsTree as ResultsTree
     from rotor_mbs.api import Run as Run
+    from rotor_mbs.api import SweepData as SweepData
     from rotor_mbs.api import compare as compare
     from rotor_mbs.api import load as load
     from rotor_mbs.api import open as open
     from rotor_mbs.api import run as run
     from rotor_mbs.api import scene as scene
     from rotor_mbs.api import scenes as scenes
+    from rotor_mbs.api import sweep as sweep
     from rotor_mbs.errors import InputError as InputError
     from rotor_mbs.errors import MethodRefusal as MethodRefusal
     from rotor_mbs.errors import RotorError as RotorError
@@ -43,7 +45,19 @@ if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene as Scene
 
 _PLACES = {
-    "rotor_mbs.api": ("Comparison", "ResultsTree", "Run", "compare", "load", "open", "run", "scene", "scenes"),
+    "rotor_mbs.api": (
+        "Comparison",
+        "ResultsTree",
+        "Run",
+        "SweepData",
+        "compare",
+        "load",
+        "open",
+        "run",
+        "scene",
+        "scenes",
+        "sweep",
+    ),
     "rotor_mbs.errors": ("InputError", "MethodRefusal", "RotorError", "StoreError"),
     "rotor_mbs.methods.base": ("Method",),
     "rotor_mbs.scenario.scene": ("Blade", "Scene"),

@@ -18,19 +18,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor_mbs.analysis.rehydrate import rehydrate
-from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.methods.catalogue import REFERENCE, check_names, default_methods
-from rotor_mbs.methods.solve import solve
+from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
-from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
-from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import compare as metrics_of
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
-from rotor_mbs.studies.frozen import frozen_file, frozen_solution
-from rotor_mbs.studies.run import able_methods, asked_methods, run_scenes
+from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
@@ -106,19 +103,8 @@ def run(
     >>> run.metrics["angle_error_max"] < 1e-9   # rad, against the reference, up to the scene's horizon
     True
     """
-    exact = _reference(scene, compute=reference)
-    found = _with_reference(solve(method, scene, settings, time_limit_s=timeout), exact)
-    judgement = judge(scene, found, exact)
-    found.status, found.message, found.metrics = judgement.status, judgement.message, judgement.metrics
-    return found
-
-
-def _reference(scene: Scene, *, compute: bool) -> Trajectory | None:
-    """The shipped reference of the scene's numbers; else a computed one, where that is asked for."""
-    number = scene_hash(scene)
-    if frozen_file(number) is not None:
-        return frozen_solution(scene, number)[0].trajectory
-    return solve(REFERENCE, scene, {}).trajectory if compute else None
+    found, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
+    return _with_reference(found, exact)
 
 
 @dataclass
@@ -226,7 +212,7 @@ def compare(
 
     Parameters
     ----------
-    methods : names; the default set where none is given, without those that cannot represent the scene.
+    methods : names; where none is given, those that the selection rule takes for such a scene.
     workers : parallel processes; 0 runs everything in this process. In a script, processes need the usual
         `if __name__ == "__main__":`.
     timeout : s, for each run.
@@ -236,6 +222,8 @@ def compare(
     ------
     InputError
         For an unknown method or setting, and for a method that was named and cannot represent the scene.
+    MethodRefusal
+        Where no method is named and the scene has no motion to be followed.
 
     Examples
     --------
@@ -248,7 +236,10 @@ def compare(
     0.7853981633974483
     """
     named = check_names(methods)
-    able = asked_methods([scene], named)[scene.name] if named else able_methods(scene, default_methods())[0]
+    chosen, reasons = (asked_methods([scene], named), []) if named else selected_methods([scene])
+    able = chosen[scene.name]
+    if not able:
+        raise MethodRefusal("; ".join(reasons))
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "comparison.h5"
     run_scenes([scene], {scene.name: able}, path, workers=workers, timeout_s=timeout, settings=settings)
     with open_results(path) as results:
@@ -256,6 +247,85 @@ def compare(
         runs = {name: _loaded(stored, stored.runs[name]) for name in able}
     reference = next(iter(runs.values())).reference if runs else None
     return Comparison(scene, runs, reference, path)
+
+
+def sweep(
+    scene: Scene,
+    parameters: Mapping[str, object],
+    *,
+    methods: Sequence[str] = ("lagrange/taylor",),
+    output: str | os.PathLike[str] | None = None,
+    workers: int = 1,
+    timeout: float = 60.0,
+    **options: object,
+) -> SweepData:
+    """One scene over all combinations of the values of its parameters, in worker processes, into one dataset.
+
+    In a script, the processes need the usual `if __name__ == "__main__":`.
+
+    Parameters
+    ----------
+    parameters : by the key of a number in a scene file, such as "bearing.stiffness" or "initial.angles[1]": a list of
+        values, or a table as an [[axis]] of a sweep file has it, such as `{"uniform": [0.0, 1.0]}`.
+    output : the dataset's file, from which the same call continues after an interruption; a temporary one where it is
+        left out.
+    workers : parallel processes.
+    timeout : s, for each run.
+    **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation, settings, ...
+
+    Raises
+    ------
+    InputError
+        For a key, value or option that is not allowed, or an output that holds something else.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
+    >>> data = rm.sweep(scene, {"bearing.stiffness": [0.0, 1e3, 1e4]}, methods=["lagrange/dop853"], samples=11)
+    >>> data.statuses
+    {'ok': 3}
+    >>> data.to_xarray().angles.dims
+    ('run', 'time', 'coordinate')
+    """
+    from rotor_mbs.scenario.sweep import sweep_of
+    from rotor_mbs.studies.sweep import run_sweep
+
+    study = sweep_of(scene, parameters, methods=list(methods), **options)
+    path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
+    result = run_sweep(study, path, workers=workers, timeout_s=timeout)
+    data = SweepData(path, dict(result.statuses))
+    if output is None:
+        weakref.finalize(data, shutil.rmtree, path.parent, ignore_errors=True)
+    return data
+
+
+@dataclass(eq=False)
+class SweepData:
+    """The dataset of a sweep.
+
+    Attributes
+    ----------
+    path : of the file.
+    statuses : how many runs have each status.
+    """
+
+    path: Path
+    statuses: dict[str, int]
+
+    def column(self, name: str) -> Any:
+        """An array whole, such as "status", "pitch_max" or "angles": one row for each run. Raises StoreError."""
+        from rotor_mbs.store.sweep_read import StoredSweep
+
+        return StoredSweep(self.path).column(name)
+
+    def to_xarray(self) -> Any:
+        """The dataset as an xarray.Dataset, opened lazily: one variable for each parameter, with its unit."""
+        return need_xarray().open_dataset(self.path)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
+        return f"{self.path}: {sum(self.statuses.values())} runs: {counts}"
 
 
 def open(path: str | os.PathLike[str]) -> ResultsTree:

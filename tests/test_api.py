@@ -130,3 +130,19 @@ def test_what_was_not_asked_for_is_refused_by_name(tmp_path: Path) -> None:
         run.plot().save(tmp_path / "motion.bmp")
     run.plot().save(tmp_path / "motion.png")
     assert (tmp_path / "motion.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> None:
+    scene = rm.scene("paper/fig08").replace(**SHORT)
+    values = [0.0, 1e3, 1e4]
+    data = rm.sweep(
+        scene, {"bearing.stiffness": values}, methods=["lagrange/dop853"], samples=11, output=tmp_path / "stiffness.h5"
+    )
+    table = data.to_xarray()
+    assert table.bearing_stiffness.values.tolist() == values
+    assert table.bearing_stiffness.attrs["units"] == "N m/rad"
+    for i, stiffness in enumerate(values):
+        single = rm.run(scene.replace(samples=11, **{"bearing.stiffness": stiffness}), "lagrange/dop853")
+        np.testing.assert_array_equal(data.column("angles")[i], single.angles)
+    with pytest.raises(rm.InputError, match=r"bearing\.stifness"):
+        rm.sweep(scene, {"bearing.stifness": values})

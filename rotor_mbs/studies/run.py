@@ -94,8 +94,8 @@ def solve_judged(
     *,
     compute_reference: bool = False,
     time_limit_s: float = float("inf"),
-) -> Solution:
-    """One run in this process, with status, message and metrics; nothing is stored.
+) -> tuple[Solution, Trajectory | None]:
+    """One run in this process, with status, message and metrics, and the reference it was judged by; stores nothing.
 
     It is judged against the shipped reference of the scene. Where there is none, one is computed with
     `compute_reference`, which can take much longer than the run; else energy and constraints alone decide.
@@ -105,7 +105,7 @@ def solve_judged(
     Examples
     --------
     >>> from rotor_mbs.scenario.catalogue import find_scenes
-    >>> run = solve_judged(find_scenes(["paper/fig03"])[0], "lagrange/dop853")
+    >>> run, reference = solve_judged(find_scenes(["paper/fig03"])[0], "lagrange/dop853")
     >>> run.status, run.metrics["angle_error_max"] < 1e-9
     ('ok', True)
     """
@@ -119,9 +119,9 @@ def solve_judged(
         run = solve(method, scene, settings or {}, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
     except OutOfTimeError as exc:
         run = _without_samples(scene, method, str(exc), settings or {})
-        return replace(run, status="timed_out", message=str(exc))
+        return replace(run, status="timed_out", message=str(exc)), reference
     judgement = judge(scene, run, reference)
-    return replace(run, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
+    return replace(run, status=judgement.status, message=judgement.message, metrics=judgement.metrics), reference
 
 
 def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
