@@ -22,7 +22,7 @@ class OutOfTimeError(Exception):
 class _State:
     end = math.inf
     polled = False
-    told = False
+    reported = False
 
 
 @contextmanager
@@ -32,7 +32,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     if math.isinf(seconds):
         yield
         return
-    _State.end, _State.told = time.monotonic() + seconds, False
+    _State.end, _State.reported = time.monotonic() + seconds, False
     if usable:
         before = signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, seconds)
@@ -42,12 +42,12 @@ def time_limit(seconds: float) -> Iterator[None]:
         if usable:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, before)
-        _State.end, _State.told = math.inf, False
+        _State.end, _State.reported = math.inf, False
 
 
 def _interrupt(_number: int, _frame: object) -> None:
-    if not (_State.polled or _State.told):
-        raise OutOfTimeError(words())
+    if not (_State.polled or _State.reported):
+        raise OutOfTimeError(message())
 
 
 @contextmanager
@@ -66,11 +66,11 @@ def is_set() -> bool:
 
 
 def is_over() -> bool:
-    """Whether the limit is reached; who has been told so is not interrupted any more by a signal that comes late."""
-    _State.told = _State.told or time.monotonic() > _State.end
-    return _State.told
+    """Whether the limit is reached; once it has been reported, a late signal interrupts no more."""
+    _State.reported = _State.reported or time.monotonic() > _State.end
+    return _State.reported
 
 
-def words() -> str:
-    """What is said of a run that was ended so."""
+def message() -> str:
+    """The message of a run that was ended so."""
     return "ended by its time limit"

@@ -16,7 +16,7 @@ from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.entries import Entries, derived_entries, printed_entries, right_entries
 from rotor_mbs.models.printed.errata import random_states
-from rotor_mbs.models.printed.matrices import AS_PRINTED, MENDED, Errata
+from rotor_mbs.models.printed.matrices import AS_PRINTED, CORRECTED, Errata
 from rotor_mbs.scenario.scene import Blade, Scene
 
 _SEED, _STATES = 2020, 5
@@ -28,7 +28,7 @@ def differences() -> Iterator[tuple[str, float, str]]:
     states = random_states(_SEED, _STATES)
     pairs = [(printed_entries(s.names), derived_entries(s, AS_PRINTED)) for s in states]
     yield "entries as printed", *_worst(pairs)
-    yield "entries mended", *_worst([(derived_entries(s, MENDED), right_entries(s)) for s in states])
+    yield "entries corrected", *_worst([(derived_entries(s, CORRECTED), right_entries(s)) for s in states])
     for blades in (1, 3):
         yield f"accelerations of {blades}", _accelerations(blades), "(33) or (39)-(56) against (24)-(38), errata in"
         yield f"accelerations of {blades}, mended", _mended(blades), "(24)-(38) without errata against the closed form"
@@ -80,7 +80,7 @@ def _mended(blades: int) -> float:
     for angles, rates, (m, c, d, g) in _random(blades):
         form = rotor_form(_scene(blades, m, c, d, g))
         right = closed_form.accelerations(angles, rates, form, _TORQUE, math.sin, math.cos)
-        for errata in (MENDED, Errata(e1=False, e2=False, e3=True)):
+        for errata in (CORRECTED, Errata(e1=False, e2=False, e3=True)):
             derived = DerivedRotor(m, c, d, g, _phases(blades), errata).accelerations(_TORQUE, angles, rates)
             worst = _larger(worst, _off(derived, right))
     return worst
@@ -92,7 +92,7 @@ def _held() -> float:
         for gravity in (g, 0.0):
             form = rotor_form(_scene(1, m, 0.0, d, gravity))
             right = closed_form.accelerations(angles[:1], rates[:1], form, _TORQUE, math.sin, math.cos)
-            found = literal.held_pitch_acceleration(m, d, gravity, _TORQUE, angles[0] - 0.7, [0.7])
+            found = literal.fixed_pitch_acceleration(m, d, gravity, _TORQUE, angles[0] - 0.7, [0.7])
             worst = _larger(worst, _off([found], right))
     return worst
 

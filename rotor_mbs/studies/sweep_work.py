@@ -149,7 +149,7 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     assert block.work is not None
     errors = energy_errors(block.kinetic_energy, block.potential_energy, block.work)
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
-    ok = clearly_ok(scenes, chunk.method, block.words, block.samples, drifts)
+    ok = clearly_ok(scenes, chunk.method, block.integrations, block.samples, drifts)
     rows = empty_rows(len(scenes), chunk.row, METRICS)
     for name in chunk.row.names or ():
         if name not in rows:
@@ -158,10 +158,10 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     rows["status"][ok] = code_of("ok")
     rows["energy_drift_max"] = drifts
     _put_extremes(rows, slice(None), block.angles, block.rates)
-    for i, integration in enumerate(block.words):
+    for i, integration in enumerate(block.integrations):
         _put_effort(rows, i, integration, integration.time_reached)
     for i in np.flatnonzero(~ok).tolist():
-        run = Solution(scenes[i], chunk.method, block.trajectory(i), block.words[i], settings.as_dict())
+        run = Solution(scenes[i], chunk.method, block.trajectory(i), block.integrations[i], settings.as_dict())
         _put_verdict(rows, i, scenes[i], run)
     return rows
 
@@ -171,7 +171,7 @@ def _quantity(block: Block, scenes: Sequence[Scene], name: str) -> Array:
     values: Array | None = getattr(block, name, None)
     if values is None:
         runs = enumerate(scenes)
-        made = [Solution(scene, ENSEMBLE_METHOD, block.trajectory(i), block.words[i])[name] for i, scene in runs]
+        made = [Solution(scene, ENSEMBLE_METHOD, block.trajectory(i), block.integrations[i])[name] for i, scene in runs]
         values = np.full((len(scenes), scenes[0].samples, *made[0].shape[1:]), np.nan)
         for row, found in zip(values, made, strict=True):
             row[: len(found)] = found

@@ -16,7 +16,7 @@ from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import energy, geometry, observe, timetable
+from rotor_mbs.models.exudyn import energy, geometry, readings, timetable
 
 KINDS = ("node", "object", "marker", "load", "sensor")
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
@@ -226,7 +226,7 @@ def test_unwrapping_follows_rates_over_turns_between_rows() -> None:
     angle, rate = 70.0 + 900.0 * t + 50.0 * np.sin(9 * t), 900.0 + 450.0 * np.cos(9 * t)
     wrapped = np.angle(np.exp(1j * angle))
     # predicted to h³/12 times the third derivative, 3e-3 rad, against the half turn that would mislead it
-    assert np.abs(observe.unwrap(t, wrapped, rate, 70.0) - angle).max() < 1e-11
+    assert np.abs(readings.unwrap(t, wrapped, rate, 70.0) - angle).max() < 1e-11
 
 
 def test_cumulative_integral_is_exact_for_quintics_on_uneven_rows() -> None:
@@ -264,16 +264,16 @@ def test_quaternion_and_rotation_vector_are_those_of_the_rotation() -> None:
         assert np.abs(R @ axis - axis).max() < 1e-14
 
 
-def test_legs_meet_samples_and_kinks() -> None:
+def test_integration_intervals_meet_samples_and_kinks() -> None:
     scene = replace(BARE, duration=1.0, samples=11, rotor_torque=((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0)))
-    pieces = timetable.torque_pieces(scene)
+    pieces = timetable.torque_segments(scene)
     assert [(p.start, p.torque_start) for p in pieces] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
     assert pieces[1].torque_end == pytest.approx(2.0)
-    parts = timetable.legs(scene, pieces, every_sample=False)
-    ends = [leg.end for leg in parts]
+    parts = timetable.integration_intervals(scene, pieces, every_sample=False)
+    ends = [interval.end for interval in parts]
     assert np.allclose(ends, [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])
-    assert [leg.intervals for leg in parts] == [3, 1, 1, 1, 3, 2]
-    assert len(timetable.legs(scene, pieces, every_sample=True)) == 11
+    assert [interval.sample_intervals for interval in parts] == [3, 1, 1, 1, 3, 2]
+    assert len(timetable.integration_intervals(scene, pieces, every_sample=True)) == 11
     assert timetable.steps_and_rows(0.01, 0.01 / 15, False) == (15, 1)
     steps, rows = timetable.steps_and_rows(0.01, 1e-4 / 1.37, True)
     assert steps % rows == 0

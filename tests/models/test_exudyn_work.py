@@ -26,7 +26,7 @@ def work_at_unit_rate(time: Array) -> Array:
     scene = driven()
     angles, rates = np.zeros((len(time), 2)), np.zeros((len(time), 2))
     angles[:, 0], rates[:, 0] = time, 1.0
-    return energy.work(scene, timetable.torque_pieces(scene), time, angles, rates)
+    return energy.work(scene, timetable.torque_segments(scene), time, angles, rates)
 
 
 def exact_work(time: Array) -> Array:
@@ -47,7 +47,7 @@ def test_work_of_a_run_that_stopped_before_a_stretch_of_torque(rows: int) -> Non
 
 @pytest.mark.parametrize("towards", [0.0, 8.0])
 def test_work_where_the_row_at_the_jump_is_off_by_rounding(towards: float) -> None:
-    """The row belongs to both stretches, on whichever side of the jump its time was rounded to."""
+    """The row belongs to both segments, on whichever side of the jump its time was rounded to."""
     time = np.linspace(0.0, 8.0, 81)
     time[40] = np.nextafter(4.0, towards)
     assert np.abs(work_at_unit_rate(time) - exact_work(time)).max() < 1e-12

@@ -225,7 +225,7 @@ def test_error_growth_is_that_of_neighbouring_runs() -> None:
 
 
 def test_the_fallback_reference_states_its_uncertainty() -> None:
-    from rotor_mbs.models.lagrange.fallback_reference import FallbackReference
+    from rotor_mbs.models.lagrange.reference import FallbackReference
 
     scene = paper("fig11", duration=7.0, samples=701)
     fallback = FallbackReference(scene)

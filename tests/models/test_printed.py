@@ -9,7 +9,7 @@ import pytest
 
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
-from rotor_mbs.models.printed.matrices import AS_PRINTED, MENDED, Errata
+from rotor_mbs.models.printed.matrices import AS_PRINTED, CORRECTED, Errata
 
 THIRDS = tuple(2.0 * math.pi * i / 3.0 for i in range(3))
 M, C, D, G = 15000.0, math.hypot(0.08, 0.03), 15.42, 9.8  # Table 1
@@ -91,7 +91,7 @@ def test_all_mended_are_lagranges_equations(blades):
         angles, rates = random_motion(rng, blades)
         chosen = constants(rng)
         torque = rng.uniform(-1.0, 1.0)
-        rotor = DerivedRotor(*chosen, phases(blades), MENDED)
+        rotor = DerivedRotor(*chosen, phases(blades), CORRECTED)
         accelerations = np.array(rotor.accelerations(torque, angles, rates))
         forces = Lagrangian(*chosen, phases(blades)).forces(np.array(angles), np.array(rates), accelerations)
         # Differences cut off 1e-10 of terms as large as the accelerations.
@@ -112,7 +112,7 @@ def test_third_erratum_alone_changes_nothing():
     # The coefficient of the term it stands in comes from E2.
     rng = np.random.default_rng(3)
     alone, none = (
-        DerivedRotor(*constants(np.random.default_rng(4)), THIRDS, e) for e in (Errata(False, False), MENDED)
+        DerivedRotor(*constants(np.random.default_rng(4)), THIRDS, e) for e in (Errata(False, False), CORRECTED)
     )
     for _ in range(10):
         angles, rates = random_motion(rng, 3)

@@ -77,7 +77,7 @@ def _many_blades(blades: int, count: int) -> list[Scene]:
     "scenes",
     [
         _perturbed(paper("fig11", duration=2.0, samples=41), LANES + 3),
-        _perturbed(paper("fig04b", samples=41), 3),  # a pitch that is held
+        _perturbed(paper("fig04b", samples=41), 3),  # a fixed pitch
         _machines(3),
         [replace(scene, bearing_damping=(10.0, 20.0, 30.0), shaft_damping=5.0) for scene in _machines(2)],
         [replace(scene, rotor_torque=((0.0, 0.0), (1.0, 50.0))) for scene in _machines(2)],
@@ -85,14 +85,14 @@ def _many_blades(blades: int, count: int) -> list[Scene]:
         _many_blades(6, 2),
         [replace(scene, gravity=0.0, bearing_stiffness=()) for scene in _machines(2)],
     ],
-    ids=["starts", "held pitch", "machines", "dampers", "torque over time", "tips", "six blades", "free"],
+    ids=["starts", "fixed pitch", "rotors", "dampers", "torque over time", "tips", "six blades", "free"],
 )
 def test_runs_side_by_side_are_the_runs_one_by_one(scenes: list[Scene]) -> None:
     block = solve_many(scenes, _EPS)
     for i, scene in enumerate(scenes):
         single = solve("lagrange/taylor", scene, {"tolerance": _EPS})
-        assert block.words[i].success
-        assert block.words[i].steps == pytest.approx(single.integration.steps, abs=2)
+        assert block.integrations[i].success
+        assert block.integrations[i].steps == pytest.approx(single.integration.steps, abs=2)
         for name in _NAMES:
             expected, found = getattr(single.trajectory, name), getattr(block, name)[i]
             # Round-off of other instructions, which two seconds of fig11 carry on a thousandfold; rates by the
@@ -108,7 +108,7 @@ def test_a_run_does_not_depend_on_its_neighbours() -> None:
         alone = solve_many([scenes[i]], _EPS)
         for name in _NAMES:
             np.testing.assert_array_equal(getattr(alone, name)[0], getattr(block, name)[i], err_msg=name)
-        assert alone.words[0].steps == block.words[i].steps
+        assert alone.integrations[0].steps == block.integrations[i].steps
 
 
 @pytest.mark.parametrize("outputs", [("angles",), ("angles", "tip"), ("angles", "energy")])
@@ -117,7 +117,7 @@ def test_what_is_not_asked_for_is_not_made(outputs: tuple[str, ...]) -> None:
     block = solve_many(scenes, _EPS)
     assert (block.tip is not None) == ("tip" in outputs)
     assert (block.kinetic_energy is not None) == ("energy" in outputs)
-    assert all(word.success for word in block.words)
+    assert all(word.success for word in block.integrations)
 
 
 def test_many_samples_are_evaluated_in_pieces() -> None:
@@ -191,7 +191,7 @@ def _towards_the_singularity(count: int) -> list[Scene]:
 def test_a_run_that_breaks_off_ends_alone(gravity: float) -> None:
     scenes = [replace(scene, gravity=gravity) for scene in _towards_the_singularity(2)]
     block = solve_many(scenes, _EPS)
-    assert [word.success for word in block.words] == [True, False, False]
+    assert [word.success for word in block.integrations] == [True, False, False]
     assert block.samples[0] == 301
     for i in (1, 2):
         n = block.samples[i]
@@ -199,7 +199,7 @@ def test_a_run_that_breaks_off_ends_alone(gravity: float) -> None:
         assert np.isfinite(block.angles[i, :n]).all()
         for name in _NAMES:
             assert np.isnan(getattr(block, name)[i, n:]).all(), name
-        assert block.words[i].time_reached == pytest.approx(3.0 * (n - 1) / 300)
+        assert block.integrations[i].time_reached == pytest.approx(3.0 * (n - 1) / 300)
         single = solve("lagrange/taylor", scenes[i], {"tolerance": _EPS}).trajectory
         assert abs(len(single.time) - n) <= 1
 
@@ -212,9 +212,9 @@ def test_every_row_has_the_status_that_the_run_alone_would_have() -> None:
     assert block.work is not None
     errors = energy_errors(block.kinetic_energy, block.potential_energy, block.work)
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
-    well = clearly_ok(scenes, "lagrange/taylor", block.words, block.samples, drifts)
+    well = clearly_ok(scenes, "lagrange/taylor", block.integrations, block.samples, drifts)
     for i, scene in enumerate(scenes):
-        run = Solution(scene, "lagrange/taylor", block.trajectory(i), block.words[i])
+        run = Solution(scene, "lagrange/taylor", block.trajectory(i), block.integrations[i])
         verdict = judge(scene, run, None)
         assert well[i] == (verdict.status == "ok")
         assert drifts[i] == pytest.approx(verdict.metrics["energy_drift_max"], rel=1e-12)

@@ -32,7 +32,7 @@ EQUIVALENT = {
     r"geometry\._turn .*2 \* rest scaled": "compares whole numbers",
     r"geometry\.hub_body .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
     r"geometry\._joined .*r @ r \* np\.eye": (
-        "what is held has its centre of mass on its own z, in the rotor's plane: about y the product is zero"
+        "a fixed blade has its centre of mass on its own z, in the rotor's plane: about y the product is zero"
     ),
     r"energy\.work .*last - first scaled": "whole numbers: rows counted",
     r"energy\.cumulative_integral .*sign in .*abscissae": "the points stand alike on both sides of the middle",
@@ -41,16 +41,16 @@ EQUIVALENT = {
     r"readings\._dot ": (
         "a pitch is read off twice, across and along the shaft: a term lost shrinks both sides of the arctangent alike"
     ),
-    r"observe\.unwrap .*right side of start - wrapped\[0\] lost": "rounded to turns, and less than half of one",
-    r"observe\.unwrap .*scaled": "rounded to whole turns: 1 % of the way between two rows is no half turn",
-    r"timetable\.legs .*0\.5 \* \(t0 \+ t1\) scaled|timetable\.legs .*right side of t0 \+ t1 scaled": (
-        "any instant inside the leg tells its piece"
+    r"readings\.unwrap .*right side of start - wrapped\[0\] lost": "rounded to turns, and less than half of one",
+    r"readings\.unwrap .*scaled": "rounded to whole turns: 1 % of the way between two rows is no half turn",
+    r"timetable\.integration_intervals .*(0\.5 \* \(t0 \+ t1\)|right side of t0 \+ t1) scaled": (
+        "any instant inside the interval determines its segment"
     ),
-    r"timetable\.legs .*right side of scene\.samples - 1 scaled": (
+    r"timetable\.integration_intervals .*right side of scene\.samples - 1 scaled": (
         "a kink that is off its sample by a millionth of the interval is taken to be on it"
     ),
-    r"timetable\.legs .*end - start scaled": "rounded to a whole number of intervals",
-    r"literal\.held_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:48: .* q2 \+ phase)": (
+    r"timetable\.integration_intervals .*end - start scaled": "rounded to a whole number of intervals",
+    r"literal\.fixed_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:48: .* q2 \+ phase)": (
         "the cosine multiplies c, which is 0 where this function is used"
     ),
     r"literal\.three_blade_accelerations .*c[345] -> s[345]": (

@@ -73,9 +73,8 @@ TARGETS = (
     Target(
         "lagrange",
         f"{_L}.parameters",
-        ("rotor_form", "_inertia_about_hub", "_rotor_inertia", "_coefficients", "_cosine_of_turn"),
+        ("rotor_form", "_inertia_about_hub", "_rotor_inertia", "_coefficients", "_cosine_of_turn", "torque_segments"),
     ),
-    Target("lagrange", f"{_L}.torque", ("stretches",)),
     Target("lagrange", f"{_L}.samples", ("trajectory", "_constant_work")),
     Target("printed", f"{_P}.literal", ("*",)),
     Target("printed", f"{_P}.matrices", ("*",)),
@@ -99,7 +98,7 @@ TARGETS = (
     Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
     Target("multibody", f"{_M}.tree", ("_node", "_tree", "_of_blade", "_rotor_torque", "_tip_sensor")),
     Target("multibody", f"{_M}.energy", ("*",)),
-    Target("multibody", f"{_M}.timetable", ("at", "torque_at", "_slope", "torque_pieces", "legs")),
+    Target("multibody", f"{_M}.timetable", ("at", "torque_at", "_slope", "torque_segments", "integration_intervals")),
     Target("multibody", f"{_M}.readings", ("_fields", "_add_energies")),
     Target("chain", f"{_M}.geometry", ("quaternion", "quaternion_rate"), 1e-2),
     Target(
@@ -118,8 +117,7 @@ TARGETS = (
         ),
         1e-2,
     ),
-    Target("chain", f"{_M}.readings", ("_joint_motion", "_dot"), 1e-2),
-    Target("chain", f"{_M}.observe", ("unwrap",), 1e-2),
+    Target("chain", f"{_M}.readings", ("_joint_motion", "_dot", "unwrap"), 1e-2),
     Target(
         "rules",
         "rotor_mbs.solution.judgement",
@@ -164,8 +162,8 @@ TARGETS = (
 _PARTS = "models/test_exudyn_parts.py::test_"
 _TESTS = {
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
-    f"{_M}.observe": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
-    f"{_M}.timetable": (f"{_PARTS}legs_meet_samples_and_kinks",),
+    f"{_M}.readings": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
+    f"{_M}.timetable": (f"{_PARTS}integration_intervals_meet_samples_and_kinks",),
     f"{_M}.tree": ("solution/test_judgement_messages.py",),
     "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py",),
     f"{_M}.energy": (f"{_PARTS}cumulative_integral_is_exact_for_quintics_on_uneven_rows", "models/test_exudyn_work.py"),

@@ -1,4 +1,4 @@
-"""The one place that imports Exudyn: builds a system from its parts, runs it leg by leg, hands out recorded rows.
+"""The one place that imports Exudyn: builds a system from its parts, runs it, returns recorded rows.
 
 Knows no rotor. The engine runs without window, console output or files, in its fast build (no range checks).
 """
@@ -15,10 +15,10 @@ import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.time_limit import OutOfTimeError
-from rotor_mbs.methods.time_limit import words as out_of_time
+from rotor_mbs.methods.time_limit import message as out_of_time
 from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.models.exudyn.timetable import Leg, steps_and_rows
+from rotor_mbs.models.exudyn.timetable import IntegrationInterval, steps_and_rows
 from rotor_mbs.solution.record import Array, Integration
 
 os.environ.setdefault("EXUDYN_SUPPRESS_UI_WINDOW_OPEN", "1")
@@ -43,7 +43,7 @@ class Linearized(NamedTuple):
 
 
 class _StuckError(Exception):
-    """The engine makes no headway."""
+    """The engine makes no progress."""
 
 
 class System:
@@ -122,29 +122,33 @@ class System:
         self._mbs.systemData.SetODE2Coordinates(values, _engine.ConfigurationType.Initial)
 
     def integrate(
-        self, scheme: Scheme, legs: Sequence[Leg], rows_between: bool, before_leg: Callable[[Leg], None]
+        self,
+        scheme: Scheme,
+        intervals: Sequence[IntegrationInterval],
+        rows_between: bool,
+        before_interval: Callable[[IntegrationInterval], None],
     ) -> Integration:
-        """From the initial state to the end of the last leg, or to the first failure, which is told and not raised.
+        """From the initial state to the end of the last interval, or to the first failure, which is in the result.
 
-        rows_between: keep rows between samples too. before_leg is called with each leg first.
+        rows_between: keep rows between samples too. before_interval is called with each interval first.
         Raises KeyboardInterrupt if interrupted.
         """
         self._mbs.systemData.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         settings = _settings(scheme)
         trials = self._limit_trials(scheme) if scheme.trial_steps else []
         total = Integration(True, "", 0.0, 0, 0)
-        for leg in legs:
-            before_leg(leg)
+        for interval in intervals:
+            before_interval(interval)
             trials.clear()
-            settings.solution.sensors.append = leg is not legs[0]
-            _schedule(settings, scheme, leg, rows_between)
+            settings.solution.sensors.append = interval is not intervals[0]
+            _schedule(settings, scheme, interval, rows_between)
             solver = _engine.MainSolverExplicit() if scheme.stages else _engine.MainSolverImplicitSecondOrder()
             failure = self._solve(solver, settings)
-            _count(total, scheme, leg, solver.it, failure)
+            _count(total, scheme, interval, solver.it, failure)
             if failure:
                 break
             self._keep_state()
-            settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, leg.end - leg.start)
+            settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, interval.end - interval.start)
         return total
 
     def _solve(self, solver: Any, settings: Any) -> str:
@@ -171,7 +175,7 @@ class System:
         def before_trial(_system: object, time: float) -> bool:
             trials.append(time)
             if len(trials) > scheme.trial_steps:
-                raise _StuckError(f"no headway in {scheme.trial_steps} trial steps near t = {time:.6g} s")
+                raise _StuckError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
             return True
 
         self._mbs.SetPreStepUserFunction(before_trial)
@@ -197,20 +201,20 @@ def _settings(scheme: Scheme) -> Any:
     return settings
 
 
-def _schedule(settings: Any, scheme: Scheme, leg: Leg, rows_between: bool) -> None:
+def _schedule(settings: Any, scheme: Scheme, interval: IntegrationInterval, rows_between: bool) -> None:
     integration = settings.timeIntegration
-    span = (leg.end - leg.start) / leg.intervals
+    span = (interval.end - interval.start) / interval.sample_intervals
     steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
-    integration.startTime, integration.endTime = leg.start, leg.end
-    integration.numberOfSteps = steps * leg.intervals
+    integration.startTime, integration.endTime = interval.start, interval.end
+    integration.numberOfSteps = steps * interval.sample_intervals
     every_step = scheme.step is None and rows_between
-    # The engine adds up periods: shortened by a tenth of a step over the whole leg, rounding makes none come late.
+    # The engine adds up periods: shortened by a tenth of a step over the whole interval, rounding makes none come late.
     period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
     settings.solution.sensors.writePeriod = 0.0 if every_step else period
 
 
-def _count(total: Integration, scheme: Scheme, leg: Leg, it: Any, failure: str) -> None:
-    """Add one leg's outcome; an implicit step evaluates its residual once more than it iterates.
+def _count(total: Integration, scheme: Scheme, interval: IntegrationInterval, it: Any, failure: str) -> None:
+    """Add one interval's outcome; an implicit step evaluates its residual once more than it iterates.
 
     The engine's index is one ahead of the steps it took, and two where the last one failed.
     """
@@ -221,7 +225,7 @@ def _count(total: Integration, scheme: Scheme, leg: Leg, it: Any, failure: str) 
     total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
     total.success, total.message = not failure, failure
     total.out_of_time = failure == out_of_time()
-    total.time_reached = max(leg.start, it.currentTime - it.currentStepSize) if failure else leg.end
+    total.time_reached = max(interval.start, it.currentTime - it.currentStepSize) if failure else interval.end
 
 
 def _caused_by(exc: BaseException | None, kind: type[BaseException]) -> bool:

@@ -1,6 +1,6 @@
 """What a model consists of, as plain data: it is listed, counted, and handed to the engine, and so cannot differ.
 
-Knows the engine's item names as words only.
+Knows the names of the engine's items only.
 """
 
 from __future__ import annotations

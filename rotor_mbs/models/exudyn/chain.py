@@ -1,4 +1,4 @@
-"""The rotor as a chain of free bodies held together by joints: ground, hub, blades; redundant coordinates.
+"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates.
 
 Knows the engine through the blueprint alone. Every node stands at its body's centre of mass, so masses and inertias
 go in as the scene tells them. A hub without mass or inertia is a body with none: its joints fix it, the constrained

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.models.exudyn.geometry import Body, pitching
-from rotor_mbs.models.exudyn.timetable import Piece
+from rotor_mbs.models.exudyn.timetable import TorqueSegment
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
 
@@ -49,7 +49,7 @@ def work_needs_rows(scene: Scene) -> bool:
     return scene.has_damping or (scene.has_torque and not scene.has_constant_torque)
 
 
-def work(scene: Scene, pieces: Sequence[Piece], time: Array, angles: Array, rates: Array) -> Array:
+def work(scene: Scene, segments: Sequence[TorqueSegment], time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the rotor torque less what the dampers took, from rows of time s, angles rad, rates rad/s."""
     if not work_needs_rows(scene):
         exact: Array = scene.torque_at(0.0) * (angles[:, 0] - angles[:1, 0])
@@ -57,12 +57,12 @@ def work(scene: Scene, pieces: Sequence[Piece], time: Array, angles: Array, rate
     losses = _losses(scene, rates)
     out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
-    for piece in pieces:
-        first, last = np.searchsorted(time, [piece.start - slack, piece.end + slack])
+    for segment in segments:
+        first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
         if last - first < 2:
             break
         inside = slice(first, last)
-        power = piece.at(time[inside]) * rates[inside, 0] - losses[inside]
+        power = segment.at(time[inside]) * rates[inside, 0] - losses[inside]
         out[inside] = done + cumulative_integral(time[inside], power)
         done = out[last - 1]
     return out

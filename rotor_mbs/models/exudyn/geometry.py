@@ -84,7 +84,7 @@ def pitching(scene: Scene) -> tuple[int, ...]:
 
 
 def fixed_blade_rotation(scene: Scene, index: int) -> Array:
-    """(3, 3) rotation from hub frame to the frame of a blade held at its initial pitch."""
+    """(3, 3) rotation from hub frame to the frame of a blade fixed at its initial pitch."""
     return mounting(index, len(scene.blades)) @ rotation_z(scene.initial_angles[1 + index])
 
 

@@ -1,16 +1,20 @@
-"""What each of the two models' sensors say, as a trajectory. Knows the sensors' names and no equations of motion."""
+"""From the recorded rows of the sensors of both models to a trajectory. Knows no equations of motion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rotor_mbs.models.exudyn import chain, energy, observe, tree
+from rotor_mbs.models.exudyn import chain, energy, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
-from rotor_mbs.models.exudyn.timetable import Piece
+from rotor_mbs.models.exudyn.timetable import TorqueSegment, sample_times
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Trajectory
+
+Indices = NDArray[np.intp]
 
 
 class _Reader:
@@ -19,11 +23,11 @@ class _Reader:
     def __init__(self, scene: Scene, recorded: Callable[[str], Array], state: Iterable[str]) -> None:
         tables = {name: recorded(name) for name in state}
         time = next(iter(tables.values()))[:, 0]
-        kept = observe.distinct_rows(scene, time)
-        self._rows = kept[: observe.finite_rows(*(table[kept] for table in tables.values()))]
+        kept = _distinct_rows(scene, time)
+        self._rows = kept[: _finite_rows(*(table[kept] for table in tables.values()))]
         self._tables, self._recorded = tables, recorded
         self.time = time[self._rows]
-        self.samples = observe.sample_rows(scene, self.time)
+        self.samples = _sample_rows(scene, self.time)
 
     def all(self, name: str) -> Array:
         """(n, k): every kept row."""
@@ -36,31 +40,31 @@ class _Reader:
         return self.all(name)[self.samples]
 
 
-def tree_trajectory(scene: Scene, pieces: Sequence[Piece], recorded: Callable[[str], Array]) -> Trajectory:
+def tree_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: Callable[[str], Array]) -> Trajectory:
     """The kinematic tree's own coordinates; `recorded` gives (n, 1 + k) rows of a sensor, time first."""
     read = _Reader(scene, recorded, ("angles", "rates"))
     angles = _all_blades(scene, read.all("angles"), scene.initial_angles)
     rates = _all_blades(scene, read.all("rates"), (0.0,) * len(scene.initial_rates))
     bodies = [(tree.link_name(link), body) for link, body in enumerate(tree.bodies(scene))]
-    return observe.cut(scene, _fields(scene, pieces, read, angles, rates, bodies))
+    return _cut(scene, _fields(scene, segments, read, angles, rates, bodies))
 
 
-def chain_trajectory(scene: Scene, pieces: Sequence[Piece], recorded: Callable[[str], Array]) -> Trajectory:
+def chain_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: Callable[[str], Array]) -> Trajectory:
     """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps."""
     placed = chain.placed_bodies(scene)
     bodies = [(each.name, each.body) for each in placed]
     state = [f"{name} {what}" for name, _ in bodies for what in ("position", "rotation", "spin")]
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
-    fields = _fields(scene, pieces, read, angles, rates, bodies)
+    fields = _fields(scene, segments, read, angles, rates, bodies)
     fields["constraint_error"] = _largest_gap(read, bodies)
-    return observe.cut(scene, fields)
+    return _cut(scene, fields)
 
 
-def _all_blades(scene: Scene, moving: Array, held: Sequence[float]) -> Array:
-    """(n, 1 + blades): the columns that move, and the held value where a blade cannot pitch."""
-    out = np.empty((len(moving), len(held)))
-    out[:] = held
+def _all_blades(scene: Scene, moving: Array, fixed: Sequence[float]) -> Array:
+    """(n, 1 + blades): the columns that move, and the fixed value where a blade cannot pitch."""
+    out = np.empty((len(moving), len(fixed)))
+    out[:] = fixed
     out[:, [0, *(1 + i for i in pitching(scene))]] = moving
     return out
 
@@ -69,7 +73,7 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
     hub, hub_spin = _matrices(read.all("hub rotation")), read.all("hub spin")
     wrapped = np.arctan2(hub[:, 0, 2] - hub[:, 2, 0], hub[:, 0, 0] + hub[:, 2, 2])
     rates = [hub_spin[:, 1]]
-    angles = [observe.unwrap(read.time, wrapped, rates[0], scene.initial_angles[0])]
+    angles = [unwrap(read.time, wrapped, rates[0], scene.initial_angles[0])]
     hub_omega = (hub @ hub_spin[:, :, None])[:, :, 0]
     for i in pitching(scene):
         blade = _matrices(read.all(f"blade {i + 1} rotation"))
@@ -77,7 +81,7 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
         seat_x, seat_y = hub @ mounting(i, len(scene.blades))[:, 0], hub[:, :, 1]
         wrapped = np.arctan2(_dot(seat_y, x) - _dot(seat_x, y), _dot(seat_x, x) + _dot(seat_y, y))
         rate = read.all(f"blade {i + 1} spin")[:, 2] - _dot(hub_omega, z)
-        angles.append(observe.unwrap(read.time, wrapped, rate, scene.initial_angles[1 + i]))
+        angles.append(unwrap(read.time, wrapped, rate, scene.initial_angles[1 + i]))
         rates.append(rate)
     still = (0.0,) * len(scene.initial_rates)
     return (
@@ -109,7 +113,7 @@ def _largest_gap(read: _Reader, bodies: Sequence[tuple[str, Body]]) -> Array:
 
 def _fields(
     scene: Scene,
-    pieces: Sequence[Piece],
+    segments: Sequence[TorqueSegment],
     read: _Reader,
     angles: Array,
     rates: Array,
@@ -121,7 +125,7 @@ def _fields(
         tips = [read.sampled(f"tip {i + 1}") for i in range(len(scene.blades))]
         fields["tip"] = np.stack(tips, axis=1)
     if scene.wants("energy"):
-        fields["work"] = energy.work(scene, pieces, read.time, angles, rates)[read.samples]
+        fields["work"] = energy.work(scene, segments, read.time, angles, rates)[read.samples]
         fields["potential_energy"] = energy.spring_energy(scene, fields["angles"])
         fields["kinetic_energy"] = np.zeros(len(read.samples))
         for name, body in bodies:
@@ -135,3 +139,53 @@ def _add_energies(scene: Scene, fields: dict[str, Array], read: _Reader, name: s
         fields["potential_energy"] += energy.gravity_energy(scene, body, read.sampled(f"{name} position"))
     if np.any(body.inertia):
         fields["kinetic_energy"] += energy.rotation_energy(body, read.sampled(f"{name} spin"))
+
+
+# From recorded rows to samples: which rows are samples, angles over many turns, where a run stopped being finite.
+
+
+def _distinct_rows(scene: Scene, time: Array) -> Indices:
+    """Indices of the rows to keep: two intervals share the row they meet at."""
+    slack = 1e-9 * scene.duration / (scene.samples - 1)
+    return np.flatnonzero(np.concatenate([[True], np.diff(time) > slack]))
+
+
+def _finite_rows(*tables: Array) -> int:
+    """How many rows from the first are finite in every table."""
+    if not len(tables[0]):
+        return 0
+    finite = np.ones(len(tables[0]), dtype=bool)
+    for table in tables:
+        finite &= np.isfinite(table.reshape(len(table), -1)).all(axis=1)
+    return len(finite) if finite.all() else int(np.argmin(finite))
+
+
+def _sample_rows(scene: Scene, time: Array) -> Indices:
+    """Row of each sample, as far as they were reached without a gap."""
+    wanted = sample_times(scene)
+    slack = 1e-6 * scene.duration / (scene.samples - 1)
+    rows = np.searchsorted(time, wanted - slack)
+    met = rows < len(time)
+    met[met] = np.abs(time[rows[met]] - wanted[met]) <= slack
+    return rows if met.all() else rows[: int(np.argmin(met))]
+
+
+def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
+    """(n,) rad: angles known but for whole turns, made continuous with the help of the measured rates (rad/s).
+
+    The angle is predicted by the mean rate between two rows; the turn nearest to that is taken, so many turns between
+    rows do no harm as long as the prediction is right to half a turn. The first row gets the turns of `start`.
+    """
+    turn = 2.0 * np.pi
+    predicted = 0.5 * np.diff(time) * (rates[1:] + rates[:-1])
+    gained = np.round((predicted - np.diff(wrapped)) / turn)
+    turns = np.round((start - wrapped[0]) / turn) + np.concatenate([[0.0], np.cumsum(gained)])
+    unwrapped: Array = wrapped + turn * turns
+    return unwrapped
+
+
+def _cut(scene: Scene, fields: Mapping[str, Array]) -> Trajectory:
+    """The samples as a trajectory, up to the first row in which any field is not finite."""
+    n = _finite_rows(*fields.values())
+    kept: dict[str, Any] = {name: table[:n] for name, table in fields.items()}
+    return Trajectory(time=sample_times(scene)[:n], **kept)

@@ -12,11 +12,11 @@ import numpy as np
 from rotor_mbs.models.exudyn.adapter import System
 from rotor_mbs.models.exudyn.blueprint import Part
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.models.exudyn.timetable import Leg, Piece, RotorTorque, legs
+from rotor_mbs.models.exudyn.timetable import IntegrationInterval, RotorTorque, TorqueSegment, integration_intervals
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
-Reading = Callable[[Scene, Sequence[Piece], Callable[[str], Array]], Trajectory]
+Reading = Callable[[Scene, Sequence[TorqueSegment], Callable[[str], Array]], Trajectory]
 
 
 class MultibodySolver:
@@ -33,17 +33,17 @@ class MultibodySolver:
     ) -> None:
         self._scene, self._torque, self._scheme, self._reading = scene, torque, scheme, reading
         self._rows_between = rows_between
-        self._legs = legs(scene, torque.pieces, every_sample=scheme.step is None)
+        self._intervals = integration_intervals(scene, torque.segments, every_sample=scheme.step is None)
         self.system = System(parts)
 
     def integrate(self) -> Integration:
         """From the initial state, every time; bit for bit the same."""
-        return self.system.integrate(self._scheme, self._legs, self._rows_between, self._take_torque_of)
+        return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._set_torque)
 
-    def _take_torque_of(self, leg: Leg) -> None:
-        self._torque.piece = leg.piece
+    def _set_torque(self, interval: IntegrationInterval) -> None:
+        self._torque.segment = interval.segment
 
     def observe(self) -> Trajectory:
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._reading(self._scene, self._torque.pieces, self.system.rows)
+            return self._reading(self._scene, self._torque.segments, self.system.rows)

@@ -1,6 +1,7 @@
-"""When the engine stops and starts: at kinks of the torque, and where samples must be met. Knows no engine.
+"""Torque segments and integration intervals: where the engine stops and starts. Knows no engine.
 
-A step across a kink of the torque loses its order, so each linear piece of the table is integrated by itself.
+A step across a kink of the torque loses its order, so each linear segment of the table is integrated by itself. An
+interval also ends where a sample must be met.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ _ROWS = 10
 
 
 @dataclass(frozen=True)
-class Piece:
+class TorqueSegment:
     """Rotor torque in N m on [start, end] s, linear between its two ends."""
 
     start: float
@@ -43,38 +44,41 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Leg:
-    """One call of the engine: from start to end (s), over so many sample intervals, with the torque of one piece."""
+class IntegrationInterval:
+    """One call of the engine: from start to end (s), with the torque of one segment.
+
+    sample_intervals: how many intervals between samples it covers, at least 1.
+    """
 
     start: float
     end: float
-    intervals: int
-    piece: Piece
+    sample_intervals: int
+    segment: TorqueSegment
 
 
 class RotorTorque:
-    """The load function of the rotor torque; `piece` is the one of the leg being integrated."""
+    """The load function of the rotor torque; `segment` is the one of the interval being integrated."""
 
     def __init__(self, scene: Scene) -> None:
-        self.pieces = torque_pieces(scene)
-        self.piece = self.pieces[0]
+        self.segments = torque_segments(scene)
+        self.segment = self.segments[0]
 
     def scalar(self, _system: object, time: float, _load: float) -> float:
-        return self.piece.torque_at(time)
+        return self.segment.torque_at(time)
 
     def vector(self, _system: object, time: float, _load: object) -> list[float]:
-        return [0.0, self.piece.torque_at(time), 0.0]
+        return [0.0, self.segment.torque_at(time), 0.0]
 
 
-def torque_pieces(scene: Scene) -> tuple[Piece, ...]:
-    """The torque over the run as linear pieces in order; one piece where it is constant or absent."""
+def torque_segments(scene: Scene) -> tuple[TorqueSegment, ...]:
+    """The torque over the run as linear segments in order; one segment where it is constant or absent."""
     kinks = () if scene.has_constant_torque else (time for time, _ in scene.rotor_torque)
     knots = sorted({0.0, scene.duration, *(time for time in kinks if 0.0 < time < scene.duration)})
-    pieces = []
+    segments = []
     for start, end in itertools.pairwise(knots):
         first, middle = scene.torque_at(start), scene.torque_at(0.5 * (start + end))
-        pieces.append(Piece(start, end, first, 2.0 * middle - first))
-    return tuple(pieces)
+        segments.append(TorqueSegment(start, end, first, 2.0 * middle - first))
+    return tuple(segments)
 
 
 def sample_times(scene: Scene) -> Array:
@@ -82,26 +86,28 @@ def sample_times(scene: Scene) -> Array:
     return np.linspace(0.0, scene.duration, scene.samples)
 
 
-def legs(scene: Scene, pieces: tuple[Piece, ...], every_sample: bool) -> list[Leg]:
+def integration_intervals(
+    scene: Scene, segments: tuple[TorqueSegment, ...], every_sample: bool
+) -> list[IntegrationInterval]:
     """The calls of the engine in order; `every_sample` for a scheme that chooses its own steps."""
     times = sample_times(scene)
     cuts = set(range(scene.samples)) if every_sample else {0, scene.samples - 1}
     between: dict[float, float] = {}
-    for piece in pieces[1:]:
-        place = piece.start / scene.duration * (scene.samples - 1)
+    for segment in segments[1:]:
+        place = segment.start / scene.duration * (scene.samples - 1)
         near = round(place)
         if abs(place - near) <= _ALIGNED:
             cuts.add(near)
         else:
             cuts.update((math.floor(place), math.ceil(place)))
-            between[place] = piece.start
+            between[place] = segment.start
     places = sorted([*cuts, *between])
     out = []
     for start, end in itertools.pairwise(places):
         t0, t1 = (between.get(place, float(times[math.floor(place)])) for place in (start, end))
         middle = 0.5 * (t0 + t1)
-        piece = next(piece for piece in reversed(pieces) if piece.start <= middle)
-        out.append(Leg(t0, t1, max(1, round(end - start)), piece))
+        segment = next(segment for segment in reversed(segments) if segment.start <= middle)
+        out.append(IntegrationInterval(t0, t1, max(1, round(end - start)), segment))
     return out
 
 

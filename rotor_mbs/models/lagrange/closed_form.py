@@ -34,7 +34,7 @@ def accelerations(
     spin = rates[0]
     schur = form.inertia
     moment = torque - form.shaft_damping * spin
-    for weight, cos_phase, sin_phase in form.held:
+    for weight, cos_phase, sin_phase in form.fixed:
         moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
     # s and c stand outside: an integrator that works with series pays for every product of two of them.
     pitches = []
@@ -83,7 +83,7 @@ def energies(
     spin = rates[0]
     kinetic = 0.5 * form.inertia * (spin * spin)
     potential = 0.0 * sin_q
-    for weight, cos_phase, sin_phase in form.held:
+    for weight, cos_phase, sin_phase in form.fixed:
         potential = potential + weight * (cos_q * cos_phase - sin_q * sin_phase)
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
         s, c = sin(theta), cos(theta)

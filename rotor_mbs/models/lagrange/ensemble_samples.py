@@ -21,7 +21,7 @@ class Block:
     angles, rates   (k, n, 1 + blades) rad, rad/s
     tip             (k, n, blades, 3) m
     kinetic_energy, potential_energy, work   (k, n) J
-    words           the engine's word on each run; samples: how many rows of each are finite
+    integrations           the engine's report of each run; samples: how many rows of each are finite
     """
 
     time: Array
@@ -31,7 +31,7 @@ class Block:
     kinetic_energy: Array | None
     potential_energy: Array | None
     work: Array | None
-    words: list[Integration]
+    integrations: list[Integration]
     samples: list[int]
 
     def trajectory(self, i: int) -> Trajectory:
@@ -54,8 +54,8 @@ def empty_block(scenes: Sequence[Scene]) -> Block:
     tip = np.empty((*shape, len(first.blades), 3)) if first.wants("tip") else None
     kinetic, potential, work = (np.empty(shape) if first.wants("energy") else None for _ in range(3))
     angles, rates = np.empty((*shape, columns)), np.empty((*shape, columns))
-    words = [Integration(False)] * runs
-    return Block(time, angles, rates, tip, kinetic, potential, work, words, [0] * runs)
+    integrations = [Integration(False)] * runs
+    return Block(time, angles, rates, tip, kinetic, potential, work, integrations, [0] * runs)
 
 
 def put_single(block: Block, i: int, run: Solution) -> None:
@@ -65,7 +65,7 @@ def put_single(block: Block, i: int, run: Solution) -> None:
         values, target = getattr(run.trajectory, name), getattr(block, name)
         if target is not None and values is not None:
             target[i, :n], target[i, n:] = values, np.nan
-    block.words[i], block.samples[i] = run.integration, n
+    block.integrations[i], block.samples[i] = run.integration, n
 
 
 def put(
@@ -75,7 +75,7 @@ def put(
     moving: Sequence[int],
     states: Array,
     found: Array,
-    words: Sequence[Integration],
+    integrations: Sequence[Integration],
 ) -> None:
     """Runs of one structure as runs `places` of the block; k of them.
 
@@ -84,7 +84,7 @@ def put(
     """
     count, length = len(moving), states.shape[2]
     where = _span(places)
-    if count < block.angles.shape[2]:  # pitches that are held
+    if count < block.angles.shape[2]:  # pitches that are fixed
         block.angles[where] = np.array([scene.initial_angles for scene in scenes])[:, None]
         block.rates[where] = 0.0
     for i, column in enumerate(moving):
@@ -99,11 +99,11 @@ def put(
         has_work = len(states) > 2 * count
         block.work[where] = states[2 * count] if has_work else _constant_work(scenes, states[0])
     samples = length - np.isnan(states[0]).sum(axis=1)
-    for i, word, n in zip(places, words, samples.tolist(), strict=True):
+    for i, integration, n in zip(places, integrations, samples.tolist(), strict=True):
         if n < length:
             _cut(block, i, n)
-        word.time_reached = float(block.time[i, max(n - 1, 0)])
-        block.words[i], block.samples[i] = word, n
+        integration.time_reached = float(block.time[i, max(n - 1, 0)])
+        block.integrations[i], block.samples[i] = integration, n
 
 
 def _span(places: Sequence[int]) -> slice | list[int]:
@@ -113,7 +113,7 @@ def _span(places: Sequence[int]) -> slice | list[int]:
 
 
 def _cut(block: Block, i: int, samples: int) -> None:
-    """Some numbers do not feel that a run broke off: what is held, or a term that vanishes."""
+    """Some quantities stay finite after a run broke off: a fixed pitch, or a term that vanishes."""
     for name in _COLUMNS:
         values = getattr(block, name)
         if values is not None:

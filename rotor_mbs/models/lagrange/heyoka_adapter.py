@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
+from getpass import getuser
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -85,10 +89,27 @@ def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
 
 
 def failure(outcome: Any) -> str:
-    """The engine's word on a propagation: "" where it says it reached the end, else its reason."""
+    """The engine's status of a propagation: "" where it reports that it reached the end, else its reason."""
     outcomes = heyoka().taylor_outcome
     if outcome == outcomes.time_limit:
         return ""
     if outcome == outcomes.err_nf_state:
         return "the state stopped being finite (heyoka: err_nf_state)"
     return f"heyoka: {str(outcome).rsplit('.', 1)[-1]}"
+
+
+@contextmanager
+def one_at_a_time(name: str) -> Iterator[None]:
+    """One compilation at a time on a computer, so that the next process finds the code in the engine's cache on disk.
+
+    Waits for other processes of this user inside a block of the same name; does not wait on systems without locks.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows: two processes then compile the same code, which costs time and nothing else
+        yield
+        return
+    path = Path(tempfile.gettempdir()) / f"{name}-{getuser()}.lock"
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

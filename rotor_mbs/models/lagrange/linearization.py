@@ -189,7 +189,7 @@ def _newton_step(form: RotorForm, potential: Jet, free: slice, *, downhill: bool
     """(free,) rad: -H⁻¹ g, with |H| where `downhill`; at most 0.5 rad, none where nothing holds the rotor."""
     gradient, hessian = potential.slope[free], potential.curvature[free, free]
     weights = [*(abs(value) for each in form.blades for value in (each.weight_x, each.weight_y, each.weight_z))]
-    weights += [abs(float(weight)) for weight, _, _ in form.held]
+    weights += [abs(float(weight)) for weight, _, _ in form.fixed]
     least = max(1e-9 * sum(weights), 1e-300)
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), least))
     values, vectors = np.linalg.eigh(hessian * scale * scale[:, None])

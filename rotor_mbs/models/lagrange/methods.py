@@ -13,8 +13,7 @@ from rotor_mbs.methods.base import Look, Method
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.lagrange import heyoka_adapter, reference, samples, taylor
-from rotor_mbs.models.lagrange.integrators import ode45_integrator, scipy_integrator
-from rotor_mbs.models.lagrange.ode_solvers import Integrator, OdeSolver
+from rotor_mbs.models.lagrange.ode_solvers import Integrator, OdeSolver, ode45_integrator, scipy_integrator
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.scenario.scene import Scene
 

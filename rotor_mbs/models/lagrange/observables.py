@@ -26,7 +26,7 @@ def tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
     return [[parameters(Fraction(x)) for x in blade.tip] for blade in scene.blades]
 
 
-class Derived:
+class CompiledObservables:
     """The code for scenes with the numbers' structure of `example`. Raises MethodRefusal where heyoka is not installed.
 
     Source: `closed_form.point_path` and `closed_form.energies`, evaluated in symbols.
@@ -48,7 +48,7 @@ class Derived:
             found += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos)
         if example.wants("energy"):
             found += closed_form.energies(angles, rates, form, engine.sin, engine.cos)
-        # Where all terms of a row vanish, the closed form gives a plain zero: the engine asks for an expression.
+        # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
         rows = [engine.expression(0.0) + row for row in found]
         self._function = engine.cfunc(rows, symbols, compact_mode=compact) if rows else None
         self._last: tuple[tuple[object, ...], Array] = ((), np.empty((0, 0)))
@@ -58,7 +58,7 @@ class Derived:
         scene asks for them.
 
         states    (variables, runs, samples): angles and rates that move, rad and rad/s
-        numbers   (parameters, runs): of equations and tips, then the pitches that are held
+        numbers   (parameters, runs): of equations and tips, then the pitches that are fixed
         The runs must fill the processor's lanes, once or more: what is left over is rounded by other instructions.
         """
         _, runs, samples = states.shape
@@ -75,7 +75,7 @@ class Derived:
         return found.reshape(-1, *states.shape[1:])
 
     def _spread(self, numbers: Array, samples: int) -> Array:
-        """(parameters, runs · samples): the function wants its numbers anew for every sample. Runs of one machine, a
+        """(parameters, runs · samples): the function wants its numbers anew for every sample. Runs of one rotor, a
         chunk of a sweep, have the same."""
         key = (numbers.tobytes(), numbers.shape, samples)
         if self._last[0] != key:

@@ -1,4 +1,6 @@
-"""The closed form on plain floats, for integrators that are written for any right-hand side. Knows no heyoka."""
+"""The closed form on plain floats under integrators for any right-hand side: SciPy's by name, MATLAB's ode45.
+
+Knows no heyoka; loads SciPy when one of its integrators is made."""
 
 from __future__ import annotations
 
@@ -9,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
+from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
-from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
-from rotor_mbs.models.lagrange.torque import Stretch, stretches
+from rotor_mbs.models.lagrange.parameters import RotorForm, TorqueSegment, rotor_form, torque_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
@@ -19,9 +22,9 @@ RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 
 class Advance(NamedTuple):
-    """An integrator's way over one stretch: states at the samples it reached, where it ended, what it cost and said.
+    """An integrator over one segment: states at the samples it reached, where it ended, its cost and its status.
 
-    message is "" where the end of the stretch was reached.
+    message is "" where the end of the segment was reached.
     """
 
     states: Array  # (samples reached, variables)
@@ -36,16 +39,16 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per stretch of the torque."""
+    """Any integrator over the scene, one call per segment of the torque."""
 
     def __init__(self, scene: Scene, integrator: Integrator) -> None:
         self._scene = scene
         self._integrator = integrator
         form = rotor_form(scene)
         self._moving = (0, *(1 + i for i in form.moving))
-        self._stretches = stretches(scene)
-        has_work = scene.wants("energy") and (len(self._stretches) > 1 or scene.has_damping)
-        self._functions = [right_hand_side(form, piece, with_work=has_work) for piece in self._stretches]
+        self._segments = torque_segments(scene)
+        has_work = scene.wants("energy") and (len(self._segments) > 1 or scene.has_damping)
+        self._functions = [right_hand_side(form, segment, with_work=has_work) for segment in self._segments]
         columns = list(self._moving)
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
         self._initial = np.concatenate([*start, np.zeros(int(has_work))])
@@ -55,28 +58,28 @@ class OdeSolver:
     def integrate(self) -> Integration:
         state, rows = self._initial, [self._initial[None, :]]
         steps, evaluations, message = 0, 0, ""
-        for piece, function in zip(self._stretches, self._functions, strict=True):
-            inside = self._times[(self._times > piece.start) & (self._times <= piece.end)]
-            way = self._integrator(function, piece.start, piece.end, state, inside)
-            steps, evaluations = steps + way.steps, evaluations + way.evaluations
-            rows.append(way.states)
-            state, message = way.end, way.message
+        for segment, function in zip(self._segments, self._functions, strict=True):
+            inside = self._times[(self._times > segment.start) & (self._times <= segment.end)]
+            part = self._integrator(function, segment.start, segment.end, state, inside)
+            steps, evaluations = steps + part.steps, evaluations + part.evaluations
+            rows.append(part.states)
+            state, message = part.end, part.message
             if message:
                 break
         states = np.concatenate(rows)
         finite = np.isfinite(states).all(axis=1)
         self._states = states[: len(finite) if finite.all() else int(np.argmin(finite))]
         reached = float(self._times[max(len(self._states) - 1, 0)])
-        return Integration(not message, message, reached, steps, evaluations, message == deadline.words())
+        return Integration(not message, message, reached, steps, evaluations, message == deadline.message())
 
     def observe(self) -> Trajectory:
         return samples.trajectory(self._scene, self._times[: len(self._states)], self._states, self._moving)
 
 
-def right_hand_side(form: RotorForm, piece: Stretch, *, with_work: bool) -> RightHandSide:
+def right_hand_side(form: RotorForm, segment: TorqueSegment, *, with_work: bool) -> RightHandSide:
     """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
     count = 1 + len(form.blades)
-    offset, slope = float(piece.offset), float(piece.slope)
+    offset, slope = float(segment.offset), float(segment.slope)
 
     def derivative(time: float, state: Sequence[float]) -> list[float]:
         values = state.tolist() if isinstance(state, np.ndarray) else state
@@ -85,9 +88,61 @@ def right_hand_side(form: RotorForm, piece: Stretch, *, with_work: bool) -> Righ
         try:
             found = closed_form.accelerations(angles, rates, form, torque, math.sin, math.cos)
         except (ZeroDivisionError, ValueError, OverflowError):
-            # A singular mass matrix, or a state that has run away: not a number, as array arithmetic would say.
+            # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
             return [math.nan] * len(values)
         work = [closed_form.power(rates, form, torque)] if with_work else []
         return [*rates, *found, *work]
 
     return derivative
+
+
+def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: float) -> Integrator:
+    """SciPy's solver `name`, step by step, samples by its own interpolant; asks for the time limit between steps."""
+    import scipy.integrate
+
+    solver_type = getattr(scipy.integrate, name)
+
+    def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
+        def watched(time: float, values: Sequence[float]) -> list[float]:
+            if deadline.is_over():  # a step may try ever smaller sizes without end
+                raise OutOfTimeError
+            return function(time, values)
+
+        rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
+        with np.errstate(all="ignore"), deadline.polled():
+            try:
+                solver = solver_type(watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance)
+                done = 0
+                while solver.status == "running":
+                    reason = solver.step()
+                    if solver.status == "failed":
+                        message = f"SciPy: {reason}"
+                        break
+                    steps += 1
+                    reached = int(np.searchsorted(times, solver.t, side="right"))
+                    if reached > done:
+                        rows.append(solver.dense_output()(times[done:reached]).T)
+                        done = reached
+            except OutOfTimeError:
+                message = deadline.message()
+            except (ValueError, np.linalg.LinAlgError) as exc:  # of its linear algebra, on what is not finite
+                message = f"SciPy: {exc}"
+        last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)
+        return Advance(np.concatenate(rows), last, steps, evaluations, message)
+
+    return advance
+
+
+def ode45_integrator(relative_tolerance: float, absolute_tolerance: float) -> Integrator:
+    """MATLAB's ode45; its clock starts at zero on every segment."""
+
+    def advance(function: RightHandSide, start: float, end: float, state: Array, times: Array) -> Advance:
+        result = matlab.ode45(
+            lambda t, y: function(start + t, y), end - start, state.tolist(), relative_tolerance, absolute_tolerance
+        )
+        reached = result.time[-1]
+        inside = np.minimum(times - start, end - start)
+        last = result.at(result.time[-1:])[0]
+        return Advance(result.at(inside[inside <= reached]), last, result.steps, result.evaluations, result.message)
+
+    return advance

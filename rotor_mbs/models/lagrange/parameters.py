@@ -1,19 +1,24 @@
-"""A scene's numbers as the coefficients of the closed form, in exact rational arithmetic until the last step.
+"""A scene's numbers as the closed form needs them: coefficients, torque segments, units of rates.
 
-Why exact: for a point mass the coefficients Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating
-point they leave a rounding remainder, and near a pitch of ±π/2 that remainder, not the physics, would be the inertia.
-Knows the scene only; no integrator.
+Coefficients and segments are in exact rational arithmetic until the last step. Why: for a point mass the coefficients
+Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating point they leave a rounding remainder, and near
+a pitch of ±π/2 that remainder, not the physics, would be the inertia. Knows the scene only; no integrator.
 """
 
 from __future__ import annotations
 
 import functools
+import itertools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.record import Array
 
 # A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic parameter.
 Number = Any
@@ -68,13 +73,13 @@ class RotorForm:
     """Coefficients of the whole rotor.
 
     blades      the blades whose pitch moves, in order; `moving` holds their numbers (from 0)
-    held        (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
-    inertia     kg m²: hub, and the blades that are held
+    fixed        (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
+    inertia     kg m²: hub, and the blades that are fixed
     """
 
     blades: tuple[BladeForm, ...]
     moving: tuple[int, ...]
-    held: tuple[tuple[Number, Number, Number], ...]
+    fixed: tuple[tuple[Number, Number, Number], ...]
     inertia: Number
     shaft_damping: Number
 
@@ -82,13 +87,13 @@ class RotorForm:
 def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
     """The coefficients of `scene`, each correctly rounded from its exact value by `convert`.
 
-    The scene's doubles are taken as exact, so that every precision solves the same machine.
+    The scene's doubles are taken as exact, so that every precision solves the same rotor.
     """
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
     moving: list[int] = []
-    held: list[tuple[Number, Number, Number]] = []
+    fixed: list[tuple[Number, Number, Number]] = []
     inertia = Fraction(scene.hub_inertia)
     for i, blade in enumerate(scene.blades):
         phase = [_cosine_of_turn(Fraction(i, count)), _cosine_of_turn(Fraction(i, count) - Fraction(1, 4))]
@@ -101,8 +106,10 @@ def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
         else:
             inertia += _rotor_inertia(blade)[1]
             weight = Fraction(blade.mass) * gravity * Fraction(blade.centre_of_mass[2])
-            held.append((convert(weight), convert(phase[0]), convert(phase[1])))
-    return RotorForm(tuple(forms), tuple(moving), tuple(held), convert(inertia), convert(Fraction(scene.shaft_damping)))
+            fixed.append((convert(weight), convert(phase[0]), convert(phase[1])))
+    return RotorForm(
+        tuple(forms), tuple(moving), tuple(fixed), convert(inertia), convert(Fraction(scene.shaft_damping))
+    )
 
 
 def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:
@@ -127,7 +134,7 @@ def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
     return xx, yy, 2 * xy
 
 
-@functools.lru_cache(maxsize=256)  # the blades of a rotor are mostly equal, and so are the machines of a sweep
+@functools.lru_cache(maxsize=256)  # the blades of a rotor are mostly equal, and so are the rotors of a sweep
 def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
     """schur_ss ... lever_sc of BladeForm, in its order."""
     xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
@@ -166,3 +173,47 @@ def _cosine_of_turn(turn: Fraction) -> Fraction:
         term = term * square // (k * (k - 1) * _ONE)
         total += sign * term
     return Fraction(total, _ONE).limit_denominator(10**50)
+
+
+class TorqueSegment(NamedTuple):
+    """From `start` to `end` (s) the torque is offset + slope·t (N m, N m/s; exact)."""
+
+    start: float
+    end: float
+    offset: Fraction
+    slope: Fraction
+
+
+def torque_segments(scene: Scene) -> list[TorqueSegment]:
+    """The whole duration, cut where the torque has a kink or a jump; one segment where it is constant."""
+    table = [(Fraction(t), Fraction(torque)) for t, torque in scene.rotor_torque]
+    if scene.has_constant_torque:
+        return [TorqueSegment(0.0, scene.duration, table[0][1] if table else Fraction(0), Fraction(0))]
+    end = Fraction(scene.duration)
+    rows = [(Fraction(0), table[0][1]), *table, (max(end, table[-1][0]), table[-1][1])]
+    segments = []
+    for (t0, torque0), (t1, torque1) in itertools.pairwise(rows):
+        if t0 < min(t1, end):
+            slope = (torque1 - torque0) / (t1 - t0)
+            segments.append(TorqueSegment(float(t0), float(min(t1, end)), torque0 - slope * t0, slope))
+    return segments
+
+
+# Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).
+_UNIT_FREQUENCY = 100.0
+
+
+def rate_units(scene: Scene) -> Array:
+    """(1 + moving blades,) rad/s: 1, or a coordinate's own frequency where that is above 100 rad/s.
+
+    Without it the quarter period that turns an angle into a rate would count as growth of an error: 1e5-fold on a
+    bearing of 1e12 N m/rad, where nothing grows at all. The frequency is that of the bearing's spring, of gravity on
+    the offset mass and of the rotor's turning, at the start.
+    """
+    form = rotor_form(scene)
+    spin = abs(scene.initial_rates[0])
+    frequencies = [0.0]
+    for blade in form.blades:
+        moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
+        frequencies.append(max(math.sqrt(moment / blade.pitch_inertia), spin))
+    return np.array([frequency if frequency > _UNIT_FREQUENCY else 1.0 for frequency in frequencies])

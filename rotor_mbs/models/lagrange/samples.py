@@ -1,4 +1,4 @@
-"""From states of the closed form to a trajectory: held pitches, tip path, energies. Knows no integrator."""
+"""From states of the closed form to a trajectory: fixed pitches, tip path, energies. Knows no integrator."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def items(scene: Scene) -> list[Item]:
     built = [Item("equation", "rotor")]
     built += [Item("equation", f"pitch {i + 1}") for i in form.moving]
     built += [
-        Item("term", f"blade {i + 1} held", "its pitch has no inertia")
+        Item("term", f"blade {i + 1} fixed", "its pitch has no inertia")
         for i in range(len(scene.blades))
         if i not in form.moving
     ]

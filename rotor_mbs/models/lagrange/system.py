@@ -13,14 +13,13 @@ import numpy as np
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
-from rotor_mbs.models.lagrange.torque import Stretch, stretches
+from rotor_mbs.models.lagrange.parameters import RotorForm, TorqueSegment, rotor_form, torque_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration
 
 
 @dataclass
-class System:
+class EquationSystem:
     """First-order equations of a scene.
 
     equations   [(symbol, right-hand side)]: angles, rates, and the work where it is not known in closed form
@@ -32,20 +31,20 @@ class System:
     parameters: Parameters
     moving: tuple[int, ...]
     has_work: bool
-    stretches: list[Stretch]
+    segments: list[TorqueSegment]
 
     @property
     def structure(self) -> tuple[int, ...]:
-        return (*self.parameters.structure, len(self.equations), len(self.stretches) > 1)
+        return (*self.parameters.structure, len(self.equations), len(self.segments) > 1)
 
 
-def build_system(scene: Scene) -> System:
+def build_system(scene: Scene) -> EquationSystem:
     """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed."""
     engine = heyoka()
     parameters = Parameters()
     form, torque = equation_numbers(scene, parameters)
-    pieces = stretches(scene)
-    has_work = scene.wants("energy") and (len(pieces) > 1 or scene.has_damping)
+    segments = torque_segments(scene)
+    has_work = scene.wants("energy") and (len(segments) > 1 or scene.has_damping)
     count = 1 + len(form.blades)
     names = [f"q{i}" for i in range(count)] + [f"w{i}" for i in range(count)]
     symbols = engine.make_vars(*names)
@@ -54,19 +53,19 @@ def build_system(scene: Scene) -> System:
     equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
     if has_work:
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, torque)))
-    return System(equations, parameters, (0, *(1 + i for i in form.moving)), has_work, pieces)
+    return EquationSystem(equations, parameters, (0, *(1 + i for i in form.moving)), has_work, segments)
 
 
 def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, Any]:
     """Form, and torque in N m; takes the scene's numbers into `parameters`, in the order that integrators have them."""
     form = rotor_form(scene, parameters)
-    pieces = stretches(scene)
-    if len(pieces) > 1:
-        return form, parameters.own(pieces[0].offset) + parameters.own(pieces[0].slope) * heyoka().time
-    return form, parameters(pieces[0].offset)
+    segments = torque_segments(scene)
+    if len(segments) > 1:
+        return form, parameters.own(segments[0].offset) + parameters.own(segments[0].slope) * heyoka().time
+    return form, parameters(segments[0].offset)
 
 
-def initial_state(scene: Scene, system: System) -> list[Fraction]:
+def initial_state(scene: Scene, system: EquationSystem) -> list[Fraction]:
     """The scene's doubles, exact, in the order of the equations."""
     columns = system.moving
     values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
@@ -94,11 +93,11 @@ class Propagation:
     The state at the samples is in `states` ((n, variables), cut before the first row that is not finite).
     """
 
-    def __init__(self, integrator: Any, system: System, initial: Any, times: Array) -> None:
+    def __init__(self, integrator: Any, system: EquationSystem, initial: Any, times: Array) -> None:
         self._integrator = integrator
         self._initial = initial
         self._times = times
-        self._stretches = [_StretchGrid(piece, times, initial.dtype) for piece in system.stretches]
+        self._segments = [_SegmentGrid(segment, times, initial.dtype) for segment in system.segments]
         self._torque = len(system.parameters.values) - 2
         self.states = initial[None, :]
 
@@ -110,33 +109,33 @@ class Propagation:
         steps, message = 0, ""
         # Asked after every step, it costs a quarter of the run: only where there is a limit.
         callback = _within_time if deadline.is_set() else None
-        for stretch in self._stretches:
-            if len(self._stretches) > 1:
-                integrator.pars[self._torque :] = stretch.torque
+        for segment in self._segments:
+            if len(self._segments) > 1:
+                integrator.pars[self._torque :] = segment.torque
             with deadline.polled():
-                outcome, _, _, taken, _, states = integrator.propagate_grid(stretch.grid, callback=callback)
+                outcome, _, _, taken, _, states = integrator.propagate_grid(segment.grid, callback=callback)
             steps += taken
-            rows.append(states[1 : 1 + stretch.samples])
-            message = deadline.words() if deadline.is_over() else failure(outcome)
+            rows.append(states[1 : 1 + segment.samples])
+            message = deadline.message() if deadline.is_over() else failure(outcome)
             if message:
                 break
         states = np.concatenate(rows)
         finite = np.isfinite(states.astype(float, copy=False))
         self.states = states if finite.all() else states[: int(np.argmin(finite.all(axis=1)))]
         reached = float(self._times[max(len(self.states) - 1, 0)])
-        return Integration(not message, message, reached, steps, out_of_time=message == deadline.words())
+        return Integration(not message, message, reached, steps, out_of_time=message == deadline.message())
 
 
 def _within_time(_integrator: Any) -> bool:
     return not deadline.is_over()
 
 
-class _StretchGrid:
-    """The times at which a stretch is stopped at: its start, the samples inside, and its end."""
+class _SegmentGrid:
+    """The times at which a segment is stopped at: its start, the samples inside, and its end."""
 
-    def __init__(self, piece: Stretch, times: Array, dtype: Any) -> None:
-        inside = times[(times > piece.start) & (times <= piece.end)]
+    def __init__(self, segment: TorqueSegment, times: Array, dtype: Any) -> None:
+        inside = times[(times > segment.start) & (times <= segment.end)]
         self.samples = len(inside)
-        end = [] if len(inside) and inside[-1] == piece.end else [piece.end]
-        self.grid = np.array([piece.start, *inside, *end]).astype(dtype)
-        self.torque = array_of([piece.offset, piece.slope], quad=dtype != np.float64)
+        end = [] if len(inside) and inside[-1] == segment.end else [segment.end]
+        self.grid = np.array([segment.start, *inside, *end]).astype(dtype)
+        self.torque = array_of([segment.offset, segment.slope], quad=dtype != np.float64)

@@ -82,7 +82,7 @@ class MujocoSolver:
                 steps += taken
                 if message:
                     break
-        out_of_time = message == time_limit.words()
+        out_of_time = message == time_limit.message()
         return Integration(not message, message, rows.times[-1], steps, steps * self._stages, out_of_time)
 
     def _advance(self, interval: Interval) -> tuple[int, str]:

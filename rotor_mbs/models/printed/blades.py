@@ -25,7 +25,7 @@ class PointMassRotor:
 
     @property
     def pitches_move(self) -> bool:
-        """c = 0 takes the inertia out of (47): the pitch is then held (Fig. 4b)."""
+        """c = 0 takes the inertia out of (47): the pitch is then fixed (Fig. 4b)."""
         return self.c != 0.0
 
 

@@ -125,7 +125,7 @@ def right_formulas() -> Entries:
     """Text of the right entries, in closed form."""
     entries: Entries = {}
     for equation, name in MATRICES:
-        names = {**SYMBOLS, "errata": matrices.MENDED}
+        names = {**SYMBOLS, "errata": matrices.CORRECTED}
         entries |= _matrix_entries(equation, _call(getattr(matrices, name), names))
     m, c, d, g = (SYMBOLS[name] for name in "mcdg")
     terms = []
@@ -137,7 +137,7 @@ def right_formulas() -> Entries:
 
 
 def right_closed_form(m: Any, c: Any, d: Any, g: Any, s2: Any, c2: Any, s3: Any, c3: Any) -> BladeTerms:
-    """What one blade adds to the right equations: (25), (29), (30), (32) with E1 and E2 mended."""
+    """What one blade adds to the right equations: (25), (29), (30), (32) with E1 and E2 corrected."""
     return BladeTerms(
         d_22=c**2 * m * c3**2 + d**2 * m,
         d_23=-c * d * m * s3,

@@ -18,7 +18,7 @@ from rotor_mbs.models.printed.entries import (
     right_entries,
     right_formulas,
 )
-from rotor_mbs.models.printed.matrices import MENDED, Errata
+from rotor_mbs.models.printed.matrices import CORRECTED, Errata
 
 # Lengths, mass and gravity are drawn of order one: rounding is some 1e-16, a wrong formula some 1e-1.
 TOLERANCE = 1e-12
@@ -90,7 +90,7 @@ def _subsets() -> list[tuple[str, ...]]:
 
 
 def _only(subset: tuple[str, ...]) -> Errata:
-    return Errata(*(name in subset for name in NAMES)) if subset else MENDED
+    return Errata(*(name in subset for name in NAMES)) if subset else CORRECTED
 
 
 def _difference(key: Key, first: Sequence[Entries], second: Sequence[Entries]) -> float:

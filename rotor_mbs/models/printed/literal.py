@@ -135,7 +135,7 @@ def rotor_gravity(m: float, c: float, d: float, g: float, q2: float, c3: float, 
     return -(moments[0] + moments[1] + moments[2])
 
 
-def held_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: float, phases: Sequence[float]) -> float:
+def fixed_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: float, phases: Sequence[float]) -> float:
     """q̈2 in rad/s² where c = 0: a pitch has no inertia, (47) is zero, and the first row of (33) is a pendulum's.
 
     Summed over the blades at the given phases (rad).

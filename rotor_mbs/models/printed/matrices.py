@@ -16,7 +16,7 @@ LAST_ROW_OF_DERIVATIVE = (0, 0, 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Errata:
-    """Which of the three faults are in: True as printed, False mended.
+    """Which of the three faults are in: True as printed, False corrected.
 
     e1   (8) row 2 column 4 is c c3 (and (17) its derivative), where y does not depend on q2
     e2   (19) row 1 column 4 has s2 in place of c2
@@ -29,7 +29,7 @@ class Errata:
 
 
 AS_PRINTED = Errata()
-MENDED = Errata(e1=False, e2=False, e3=False)
+CORRECTED = Errata(e1=False, e2=False, e3=False)
 
 
 def a3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:

@@ -70,7 +70,7 @@ class PrintedSolver:
         )
 
     def _coordinates(self, states: Array) -> tuple[Array, Array]:
-        """Angles and rates, (n, 1 + blades) each, of states of what moves; a held pitch stays where it started."""
+        """Angles and rates, (n, 1 + blades) each, of states of what moves; a fixed pitch stays where it started."""
         angles = np.tile(np.array(self._scene.initial_angles, dtype=float), (len(states), 1))
         rates = np.zeros_like(angles)
         angles[:, : self._moving] = states[:, : self._moving]
@@ -93,7 +93,7 @@ class PrintedModel:
             if rotor.pitches_move:
                 built.append(Item("equation", f"pitch {i}", sources[1]))
             else:
-                built.append(Item("term", f"blade {i} held", "its pitch has no inertia"))
+                built.append(Item("term", f"blade {i} fixed", "its pitch has no inertia"))
         if scene.gravity != 0.0:
             built.append(Item("term", "gravity"))
         if scene.has_torque:
@@ -121,7 +121,7 @@ class PrintedModel:
     def _accelerations(self, rotor: PointMassRotor) -> Accelerations:
         m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
         if not rotor.pitches_move:
-            return lambda torque, state: [literal.held_pitch_acceleration(m, d, g, torque, state[0], rotor.phases)]
+            return lambda torque, state: [literal.fixed_pitch_acceleration(m, d, g, torque, state[0], rotor.phases)]
         if self._errata:
             derived = DerivedRotor(m, c, d, g, rotor.phases, self._errata)
             n = 1 + len(rotor.phases)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.models.printed import matrices
 from rotor_mbs.models.printed.blades import PointMassRotor
-from rotor_mbs.models.printed.matrices import MENDED
+from rotor_mbs.models.printed.matrices import CORRECTED
 
 Array = NDArray[np.float64]
 
@@ -33,10 +33,10 @@ def tip_path(rotor: PointMassRotor, angles: Array) -> Array:
 
 
 def kinetic_energy(rotor: PointMassRotor, angles: Array, rates: Array) -> Array:
-    """(n,) J: ½ m v² with v from the last columns of (8), E1 mended, and (9)."""
+    """(n,) J: ½ m v² with v from the last columns of (8), E1 corrected, and (9)."""
     total = np.zeros(len(angles))
     for pitch, sines in enumerate(_sines(rotor, angles), start=1):
-        u32 = matrices.u32(*sines, rotor.c, rotor.d, MENDED)
+        u32 = matrices.u32(*sines, rotor.c, rotor.d, CORRECTED)
         u33 = matrices.u33(*sines, rotor.c)
         for by_q2, by_q3 in zip(u32[:3], u33[:3], strict=True):
             total += 0.5 * rotor.m * (by_q2[3] * rates[:, 0] + by_q3[3] * rates[:, pitch]) ** 2
@@ -54,7 +54,7 @@ def potential_energy(rotor: PointMassRotor, angles: Array) -> Array:
 def torque_work(
     torque: Sequence[tuple[float, float]], rotor_angle: Callable[[Array], Array], knots: Array, times: Array
 ) -> Array:
-    """(n,) J done up to each of `times` by a torque ((t, τ), ...) that is linear between its rows and held outside.
+    """(n,) J done up to each of `times` by a torque ((t, τ), ...) that is linear between its rows and fixed outside.
 
     Where τ is linear, ∫τ q̇2 dt = [τ q2] - τ' ∫q2 dt, and the integral is exact for a rotor_angle that is a quartic
     between `knots` (s). No column of rates enters: the work is that of the angles that are reported.
