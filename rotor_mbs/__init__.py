@@ -17,10 +17,7 @@ Examples
 ('ok', (101, 4))
 """
 
-from __future__ import annotations
-
-import importlib
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # what type checkers take for true; importing `typing` would cost as much as all else here
 
 __version__ = "0.1.0"
 
@@ -67,8 +64,10 @@ _HOME = {name: place for place, names in _PLACES.items() for name in names}
 __all__ = sorted(_HOME)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """PEP 562: a public name is imported when it is first asked for."""
+    import importlib
+
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_HOME[name]), name)
