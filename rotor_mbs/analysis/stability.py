@@ -15,18 +15,18 @@ import numpy as np
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 from rotor_mbs.store.records import Record, read_records
 
-TARGET = 1e-6  # rad: what "right" means on the map
+TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 
-# Outcome -> symbol, words. Colour is the report's.
+# Outcome -> symbol, text. Colour is the report's.
 OUTCOMES = {
     "holds": ("✓", "holds"),
-    "energy_alone": ("E", "keeps its energy; nothing else to hold it against"),
+    "energy_alone": ("E", "conserves energy; there is nothing else to compare it with"),
     "smaller_step": ("▾", "holds with a smaller step"),
     "inaccurate": ("≈", "ends, but off its bound"),
     "loses_energy": ("↯", "loses or makes energy"),
-    "says_so": ("✗", "fails and says so"),
+    "says_so": ("✗", "fails and reports it"),
     "false_success": ("!", "fails and claims success"),
-    "refuses": ("–", "refuses, rightly: no motion to follow"),
+    "refuses": ("–", "refuses a scene in which no motion exists"),
     "timed_out": ("⧗", "too slow for the time limit"),
 }
 
@@ -37,11 +37,11 @@ _ENERGY_LOST = 1e-3
 
 
 @dataclass(frozen=True)
-class Cell:
-    """A scene under a method.
+class SuiteRun:
+    """A run of the suite: a scene by a method.
 
     outcome      a key of OUTCOMES, from the run's status and what a ladder of steps found
-    message      the run's own; for "energy_alone", why nothing else holds it
+    message      the run's own; for "energy_alone", why nothing else judges it
     angle_error  rad up to the horizon; None without a reference, or where the horizon is before the second sample
     time_reached s: of the last finite sample, whatever the engine says
     step         s: the step that 1e-6 rad needs, where a ladder found it
@@ -71,7 +71,7 @@ class Cell:
 
 
 def family_of(scene: str) -> str:
-    """What a shipped scene stresses: stiff, or the first word of an extreme scene's name."""
+    """What a shipped scene stresses: stiff, or the first part of an extreme scene's name."""
     folder, _, name = scene.rpartition("/")
     if folder == "stiff":
         return "stiff"
@@ -96,18 +96,18 @@ _FAMILIES = {
 }
 
 
-def cells(path: Path) -> list[Cell]:
+def suite_runs(path: Path) -> list[SuiteRun]:
     """Every run of a results file, in its order. Raises StoreError."""
     ladders = {(record.scene, record.name): record for record in read_records(path, "steps")}
     found = []
     with open_results(path) as results:
         for scene in results.scenes.values():
             for name, run in scene.methods.items():
-                found.append(_cell(scene, run, ladders.get((scene.name, name))))
+                found.append(_suite_run(scene, run, ladders.get((scene.name, name))))
     return found
 
 
-def _cell(scene: StoredScene, run: StoredRun, ladder: Record | None) -> Cell:
+def _suite_run(scene: StoredScene, run: StoredRun, ladder: Record | None) -> SuiteRun:
     facts = run.attributes
     error = facts.get("angle_error_max")
     reference = scene.reference
@@ -115,7 +115,7 @@ def _cell(scene: StoredScene, run: StoredRun, ladder: Record | None) -> Cell:
     ladder_reaches = ladder is not None and bool(np.any(_ok(ladder) & (ladder.arrays["angle_error_max"] <= TARGET)))
     has_reference = reference is not None and reference.status == "ok"
     outcome = _outcome(run, ladder, has_motion=has_reference)
-    return Cell(
+    return SuiteRun(
         scene.name,
         run.method,
         run.status,
@@ -155,13 +155,13 @@ def _outcome(run: StoredRun, ladder: Record | None, *, has_motion: bool) -> str:
 
 def _not_compared(reference: StoredRun | None) -> str:
     if reference is None:
-        return "held by its energy alone: there is no reference"
+        return "judged by its energy alone: there is no reference"
     if len(reference.array("time")) < 2:
-        return f"held by its energy alone: no reference ({reference.attributes['message']})"
-    return "held by its energy alone: the horizon is before the second sample"
+        return f"judged by its energy alone: no reference ({reference.attributes['message']})"
+    return "judged by its energy alone: the horizon is before the second sample"
 
 
-def unreached(found: Iterable[Cell]) -> list[str]:
+def unreached(found: Iterable[SuiteRun]) -> list[str]:
     """Stiff and light scenes with a reference on which no method reaches 1e-6 rad."""
     by_scene: dict[str, bool] = {}
     for cell in found:
@@ -170,7 +170,7 @@ def unreached(found: Iterable[Cell]) -> list[str]:
     return [scene for scene, reached in by_scene.items() if not reached]
 
 
-def reached_by(found: Iterable[Cell], scene: str) -> str | None:
+def reached_by(found: Iterable[SuiteRun], scene: str) -> str | None:
     """The method that reaches 1e-6 rad on the scene in the least time; None where none does."""
     able = [cell for cell in found if cell.scene == scene and cell.status == "ok" and cell.reaches_target]
     return min(able, key=lambda cell: cell.run_time_s).method if able else None
@@ -194,14 +194,14 @@ class Advice:
     false_successes: int
 
 
-def advice(found: Sequence[Cell]) -> list[Advice]:
+def advice(found: Sequence[SuiteRun]) -> list[Advice]:
     """Per method, by family: use where nine tenths hold, avoid where fewer than half do even with a smaller step."""
     return [
         _advice(method, [c for c in found if c.method == method]) for method in dict.fromkeys(c.method for c in found)
     ]
 
 
-def _advice(method: str, own: Sequence[Cell]) -> Advice:
+def _advice(method: str, own: Sequence[SuiteRun]) -> Advice:
     use, in_part, avoid = [], [], []
     for family in dict.fromkeys(cell.family for cell in own):
         inside = [cell for cell in own if cell.family == family and cell.outcome != "refuses"]
@@ -215,19 +215,19 @@ def _advice(method: str, own: Sequence[Cell]) -> Advice:
             in_part.append(family)
         else:
             avoid.append(family)
-    held = sum(cell.outcome in _HOLDS for cell in own)
+    holding = sum(cell.outcome in _HOLDS for cell in own)
     by_energy = sum(cell.outcome == "energy_alone" for cell in own)
     claimed = sum(cell.false_success for cell in own)
     smaller = any(cell.outcome == "smaller_step" and cell.family in in_part for cell in own)
-    return Advice(method, held, by_energy, len(own), tuple(use), tuple(in_part), smaller, tuple(avoid), claimed)
+    return Advice(method, holding, by_energy, len(own), tuple(use), tuple(in_part), smaller, tuple(avoid), claimed)
 
 
-def summary_lines(found: Sequence[Cell]) -> list[str]:
-    """The advice in plain words, a line per method; a family is named by what its scenes are."""
-    return [in_words(one) for one in advice(found)]
+def summary_lines(found: Sequence[SuiteRun]) -> list[str]:
+    """The advice, a line per method."""
+    return [advice_line(one) for one in advice(found)]
 
 
-def in_words(one: Advice) -> str:
+def advice_line(one: Advice) -> str:
     """One line: where the method holds, what to use it for and what not."""
     alone = f" ({one.by_energy} by its energy alone)" if one.by_energy else ""
     parts = [f"{one.method}: holds on {one.holds} of {one.of}{alone}"]

@@ -1,6 +1,6 @@
 """What a diagram of error against run time says in numbers: Pareto front, time to an accuracy, orders, growth of cost.
 
-Knows curves as arrays; no words and no picture.
+Knows curves as arrays; no text and no picture.
 """
 
 from __future__ import annotations

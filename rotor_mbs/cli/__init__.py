@@ -33,6 +33,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("interrupted; what was finished is kept, the same command goes on from there", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # The reader of our output went away (`rotor-mbs list | head`): nothing to tell, and nobody to tell it to.
+        # The reader of our output went away (`rotor-mbs list | head`): nothing more to print.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK

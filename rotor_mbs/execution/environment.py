@@ -35,7 +35,7 @@ def versions_with(*distributions: str) -> dict[str, str]:
 
 @functools.cache
 def machine() -> dict[str, str]:
-    """Operating system and processor, as told by the machine."""
+    """Operating system and processor, as the system reports them."""
     return {"platform": platform.platform(), "cpu": f"{_processor()}, {os.cpu_count()} cores"}
 
 

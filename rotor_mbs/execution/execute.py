@@ -79,7 +79,7 @@ OnProgress: TypeAlias = Callable[[int, int, Outcome], None]
 
 
 def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
-    """Where nobody wants to know."""
+    """For calls that report no progress."""
 
 
 def execute(

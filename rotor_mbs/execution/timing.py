@@ -1,7 +1,7 @@
 """Fair timing: warm-ups, then rounds over all points in turn, as many as a budget allows. Knows no engine, no process.
 
 A point is one method at one setting. Rounds spread a drift of the machine over all points alike; the budget is shared
-out so that the cheap points get all their repeats before a dear one gets its second.
+out so that the cheap points get all their repeats before an expensive one gets its second.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ T = TypeVar("T", bound=Hashable)
 
 LONG_RUN_S = 0.5  # runs longer than this are repeated LONG_REPEATS times at most
 LONG_REPEATS = 5
-# Of the budget, what the warm-up runs may take before dear rungs are left out, so that there is time for about two
+# Of the budget, what the warm-up runs may take before expensive rungs are left out, so that there is time for about two
 # rounds; and what warm-ups and building may take together.
 _WARM_UP_SHARE, _BUILD_SHARE = 0.3, 0.6
 
@@ -122,7 +122,7 @@ def _expected(earlier: Sequence[Warm]) -> float:
 def allot(seconds: Mapping[T, float], wanted: Mapping[T, int], budget_s: float) -> dict[T, int]:
     """Repeats of each point: all it wants or what an equal share of time allows, and one in any case.
 
-    The share is the largest with which the sum stays within the budget: what cheap points leave goes to dear ones.
+    The share is the largest with which the sum stays within the budget: what cheap points leave goes to expensive ones.
     """
 
     def counts(share: float) -> dict[T, int]:

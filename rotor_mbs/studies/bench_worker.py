@@ -1,6 +1,6 @@
 """What the timing worker of a bench does: it builds a point, runs it as often as asked, and judges the last run.
 
-A point is one method at one setting. Engines are loaded beforehand, so that no run is charged for that.
+A point is one method at one setting. Engines are loaded beforehand, so that this is part of no run's time.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[st
     """A bench asks how large an error is: it is a failure only where nothing of the motion is right."""
     if status not in ("ok", "inaccurate"):
         return status, message
-    if "angle_error_max" not in metrics:  # no reference: energy alone tells
+    if "angle_error_max" not in metrics:  # no reference: energy alone decides
         return ("ok", "") if metrics.get("energy_drift_max", 0.0) < USELESS_DRIFT else (status, message)
     error = metrics["angle_error_max"]
     if error < USELESS_RAD:

@@ -23,7 +23,7 @@ from rotor_mbs.studies.check_probes import Measured, perform_probe, probes, spee
 from rotor_mbs.studies.frozen import shipped_files
 from rotor_mbs.studies.run import run_scenes
 
-# The chain takes as long as all else together: four scenes of the paper tell what it has to tell.
+# The chain takes as long as all else together; four scenes of the paper cover what it can show.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
 _TIMEOUT_S = 60.0
 _OF_EVERY_RUN = "status"  # a check that each run has one verdict of

@@ -1,6 +1,6 @@
-"""The printed equations against the paper's own derivation of them, and that one, mended, against the closed form.
+"""The printed equations against the paper's own derivation, and the corrected derivation against the closed form.
 
-At random states: an identity holds for all of them or is none. Whether the print is right is not asked here.
+At random states: an identity holds for all of them. Whether the printed equations are correct is not asked here.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ def differences() -> Iterator[tuple[str, float, str]]:
     yield "entries corrected", *_worst([(derived_entries(s, CORRECTED), right_entries(s)) for s in states])
     for blades in (1, 3):
         yield f"accelerations of {blades}", _accelerations(blades), "(33) or (39)-(56) against (24)-(38), errata in"
-        yield f"accelerations of {blades}, mended", _mended(blades), "(24)-(38) without errata against the closed form"
-    yield "held pitch", _held(), "(33) with c = 0 against the closed form"
+        look = "(24)-(38) without errata against the closed form"
+        yield f"accelerations of {blades}, corrected", _corrected(blades), look
+    yield "fixed pitch", _fixed_pitch(), "(33) with c = 0 against the closed form"
 
 
 def _worst(pairs: list[tuple[Entries, Entries]]) -> tuple[float, str]:
@@ -74,26 +75,26 @@ def _accelerations(blades: int) -> float:
     return worst
 
 
-def _mended(blades: int) -> float:
-    """Each erratum that changes nothing by itself is left in: E3 where E2 is mended."""
+def _corrected(blades: int) -> float:
+    """Each erratum that changes nothing by itself is left in: E3 where E2 is corrected."""
     worst = 0.0
     for angles, rates, (m, c, d, g) in _random(blades):
         form = rotor_form(_scene(blades, m, c, d, g))
-        right = closed_form.accelerations(angles, rates, form, _TORQUE, math.sin, math.cos)
+        exact = closed_form.accelerations(angles, rates, form, _TORQUE, math.sin, math.cos)
         for errata in (CORRECTED, Errata(e1=False, e2=False, e3=True)):
             derived = DerivedRotor(m, c, d, g, _phases(blades), errata).accelerations(_TORQUE, angles, rates)
-            worst = _larger(worst, _off(derived, right))
+            worst = _larger(worst, _off(derived, exact))
     return worst
 
 
-def _held() -> float:
+def _fixed_pitch() -> float:
     worst = 0.0
     for angles, rates, (m, _, d, g) in _random(3):
         for gravity in (g, 0.0):
             form = rotor_form(_scene(1, m, 0.0, d, gravity))
-            right = closed_form.accelerations(angles[:1], rates[:1], form, _TORQUE, math.sin, math.cos)
+            exact = closed_form.accelerations(angles[:1], rates[:1], form, _TORQUE, math.sin, math.cos)
             found = literal.fixed_pitch_acceleration(m, d, gravity, _TORQUE, angles[0] - 0.7, [0.7])
-            worst = _larger(worst, _off([found], right))
+            worst = _larger(worst, _off([found], exact))
     return worst
 
 
@@ -109,5 +110,5 @@ def _off(found: object, expected: object) -> float:
 
 
 def _larger(worst: float, off: float) -> float:
-    """The larger; not a number where either is none."""
+    """The larger; NaN where either is NaN."""
     return off if not off <= worst else worst

@@ -67,7 +67,7 @@ def probes() -> list[Case]:
 
 
 def speed_probes() -> list[Case]:
-    """Run times; worth something on an idle machine alone."""
+    """Run times; meaningful on an idle machine alone."""
     return [probe("speed", "paper/fig11", method) for method in SPEED_RATIOS]
 
 
@@ -94,7 +94,7 @@ def _run(case: Case, scene: Scene, **settings: object) -> Trajectory | None:
 
 
 def _symmetry(case: Case) -> list[Measured]:
-    """Every blade handed on to the next place and the rotor turned back by one; the mirror image in the rotor's plane.
+    """Every blade in the place of the next one and the rotor turned back by one; the mirror image in the rotor's plane.
 
     The mirror turns y into -y: azimuths stay, pitches change sign.
     """
@@ -102,7 +102,7 @@ def _symmetry(case: Case) -> list[Measured]:
     base = _run(case, scene)
     q, w = scene.initial_angles, scene.initial_rates
     back = 2.0 * math.pi / len(scene.blades)
-    handed = replace(
+    permuted = replace(
         scene,
         initial_angles=(q[0] - back, q[-1], *q[1:-1]),
         initial_rates=(w[0], w[-1], *w[1:-1]),
@@ -112,7 +112,7 @@ def _symmetry(case: Case) -> list[Measured]:
     growth = _growth(case.scene.name, scene.samples)
     found = []
     for name, variant, columns, sign in (
-        ("blades handed on", handed, [2, *range(3, len(q)), 1], 1.0),
+        ("blades permuted", permuted, [2, *range(3, len(q)), 1], 1.0),
         ("mirrored along the shaft", mirrored, list(range(1, len(q))), -1.0),
     ):
         other = _run(case, variant)
@@ -140,7 +140,7 @@ def _order(case: Case) -> list[Measured]:
 
 
 def _reference(case: Case) -> list[Measured]:
-    """Computed now against frozen; a stand-in is worth its own uncertainty and is held to that."""
+    """Computed now against frozen; a fallback reference is compared within its own uncertainty."""
     scene = case.scene
     frozen = load_frozen(case.scene.name)
     found = solve(REFERENCE, scene, {}).trajectory
@@ -151,7 +151,7 @@ def _reference(case: Case) -> list[Measured]:
     beyond = float(np.maximum(off - 10.0 * found.angle_uncertainty, 0.0).max())
     if found.angle_uncertainty.max() > 1e-12:
         worst = found.angle_uncertainty.max()
-        look += f"; a stand-in in double precision, uncertain to {worst:.0e} rad, which is allowed for"
+        look += f"; a fallback in double precision, uncertain to {worst:.0e} rad, which is allowed for"
     growth = np.abs(np.log(running_growth(found) / running_growth(frozen)))
     until = horizon_samples(frozen)
     return [
@@ -166,10 +166,10 @@ def _printed(case: Case) -> Iterator[Measured]:
 
 
 def _rules(case: Case) -> Iterator[Measured]:
-    """One number for each hand-made run: 1 where it is called what it is not."""
+    """One number for each known run: 1 where its status is not the known one."""
     for run in known_runs(load_bounds(), method_names(is_corrected=True)):
         fault = run.faults()
-        look = fault or "called what it is"
+        look = fault or "its known status"
         yield Measured("rules", case.scene.name, run.method, run.name, float(bool(fault)), "faults", look)
     for channel, off in metrics_off():
         look = f"off by {off:.1e}: a number that is stored with a run"
@@ -183,7 +183,7 @@ def _rules(case: Case) -> Iterator[Measured]:
 def _speed(case: Case) -> list[Measured]:
     """Run time over that of a fixed piece of arithmetic just before and after it, against the ratio on file.
 
-    The median over fifteen runs: what else the machine does hits both, or one run and not the others.
+    The median over fifteen runs: other load of the machine affects both, or one run alone.
     """
     scene = _scene(case, 10.0)
     solve(case.method, scene, {})

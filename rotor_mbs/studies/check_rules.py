@@ -1,4 +1,4 @@
-"""The status rules on hand-made runs whose outcome is known: each rule from both sides. Knows no engine, no file."""
+"""The status rules on constructed runs whose status is known: each rule from both sides. Knows no engine, no file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rotor_mbs.solution.metrics import compare
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 
-# The engine's word, as the arguments of `Integration`: success, message, time reached, steps, evaluations, out of time.
+# The engine's report, as arguments of `Integration`: success, message, time reached, steps, evaluations, out of time.
 _DONE, _FAILED = (True,), (False, "gave up")
 _OUT_OF_TIME = (False, "ended", 0.5, None, None, True)
 _GRAVITY, _STIFFNESS, _SPRUNG = 0.5, 2e4, 0.5
@@ -43,7 +43,7 @@ _JUST = 3e-4  # how far on either side of a bound, relatively: far above round-o
 
 @dataclass(frozen=True)
 class KnownRun:
-    """A run of which it is known what it is."""
+    """A run whose status is known."""
 
     name: str
     method: str
@@ -68,9 +68,17 @@ class KnownRun:
 
 
 def known_runs(bounds: Bounds, methods: tuple[str, ...]) -> list[KnownRun]:
-    """`bounds`: what the statuses are to be true to; `methods`: those that are held to them."""
+    """`bounds`: those that the statuses follow; `methods`: those with bounds."""
     found = [run for method in methods for run in _at_the_bounds(method, bounds)]
-    return [*found, *_broken_off(), *_singular(), *_conditioned(bounds), *_carried(bounds), *_gross(), *_not_held()]
+    return [
+        *found,
+        *_broken_off(),
+        *_singular(),
+        *_conditioned(bounds),
+        *_carried(bounds),
+        *_gross(),
+        *_unbounded(),
+    ]
 
 
 def metrics_off() -> Iterator[tuple[str, float]]:
@@ -122,7 +130,7 @@ def shares_off(scene: Scene) -> float:
 
 
 def _moving(pitch: float = 0.0) -> Trajectory:
-    """Uniform rotation, every pitch held at `pitch` rad; energies that change into each other without loss."""
+    """Uniform rotation, every pitch at `pitch` rad; energies that change into each other without loss."""
     time = np.linspace(0.0, 1.0, 11)
     angles, rates = np.full((11, 4), pitch), np.zeros((11, 4))
     angles[:, 0], rates[:, 0] = 0.5 * time, 0.5
@@ -173,10 +181,10 @@ def _at_the_bounds(method: str, bounds: Bounds) -> Iterator[KnownRun]:
 def _broken_off() -> Iterator[KnownRun]:
     exact, method = _moving(), "lagrange/taylor"
     nothing = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))  # with no sample there are no energies
-    yield KnownRun("complete, the engine content", method, "ok", exact)
+    yield KnownRun("complete, the engine reports success", method, "ok", exact)
     silent = exact.replace(kinetic_energy=None, potential_energy=None, work=None)
     yield KnownRun("complete, energies not asked for", method, "ok", silent)
-    yield KnownRun("complete, the engine not content", method, "solver_failed", exact, _FAILED)
+    yield KnownRun("complete, the engine reports failure", method, "solver_failed", exact, _FAILED)
     short = _cut(exact, 10)
     yield KnownRun("one sample short of the end, a claim of success", method, "diverged", short, is_false_success=True)
     yield KnownRun("one sample short of the end, a failure", method, "solver_failed", _cut(exact, 10), _FAILED)
@@ -282,8 +290,8 @@ def _gross() -> Iterator[KnownRun]:
         yield KnownRun(f"an error of {side:g} %", method, "inaccurate", wrong, reference=exact, is_false_success=lie)
 
 
-def _not_held() -> Iterator[KnownRun]:
-    """The printed equations are not held to energy and reference, only to getting there."""
+def _unbounded() -> Iterator[KnownRun]:
+    """The printed equations have no bounds for energy and error: they must reach the end, no more."""
     exact = _moving()
     yield KnownRun(
         "printed, far off", "printed/ode45", "ok", _with_drift(_with_error(exact, 1.0), 1.0), reference=exact

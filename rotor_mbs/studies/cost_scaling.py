@@ -44,7 +44,7 @@ class CostStudy:
 
 def cost_studies() -> tuple[CostStudy, CostStudy]:
     """Blades: like the paper's Fig. 8, every blade pitched a little, for the second in which no error has grown much.
-    Duration: one blade with its pitch at rest, a plain pendulum, which is regular for ever (Fig. 3)."""
+    Duration: one blade with its pitch at rest, a plain pendulum, whose motion stays regular (Fig. 3)."""
     many, one = find_scenes(["paper/fig08"])[0], find_scenes(["paper/fig03"])[0]
     by_duration = {t: replace(one, duration=t, samples=round(10 * t) + 1) for t in _DURATIONS}
     return (

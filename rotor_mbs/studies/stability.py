@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rotor_mbs.analysis.stability import Cell, cells
+from rotor_mbs.analysis.stability import SuiteRun, suite_runs
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.methods.catalogue import find_method, method_names
@@ -20,7 +20,7 @@ from rotor_mbs.studies.step_limits import LIMIT, STEPS, has_limit, ladder_record
 
 SUITE = ("stiff", "extreme")
 
-# The method that `run` relies on is given time for the longest scenes: where nothing ends, the map tells nothing.
+# The method that `run` relies on is given time for the longest scenes: a map of time-outs shows nothing.
 _PATIENT_METHOD, _PATIENT_S = "lagrange/taylor", 120.0
 # A ladder takes a few times its longest run; what is over this is stuck.
 _RECORD_LIMIT_S = 40.0
@@ -37,7 +37,7 @@ class SuiteReport:
     """runs: all runs of the file, as they stand on the map; not_computed: cases whose process died."""
 
     scenes: int
-    runs: list[Cell]
+    runs: list[SuiteRun]
     not_computed: list[Outcome]
 
 
@@ -63,7 +63,7 @@ def run_suite(
         report = run_scenes(scenes, chosen, output, workers=workers, timeout_s=limit_s, on_progress=on_progress)
         lost += report.not_computed
     lost += complete_records(scenes, methods, output, workers, on_progress)
-    return SuiteReport(len(scenes), cells(output), lost)
+    return SuiteReport(len(scenes), suite_runs(output), lost)
 
 
 def complete_records(
@@ -75,7 +75,7 @@ def complete_records(
 ) -> list[Outcome]:
     """Step ladders, step limits and conservation of these scenes, where the runs in `output` call for them; those whose
     process died."""
-    cases = [*_step_cases(scenes, cells(output)), *_conservation_cases(scenes, methods)]
+    cases = [*_step_cases(scenes, suite_runs(output)), *_conservation_cases(scenes, methods)]
     store = ResultsFile(output)
     made = execute(cases, perform_record, store, workers, _RECORD_LIMIT_S, on_progress)
     names, wanted = {scene.name for scene in scenes}, {case.key for case in cases}
@@ -96,7 +96,7 @@ def perform_record(job: Job) -> Result:
     return Result("ok")
 
 
-def _step_cases(scenes: Sequence[Scene], found: Sequence[Cell]) -> list[Case]:
+def _step_cases(scenes: Sequence[Scene], found: Sequence[SuiteRun]) -> list[Case]:
     """Ladders where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step."""
     by_name = {scene.name: scene for scene in scenes}
     cases = []

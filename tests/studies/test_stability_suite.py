@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor_mbs.analysis.stability import OUTCOMES, advice, cells, in_words, reached_by, unreached
+from rotor_mbs.analysis.stability import OUTCOMES, advice, advice_line, reached_by, suite_runs, unreached
 from rotor_mbs.cli import main
 from rotor_mbs.execution.execute import Outcome
 from rotor_mbs.report.pages.stability import NOT_COMPARED, write_stability_report
@@ -39,7 +39,7 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_no_run_of_ours_claims_success(suite: Path) -> None:
-    found = cells(suite)
+    found = suite_runs(suite)
     assert {cell.scene for cell in found} == set(SCENES)
     ours = [cell for cell in found if cell.method.startswith("lagrange")]
     assert not [cell for cell in ours if cell.false_success]
@@ -55,30 +55,30 @@ def test_no_run_of_ours_claims_success(suite: Path) -> None:
 def test_the_map_and_its_pages(suite: Path) -> None:
     folder = suite.with_name("stability-report")
     page = (folder / "index.html").read_text(encoding="utf-8")
-    for cell in cells(suite):
+    for cell in suite_runs(suite):
         symbol, words = OUTCOMES[cell.outcome]
         assert words in page
         assert symbol in page
     for scene in SCENES:
         own = (folder / (scene.replace("/", "-") + ".html")).read_text(encoding="utf-8")
         assert "# Stresses" in own
-    for one in advice(cells(suite)):
-        assert one.method in in_words(one)
+    for one in advice(suite_runs(suite)):
+        assert one.method in advice_line(one)
 
 
-def test_a_run_held_by_its_energy_alone_says_so(tmp_path: Path) -> None:
+def test_a_run_judged_by_its_energy_alone_says_so(tmp_path: Path) -> None:
     """A needle sampled at its two ends: the horizon is before the second, where doubles have lost the motion."""
     pytest.importorskip("heyoka")
     path = tmp_path / "needle.h5"
     (one,) = find_scenes(["extreme/needle-fig05-1e-15"])
     run_scenes([replace(one, samples=2)], {one.name: ["lagrange/taylor"]}, path, workers=0, timeout_s=60.0)
-    (cell,) = cells(path)
+    (cell,) = suite_runs(path)
     assert (cell.status, cell.outcome) == ("ok", "energy_alone")
-    assert cell.message == "held by its energy alone: the horizon is before the second sample"
+    assert cell.message == "judged by its energy alone: the horizon is before the second sample"
     assert cell.angle_error is None
     assert not cell.reaches_target
     assert reached_by([cell], one.name) is None
-    assert in_words(advice([cell])[0]).startswith("lagrange/taylor: holds on 1 of 1 (1 by its energy alone)")
+    assert advice_line(advice([cell])[0]).startswith("lagrange/taylor: holds on 1 of 1 (1 by its energy alone)")
     page = write_stability_report(path, tmp_path / "report").read_text(encoding="utf-8")
     assert cell.message in page
     assert NOT_COMPARED in page

@@ -13,12 +13,12 @@ from rotor_mbs.analysis.stability import (
     OUTCOMES,
     TARGET,
     Advice,
-    Cell,
+    SuiteRun,
     advice,
-    cells,
-    in_words,
+    advice_line,
     is_number,
     reached_by,
+    suite_runs,
 )
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, TableCell
 from rotor_mbs.report.core.environment import render
@@ -104,7 +104,7 @@ def write_stability_report(results: Path, output: Path) -> Path:
 
     Raises StoreError where the file cannot be read or the folder cannot be written.
     """
-    found, records = cells(results), read_records(results, "steps", "limits", "conservation")
+    found, records = suite_runs(results), read_records(results, "steps", "limits", "conservation")
     with open_results(results) as opened:
         names = list(dict.fromkeys(cell.scene for cell in found))
         files = page_names(names)
@@ -121,7 +121,7 @@ def write_stability_report(results: Path, output: Path) -> Path:
 
 
 def _map(
-    found: Sequence[Cell], records: Sequence[Record], files: dict[str, str], titles: dict[str, str]
+    found: Sequence[SuiteRun], records: Sequence[Record], files: dict[str, str], titles: dict[str, str]
 ) -> StabilityPage:
     names = list(dict.fromkeys(cell.method for cell in found))
     families: dict[str, list[MapRow]] = {}
@@ -135,7 +135,7 @@ def _map(
         [label_of(name) for name in names],
         list(families.items()),
         [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        [in_words(_labelled(one)) for one in advice(found)],
+        [advice_line(_labelled(one)) for one in advice(found)],
         sum(cell.false_success for cell in found),
         _limits(records),
         _conservation(records),
@@ -154,13 +154,13 @@ def _labelled(one: Advice) -> Advice:
     return replace(one, method=label_of(one.method), use=use, in_part=in_part, avoid=avoid)
 
 
-def _mark(cell: Cell, file: str) -> MapMark:
+def _mark(cell: SuiteRun, file: str) -> MapMark:
     symbol, text = OUTCOMES[cell.outcome]
     claimed = "!" if cell.false_success and cell.outcome != "false_success" else ""
     return MapMark(cell.outcome, symbol + claimed, f"{label_of(cell.method)}: {text}. {cell.message}".strip(), file)
 
 
-def _fastest(own: Sequence[Cell]) -> str:
+def _fastest(own: Sequence[SuiteRun]) -> str:
     if not own[0].has_reference:
         return "no reference"
     if all(cell.angle_error is None for cell in own):
@@ -198,7 +198,7 @@ def _shown(value: float | None) -> str:
     return "–" if value is None else f"{value:.2g}"
 
 
-def _scene_page(scene: StoredScene, own: Sequence[Cell], ladders: Sequence[Record]) -> StabilityScenePage:
+def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[Record]) -> StabilityScenePage:
     corrected = methods.corrected_runs(scene)
     runs = {name: run for name, run in corrected.items() if methods.has_samples(run) and len(run.array("time")) > 1}
     return StabilityScenePage(
@@ -216,7 +216,7 @@ def _scene_page(scene: StoredScene, own: Sequence[Cell], ladders: Sequence[Recor
     )
 
 
-def _lead(scene: StoredScene, own: Sequence[Cell]) -> list[str]:
+def _lead(scene: StoredScene, own: Sequence[SuiteRun]) -> list[str]:
     """The fastest method, or why none is accurate: by 1e10 the rounding error 1e-16 rad of the start is 1e-6 rad."""
     if not own or not own[0].has_reference or all(cell.angle_error is None for cell in own):
         return []
@@ -233,7 +233,7 @@ def _lead(scene: StoredScene, own: Sequence[Cell]) -> list[str]:
     ]
 
 
-def _outcome_table(own: Sequence[Cell]) -> PageTable:
+def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
     rows = []
     for cell in own:
         symbol, text = OUTCOMES[cell.outcome]
