@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
-from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.errors import InputError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute_with, ignore_progress
 from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, last_core, one_line, open_pool
 from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
-from rotor_mbs.methods.catalogue import find_method, ladders
+from rotor_mbs.methods.catalogue import ladders
 from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
@@ -35,11 +35,12 @@ from rotor_mbs.studies.bench_worker import (
     Point,
     Prepared,
     Request,
+    SceneOf,
     StartTimer,
     ask,
     prepared_scene,
 )
-from rotor_mbs.studies.run import reference_case, run_scenes
+from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
 
 BENCH = "bench"
 SOURCES = ("studies/bench.py", "studies/bench_worker.py", "execution/timing.py")
@@ -52,16 +53,21 @@ _ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_
 
 @dataclass(frozen=True)
 class BenchReport:
-    """made: curves measured by this call; kept: scenes of which all curves were stored already; left_out: why."""
+    """scenes: how many; made: curves measured by this call; left_out: why a method is left out on a scene."""
 
+    scenes: int
     made: list[Outcome]
-    kept: int
     left_out: list[str]
 
     @property
     def measured(self) -> int:
         """Scenes of which this call measured a curve."""
         return len({one.case.scene.name for one in self.made})
+
+    @property
+    def kept(self) -> int:
+        """Scenes of which all curves were stored already."""
+        return self.scenes - self.measured
 
 
 def run_bench(
@@ -87,16 +93,14 @@ def run_bench(
     _complete_references(scenes, output, workers)
     for scene in scenes:  # refused before the first is measured
         prepared_scene(scene, output)
-    cases, left_out = [], []
+    cases: list[Case] = []
+    left_out: list[str] = []
     for scene in scenes:
-        for ladder in chosen:
-            if reason := _refusal(ladder.method, scene):
-                left_out.append(f"{scene.name}: {ladder.curve} left out: {reason}")
-            else:
-                cases.append(_bench_case(scene, ladder, repeats, budget_s))
+        able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
+        cases += [_bench_case(scene, ladder, repeats, budget_s) for ladder in chosen if ladder.method in able]
+        left_out += refused
     made = execute_with(cases, _time_by_scene, ResultsFile(output), on_progress)
-    report = BenchReport(made, 0, left_out)
-    return BenchReport(made, len(scenes) - report.measured, left_out)
+    return BenchReport(len(scenes), made, left_out)
 
 
 def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) -> None:
@@ -108,15 +112,6 @@ def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) ->
             f"{one.case.scene.name}: no usable reference ({one.result.status}: {one.result.message}); a bench needs one"
             for one in failed
         )
-
-
-def _refusal(method: str, scene: Scene) -> str:
-    """Why `method` cannot represent `scene`, or ""."""
-    try:
-        find_method(method).items(scene)
-    except MethodRefusal as exc:
-        return str(exc)
-    return ""
 
 
 def _bench_case(scene: Scene, ladder: Ladder, repeats: int, budget_s: float) -> Case:
@@ -253,7 +248,7 @@ class Measured:
         return row
 
 
-def measure_points(scene_of: Any, points: Sequence[Sequence[Point]], options: Mapping[str, Any]) -> Measured:
+def measure_points(scene_of: SceneOf, points: Sequence[Sequence[Point]], options: Mapping[str, Any]) -> Measured:
     """Times all points in rounds, and judges the last run of each; in one worker process on one core.
 
     scene_of   picklable, from a point to its scene and reference
