@@ -12,6 +12,7 @@ from typing import NoReturn, TypeAlias
 import rotor_mbs
 
 _SCENE, _SCENES = "a name (paper/fig05) or a TOML file", "a name (paper/fig05), a folder (paper), a TOML file"
+EXPORT_FORMATS = ("mjcf", "exudyn", "csv", "sympy", "iftomm")
 _DEFAULT_FOLDER = Path("rotor-mbs-out")
 _DEFAULT_TIMEOUT_S = 60.0
 # The suite has many runs that would reach any limit: with a shorter one it ends in minutes.
@@ -51,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_sweep,
         _add_stability,
         _add_report,
+        _add_export,
     ):
         add(commands)
     return parser
@@ -214,6 +216,19 @@ def _setting(text: str) -> tuple[str, object]:
         except ValueError:
             continue
     return name, value
+
+
+def _add_export(commands: _Commands) -> None:
+    export = _command(commands, "export", "a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark", "export:write")
+    export.add_argument("scene", metavar="SCENE", help=_SCENE)
+    export.add_argument(
+        "--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT",
+        help="mjcf: a MuJoCo model; exudyn: a script without this package; csv: the reference trajectory; sympy: the "
+        "equations; iftomm: a folder with description, error definition, acceptance and results",
+    )  # fmt: skip
+    export.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="or folder (default: the scene's name with an ending)"
+    )
 
 
 def _file(text: str) -> Path:

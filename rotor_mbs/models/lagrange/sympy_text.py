@@ -1,0 +1,145 @@
+"""The equations of motion of a scene as the text of a SymPy program, written by the closed form's own energies.
+
+The closed form takes numbers of any kind; here a number is a piece of text. Imports no SymPy.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from string import Template
+
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.torque import stretches
+from rotor_mbs.scenario.scene import Scene
+
+
+class _Term:
+    """A piece of an expression: its text, and its value where it is a constant. Zeros and ones vanish from products."""
+
+    def __init__(self, text: str, value: float | None = None) -> None:
+        self.text, self.value = text, value
+
+    def __add__(self, other: object) -> _Term:
+        return _joined(self, "+", _term(other))
+
+    def __radd__(self, other: object) -> _Term:
+        return _joined(_term(other), "+", self)
+
+    def __sub__(self, other: object) -> _Term:
+        return _joined(self, "-", _term(other))
+
+    def __mul__(self, other: object) -> _Term:
+        return _product(self, _term(other))
+
+    def __rmul__(self, other: object) -> _Term:
+        return _product(_term(other), self)
+
+
+def _term(value: object) -> _Term:
+    return value if isinstance(value, _Term) else _constant(float(value))  # type: ignore[arg-type]
+
+
+def _constant(value: float | Fraction) -> _Term:
+    number = float(value)
+    return _Term(repr(number) if math.copysign(1.0, number) > 0.0 else f"({number!r})", number)
+
+
+def _joined(one: _Term, sign: str, other: _Term) -> _Term:
+    if one.value is not None and other.value is not None:
+        return _constant(one.value + other.value if sign == "+" else one.value - other.value)
+    if other.value == 0.0:
+        return one
+    if one.value == 0.0 and sign == "+":
+        return other
+    return _Term(f"({one.text} {sign} {other.text})")
+
+
+def _product(one: _Term, other: _Term) -> _Term:
+    if one.value is not None and other.value is not None:
+        return _constant(one.value * other.value)
+    if 0.0 in (one.value, other.value):
+        return _constant(0.0)
+    if one.value == 1.0:
+        return other
+    return one if other.value == 1.0 else _Term(f"{one.text}*{other.text}")
+
+
+def sympy_text(scene: Scene) -> str:
+    """A Python program that defines, in SymPy, the equations of motion M(q) a = f(q, w, t) of a scene.
+
+    q, w, a are angles (rad), rates and accelerations of the coordinates that move, rotor first. The program defines
+    the kinetic and potential energy T and V (J), the torque tau (N m) over time t (s), the generalized forces Q (N m)
+    of torque and dampers, the mass matrix M and the right-hand side f by Lagrange's equations, and the initial state.
+    """
+    form = rotor_form(scene, _constant)
+    moving = [0, *(1 + i for i in form.moving)]
+    q, w = ([_Term(f"{name}{i}") for i in moving] for name in "qw")
+    kinetic, potential = closed_form.energies(
+        q, w, form, lambda x: _Term(f"sin({x.text})"), lambda x: _Term(f"cos({x.text})")
+    )
+    dampings = [form.shaft_damping, *(blade.damping for blade in form.blades)]
+    moments = [_Term("tau"), *(_constant(0.0) for _ in form.blades)]
+    forces = [moment - damping * rate for moment, damping, rate in zip(moments, dampings, w, strict=True)]
+    return _PROGRAM.substitute(
+        title=(scene.title or scene.name).replace("\n", " "),
+        names=", ".join(f"{name}{i}" for name in "qw" for i in moving),
+        letters=" ".join(f"{name}{i}" for name in "qw" for i in moving),
+        legend="\n".join(f"#   q{i}, w{i}   {scene.coordinate_labels[i]}" for i in moving),
+        q=", ".join(f"q{i}" for i in moving),
+        w=", ".join(f"w{i}" for i in moving),
+        torque=_torque(scene),
+        kinetic=kinetic.text,
+        potential=potential.text,
+        forces=", ".join(force.text for force in forces),
+        initial_angles=[float(scene.initial_angles[i]) for i in moving],
+        initial_rates=[float(scene.initial_rates[i]) for i in moving],
+        duration=repr(float(scene.duration)),
+    )
+
+
+def _torque(scene: Scene) -> str:
+    """N m over time, piecewise linear; at a jump, the value after it."""
+    lines = [
+        (f"{float(part.offset)!r} + {float(part.slope)!r}*t" if part.slope else repr(float(part.offset)), part.end)
+        for part in stretches(scene)
+    ]
+    if len(lines) == 1:
+        return f"sympify({lines[0][0]})"
+    parts = [f"({text}, t < {end!r})" for text, end in lines[:-1]] + [f"({lines[-1][0]}, True)"]
+    return f"Piecewise({', '.join(parts)})"
+
+
+_PROGRAM = Template("""\
+# $title
+#
+# Equations of motion M(q) a = f(q, w, t) in SI units and rad. Angles, and their rates:
+$legend
+# T, V: kinetic and potential energy, J; Q: moments of torque and dampers, N m; tau: torque on the rotor, N m.
+
+from sympy import Matrix, Piecewise, cos, diff, hessian, sin, symbols, sympify
+
+t = symbols("t", real=True)
+$names = symbols("$letters", real=True)
+q, w = [$q], [$w]
+
+T = $kinetic
+V = $potential
+
+tau = $torque
+Q = [$forces]
+
+# Lagrange's equations of T - V.
+M = hessian(T, w)
+f = Matrix(
+    [
+        Q[i] + diff(T - V, q[i]) - sum(diff(T, w[i], q[j]) * w[j] for j in range(len(q)))
+        for i in range(len(q))
+    ]
+)
+
+initial_angles = $initial_angles
+initial_rates = $initial_rates
+duration = $duration
+""")

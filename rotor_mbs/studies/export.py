@@ -1,0 +1,161 @@
+"""A scene for other programs: for MuJoCo, Exudyn and SymPy, its reference trajectory, a benchmark problem."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.exudyn.script import exudyn_script
+from rotor_mbs.models.lagrange.sympy_text import sympy_text
+from rotor_mbs.models.mujoco.export import mjcf_file
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene_file import scene_toml
+from rotor_mbs.solution import quantities
+from rotor_mbs.solution.quantities import Array, Quantity
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.studies.benchmark_text import description, evaluation_program
+from rotor_mbs.studies.frozen import frozen_file, frozen_solution
+
+_AXES = "xyz"
+
+
+def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
+    """A scene in a format of other programs, as a file or, for "iftomm", a folder of files.
+
+    Parameters
+    ----------
+    to : "mjcf", "exudyn", "csv" (the reference trajectory, with units), "sympy" (the equations) or "iftomm" (a
+        benchmark problem: description, error definition, acceptance, results).
+    output : the file or folder; files that are there are replaced.
+
+    Returns
+    -------
+    The paths that were written.
+
+    Raises
+    ------
+    InputError
+        For an unknown format.
+    StoreError
+        Where a file cannot be written, or a reference is needed that the scene does not have.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import rotor_mbs as rm
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     (path,) = rm.export(rm.scene("paper/fig11"), "csv", f"{folder}/fig11.csv")
+    ...     print(path.read_text().partition(",rotor rate")[0])
+    time [s],rotor [rad],pitch 1 [rad],pitch 2 [rad],pitch 3 [rad]
+    """
+    output = Path(output)
+    if to not in FORMATS:
+        raise InputError(f"no format {to!r}; allowed: {', '.join(FORMATS)}")
+    if to == "iftomm":
+        texts = {output / name: text for name, text in _benchmark(scene).items()}
+    else:
+        texts = {output: _TEXTS[to](scene)}
+    for path, text in texts.items():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", newline="\n")
+        except OSError as exc:
+            raise StoreError(f"{path}: cannot be written: {exc.strerror}") from exc
+    return list(texts)
+
+
+def reference_trajectory(scene: Scene) -> Trajectory:
+    """The scene's reference: the shipped one, else computed. Raises StoreError where it does not reach the end."""
+    number = scene_hash(scene)
+    shipped = frozen_file(number) is not None
+    solution = frozen_solution(scene, number)[0] if shipped else solve(REFERENCE, scene, {})
+    if not len(solution.trajectory.time):
+        raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'no motion from its start'}")
+    return solution.trajectory
+
+
+def trajectory_csv(scene: Scene, trajectory: Trajectory) -> str:
+    """Comma-separated values with a header: "time [s]", "rotor [rad]", "pitch 1 [rad]", ..., a column per component.
+
+    Numbers have all their digits.
+    """
+    columns = list(_columns(scene, trajectory))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([name for name, _ in columns])
+    for row in zip(*(values.tolist() for _, values in columns), strict=True):
+        writer.writerow([repr(value) for value in row])
+    return text.getvalue()
+
+
+def _columns(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[str, Array]]:
+    yield "time [s]", trajectory.time
+    for quantity in quantities.quantities(scene.outputs):
+        values = quantities.array_of(quantity, scene, trajectory) if quantity.is_over_time else None
+        if values is not None:
+            flat = values.reshape(len(values), -1)
+            for number, name in enumerate(_names(quantity, scene)):
+                yield f"{name} [{quantity.units}]", flat[:, number]
+
+
+def _names(quantity: Quantity, scene: Scene) -> list[str]:
+    """Of a quantity's components, last dimension fastest: coordinates by their labels, then the quantity."""
+    labels = {
+        "coordinate": scene.coordinate_labels,
+        "blade": [f"{blade}" for blade in range(1, 1 + len(scene.blades))],
+        "axis": list(_AXES),
+    }
+    names = [quantity.name.replace("_", " ")]
+    for dimension in quantity.dimensions[1:]:
+        names = [f"{name} {label}" for name in names for label in labels[dimension]]
+    if quantity.name == "angles":
+        return list(scene.coordinate_labels)
+    return [f"{label} rate" for label in scene.coordinate_labels] if quantity.name == "rates" else names
+
+
+def _reference_csv(scene: Scene) -> str:
+    return trajectory_csv(scene, reference_trajectory(scene))
+
+
+def _benchmark(scene: Scene) -> dict[str, str]:
+    """Texts of a benchmark problem by file name: description, reference, error and acceptance as a program, models."""
+    trajectory = reference_trajectory(scene)
+    return {
+        "description.md": description(scene, trajectory),
+        "reference.csv": trajectory_csv(scene, trajectory),
+        "results.txt": _results(scene, trajectory),
+        "evaluate.py": evaluation_program(scene),
+        "scene.toml": scene_toml(scene),
+        "model.xml": mjcf_file(scene),
+        "model_exudyn.py": exudyn_script(scene),
+        "equations.py": sympy_text(scene),
+    }
+
+
+def _results(scene: Scene, trajectory: Trajectory) -> str:
+    """The results that a participant hands in: time and angles, in columns of text with a header."""
+    names = ["time[s]", *(f"{label.replace(' ', '_')}[rad]" for label in scene.coordinate_labels)]
+    rows = ([time, *angles] for time, angles in zip(trajectory.time.tolist(), trajectory.angles.tolist(), strict=True))
+    return "\n".join([" ".join(names), *(" ".join(map(repr, row)) for row in rows)]) + "\n"
+
+
+_TEXTS: dict[str, Callable[[Scene], str]] = {
+    "mjcf": mjcf_file,
+    "exudyn": exudyn_script,
+    "csv": _reference_csv,
+    "sympy": sympy_text,
+}
+# By format: what is written, and the ending of its name ("": a folder).
+FORMATS = {
+    "mjcf": ("a model that MuJoCo loads, with initial state and torques", ".xml"),
+    "exudyn": ("a Python script for Exudyn, without this package", "-exudyn.py"),
+    "csv": ("the reference trajectory, with units", ".csv"),
+    "sympy": ("the equations of motion as a SymPy program", "-equations.py"),
+    "iftomm": ("a folder for a library of benchmark problems: description, error, acceptance, results", ""),
+}
