@@ -38,7 +38,7 @@ rows = [data.qpos.copy()]
 for _ in range(int(sys.argv[2]) - 1):
     for _ in range(int(sys.argv[3])):
         for segment in segments:
-            if abs(segment[0] - data.time) < 0.01 * model.opt.timestep:
+            if segment[0] > 0.0 and abs(segment[0] - data.time) < 0.01 * model.opt.timestep:
                 data.act[:], data.ctrl[:] = numpy.split(segment[1:], 2)
         mujoco.mj_step(model, data)
     rows.append(data.qpos.copy())
