@@ -10,8 +10,7 @@ from fractions import Fraction
 from string import Template
 
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.parameters import rotor_form
-from rotor_mbs.models.lagrange.torque import stretches
+from rotor_mbs.models.lagrange.parameters import rotor_form, torque_segments
 from rotor_mbs.scenario.scene import Scene
 
 
@@ -103,7 +102,7 @@ def _torque(scene: Scene) -> str:
     """N m over time, piecewise linear; at a jump, the value after it."""
     lines = [
         (f"{float(part.offset)!r} + {float(part.slope)!r}*t" if part.slope else repr(float(part.offset)), part.end)
-        for part in stretches(scene)
+        for part in torque_segments(scene)
     ]
     if len(lines) == 1:
         return f"sympify({lines[0][0]})"
