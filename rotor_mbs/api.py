@@ -154,9 +154,9 @@ class Comparison:
     def __getitem__(self, method: str) -> Run:
         return self.runs[method]
 
-    def table(self) -> Table:
+    def table(self) -> TextTable:
         """A row for each method: status, error (rad), energy drift (of the energy scale), run time (s)."""
-        return Table(
+        return TextTable(
             ("method", "status", "error (rad)", "energy drift", "time (s)"), [_row(r) for r in self.runs.values()]
         )
 
@@ -397,7 +397,7 @@ def _with_reference(solution: Solution, reference: Trajectory | None) -> Run:
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """Rows of text under a heading; printed in columns, a table in a notebook."""
 
     head: tuple[str, ...]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_fields
 
 if TYPE_CHECKING:  # numpy behind it is too heavy for `list`
     from rotor_mbs.solution.record import Item
@@ -53,7 +53,7 @@ def show(arguments: argparse.Namespace) -> int:
         return 0
     print(f"{scene.name}: {scene.title}\n")
     for key, value in _data(scene).items():
-        print(f"  {key:20} {_readable(value)}")
+        print(f"  {key:26} {_readable(value)}")
     for model in models:
         print(f"\n{model.name}  ({', '.join(model.methods)})")
         if model.refused:
@@ -64,40 +64,26 @@ def show(arguments: argparse.Namespace) -> int:
 
 
 def _data(scene: Scene) -> dict[str, object]:
-    first = scene.blades[0]
-    same = all(blade == first for blade in scene.blades)
-    blades = [first] if same else list(scene.blades)
-    data: dict[str, object] = {
-        "figures": list(scene.figures),
-        "blades": len(scene.blades),
-        "gravity, m/s^2": scene.gravity,
-        "duration, s": scene.duration,
-        "samples": scene.samples,
-        "outputs": list(scene.outputs),
-        "angles, rad": list(scene.initial_angles),
-        "rates, rad/s": list(scene.initial_rates),
-        "hub inertia, kg m^2": scene.hub_inertia,
-        "torque, N m": [list(row) for row in scene.rotor_torque],
-        "stiffness, N m/rad": list(scene.bearing_stiffness),
-        "damping, N m s/rad": list(scene.bearing_damping),
-        "shaft, N m s/rad": scene.shaft_damping,
-    }
-    for i, blade in enumerate(blades):
-        which = "every blade" if same else f"blade {i + 1}"
-        data[which] = {
-            "mass, kg": blade.mass,
-            "centre of mass, m": list(blade.centre_of_mass),
-            "inertia, kg m^2": list(blade.inertia),
-            "tip, m": list(blade.tip),
-        }
-    return {key: value for key, value in data.items() if value not in ([], 0.0) or key == "gravity, m/s^2"}
+    """Every key of the scene that is set, with its unit."""
+    data: dict[str, object] = {}
+    for one in scene_fields("label", "run", "start", "rotor"):
+        value, unit = getattr(scene, one.name), one.metadata["unit"]
+        if one.name == "blades":
+            data["blades"] = len(value)
+            alike = all(blade == value[0] for blade in value)
+            for i, blade in enumerate(value[:1] if alike else value):
+                numbers = {f"{part.name}, {part.metadata['unit']}": getattr(blade, part.name) for part in fields(blade)}
+                data["every blade" if alike else f"blade {i + 1}"] = numbers
+        elif one.metadata["key"] and one.name != "title" and (value not in ((), 0.0) or one.name == "gravity"):
+            data[one.metadata["key"] if unit == "1" else f"{one.metadata['key']}, {unit}"] = value
+    return data
 
 
 def _readable(value: object) -> str:
     if isinstance(value, dict):
         return "; ".join(f"{key} {_readable(part)}" for key, part in value.items())
-    if isinstance(value, list):
-        return ", ".join(f"[{_readable(part)}]" if isinstance(part, list) else _readable(part) for part in value)
+    if isinstance(value, tuple):
+        return ", ".join(f"[{_readable(part)}]" if isinstance(part, tuple) else _readable(part) for part in value)
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 

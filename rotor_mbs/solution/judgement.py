@@ -20,13 +20,13 @@ import numpy as np
 from rotor_mbs.scenario.bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import Metrics, compare
-from rotor_mbs.solution.quantities import Array, Comparison, Quantity, known_quantities
+from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution
 
 
 @dataclass(frozen=True, slots=True)
-class Allowed:
+class MethodBounds:
     """The bounds on a method's runs.
 
     angle    relative error (of the largest angle, at least 1 rad) per unit of error growth: the scene's own growth,
@@ -64,16 +64,16 @@ class Judgement:
 
 
 @functools.cache
-def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> Allowed | None:
+def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> MethodBounds | None:
     """The bounds on "model/integrator", `own` first; None for methods that have none (the printed equations)."""
     bounds = shipped_bounds().with_entries(own)
     angle, energy = (bounds.find(check, method) for check in ("agreement", "energy"))
     if angle is None or energy is None:
         return None
-    return Allowed(angle.value, energy.value)
+    return MethodBounds(angle.value, energy.value)
 
 
-def quantity_bound(rule: Comparison, bounds: Bounds, method: str) -> float | None:
+def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
     """The bound on a quantity's number for a method; None where the number is not judged."""
     entry = bounds.find(rule.check, method) if rule.check else None
     return entry.value if entry else rule.bound
@@ -109,7 +109,7 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
     return all(error <= _RESEMBLES for error in errors)
 
 
-def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, Comparison, float]]:
+def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
     """What each judged quantity's number comes to, of what it is relative to; only those that the run has."""
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement

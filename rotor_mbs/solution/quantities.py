@@ -35,7 +35,7 @@ class Samples(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class QuantityMetric:
     """How a run's array becomes one number that is stored with the run, and the largest value that passes.
 
     The number is the largest size over all samples (with the last dimension `axis`: of the vectors).
@@ -96,7 +96,7 @@ class Quantity:
     >>> angular_momentum = Quantity(
     ...     "hub_angular_momentum", ("time",), "N m s", "angular momentum of the hub about the shaft",
     ...     output="momentum", producer=lambda scene, samples: scene.hub_inertia * samples.rates[:, 0],
-    ...     judgement=Comparison("hub_angular_momentum_error_max", bound=1e-3, unit="N m s"))
+    ...     judgement=QuantityMetric("hub_angular_momentum_error_max", bound=1e-3, unit="N m s"))
     >>> angular_momentum.is_over_time
     True
     """
@@ -108,7 +108,7 @@ class Quantity:
     output: str = ""
     producer: Producer | None = None
     required: bool = True
-    judgement: Comparison | None = None
+    judgement: QuantityMetric | None = None
     plot: Plot | None = None
 
     @property
@@ -145,7 +145,7 @@ def longest_arm(scene: Scene) -> float:
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades)
 
 
-_JOINT_GAP = Comparison(
+_JOINT_GAP = QuantityMetric(
     "constraint_error_max",
     with_reference=False,
     relative_to=longest_arm,
@@ -162,7 +162,7 @@ BUILT_IN = (
     Quantity("rates", ("time", "coordinate"), "rad/s", "rotor rate and pitch rates", "rates"),
     Quantity(
         "tip", ("time", "blade", "axis"), "m", "path of each blade's tip in the base frame", "tip",
-        judgement=Comparison("tip_error_max"),
+        judgement=QuantityMetric("tip_error_max"),
     ),
     Quantity("kinetic_energy", ("time",), "J", "kinetic energy", "energy"),
     Quantity(

@@ -19,7 +19,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.digests import changed_arrays
 from rotor_mbs.store.read import open_results
-from rotor_mbs.studies.check_probes import Measured, perform_probe, probes, speed_probes
+from rotor_mbs.studies.check_probes import Measurement, perform_probe, probes, speed_probes
 from rotor_mbs.studies.frozen import shipped_files
 from rotor_mbs.studies.run import run_scenes
 
@@ -149,16 +149,16 @@ def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Ve
     return [judge_measured(one, bounds) for case in available for one in measured(outcomes[case])]
 
 
-def measured(outcome: Outcome) -> list[Measured]:
+def measured(outcome: Outcome) -> list[Measurement]:
     """What a probe found; where it was lost, one measurement that is not a number."""
     if outcome.result.value is not None:
-        found: list[Measured] = outcome.result.value
+        found: list[Measurement] = outcome.result.value
         return found
     case = outcome.case
-    return [Measured(case.study, case.scene.name, case.method, "all", math.nan, "", outcome.result.message)]
+    return [Measurement(case.study, case.scene.name, case.method, "all", math.nan, "", outcome.result.message)]
 
 
-def judge_measured(one: Measured, bounds: Bounds) -> Verdict:
+def judge_measured(one: Measurement, bounds: Bounds) -> Verdict:
     """A measured number against its bound."""
     bound = bounds.of(one.check, one.method).value
     return Verdict(one.check, one.scene, one.method, one.channel, one.value, bound, one.unit, one.look_at)

@@ -25,7 +25,7 @@ from rotor_mbs.studies.frozen import load_frozen
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measurement:
     """A number for a verdict that no results file holds."""
 
     check: str
@@ -74,7 +74,7 @@ def speed_probes() -> list[Case]:
 _ORDER_STEPS = (0.002, 0.001, 0.0005, 0.00025)  # s
 
 
-def measure(case: Case) -> Iterable[Measured]:
+def measure(case: Case) -> Iterable[Measurement]:
     """The measurements of a probe, one by one; NaN where a run did not get to its end."""
     return _KINDS[case.study](case)
 
@@ -93,7 +93,7 @@ def _run(case: Case, scene: Scene, **settings: object) -> Trajectory | None:
     return run.trajectory if len(run.trajectory.time) == scene.samples else None
 
 
-def _symmetry(case: Case) -> list[Measured]:
+def _symmetry(case: Case) -> list[Measurement]:
     """Every blade in the place of the next one and the rotor turned back by one; the mirror image in the rotor's plane.
 
     The mirror turns y into -y: azimuths stay, pitches change sign.
@@ -121,11 +121,11 @@ def _symmetry(case: Case) -> list[Measured]:
             pitches = np.abs(sign * other.angles[:, columns] - base.angles[:, 1:]).max(axis=1)
             value = float((pitches / growth).max())
         look = "a blade's phase, or a term that knows its blade's number or side"
-        found.append(Measured("symmetry", case.scene.name, case.method, name, value, "per growth", look))
+        found.append(Measurement("symmetry", case.scene.name, case.method, name, value, "per growth", look))
     return found
 
 
-def _order(case: Case) -> list[Measured]:
+def _order(case: Case) -> list[Measurement]:
     """The slope of log error over log step, against the reference, over 0.5 s."""
     scene = _scene(case, 0.5)
     exact = load_frozen(case.scene.name).angles[: scene.samples]
@@ -136,17 +136,17 @@ def _order(case: Case) -> list[Measured]:
         errors.append(math.nan if found is None else float(np.abs(found.angles - exact).max()))
     order = float(np.polyfit(np.log(_ORDER_STEPS), np.log(errors), 1)[0]) if np.isfinite(errors).all() else math.nan
     look = f"fitted {order:.3f}, expected {expected:g}: the scheme, or a force evaluated at the wrong time"
-    return [Measured("order", case.scene.name, case.method, "angles", abs(order - expected), "", look)]
+    return [Measurement("order", case.scene.name, case.method, "angles", abs(order - expected), "", look)]
 
 
-def _reference(case: Case) -> list[Measured]:
+def _reference(case: Case) -> list[Measurement]:
     """Computed now against frozen; a fallback reference is compared within its own uncertainty."""
     scene = case.scene
     frozen = load_frozen(case.scene.name)
     found = solve(REFERENCE, scene, {}).trajectory
     look = "the closed form, its coefficients, or a touched file under reference/"
     if len(found.time) != scene.samples or found.angle_uncertainty is None or found.error_growth is None:
-        return [Measured("reference", case.scene.name, REFERENCE, "recomputed", math.nan, "rad", look)]
+        return [Measurement("reference", case.scene.name, REFERENCE, "recomputed", math.nan, "rad", look)]
     off = np.abs(found.angles - frozen.angles).max(axis=1)
     beyond = float(np.maximum(off - 10.0 * found.angle_uncertainty, 0.0).max())
     if found.angle_uncertainty.max() > 1e-12:
@@ -155,32 +155,32 @@ def _reference(case: Case) -> list[Measured]:
     growth = np.abs(np.log(running_growth(found) / running_growth(frozen)))
     until = horizon_samples(frozen)
     return [
-        Measured("reference", case.scene.name, REFERENCE, "recomputed angles", beyond, "rad", look),
-        Measured("growth", case.scene.name, REFERENCE, "error growth", float(growth[:until].max()), "log", look),
+        Measurement("reference", case.scene.name, REFERENCE, "recomputed angles", beyond, "rad", look),
+        Measurement("growth", case.scene.name, REFERENCE, "error growth", float(growth[:until].max()), "log", look),
     ]
 
 
-def _printed(case: Case) -> Iterator[Measured]:
+def _printed(case: Case) -> Iterator[Measurement]:
     for channel, off, look in differences():
-        yield Measured("printed", case.scene.name, case.method, channel, off, "relative", look)
+        yield Measurement("printed", case.scene.name, case.method, channel, off, "relative", look)
 
 
-def _rules(case: Case) -> Iterator[Measured]:
+def _rules(case: Case) -> Iterator[Measurement]:
     """One number for each known run: 1 where its status is not the known one."""
     for run in known_runs(load_bounds(), method_names(is_corrected=True)):
         fault = run.faults()
         look = fault or "its known status"
-        yield Measured("rules", case.scene.name, run.method, run.name, float(bool(fault)), "faults", look)
+        yield Measurement("rules", case.scene.name, run.method, run.name, float(bool(fault)), "faults", look)
     for channel, off in metrics_off():
         look = f"off by {off:.1e}: a number that is stored with a run"
-        yield Measured("rules", case.scene.name, "*", channel, float(not off <= 1e-12), "faults", look)
+        yield Measurement("rules", case.scene.name, "*", channel, float(not off <= 1e-12), "faults", look)
     for scene in find_scenes(["check"]):
         off = shares_off(scene)
         look = f"off by {off:.1e}: what decides that a motion is singular"
-        yield Measured("rules", scene.name, "*", "rotor inertia share", float(not off <= 1e-12), "faults", look)
+        yield Measurement("rules", scene.name, "*", "rotor inertia share", float(not off <= 1e-12), "faults", look)
 
 
-def _speed(case: Case) -> list[Measured]:
+def _speed(case: Case) -> list[Measurement]:
     """Run time over that of a fixed piece of arithmetic just before and after it, against the ratio on file.
 
     The median over fifteen runs: other load of the machine affects both, or one run alone.
@@ -196,7 +196,7 @@ def _speed(case: Case) -> list[Measured]:
     ratio = float(np.median(ratios))
     expected = SPEED_RATIOS[case.method]
     look = f"{ratio:.3g} calibration runs, {expected:g} on file: a slower engine, or our own code around it"
-    return [Measured("speed", case.scene.name, case.method, "run time", ratio / expected, "times", look)]
+    return [Measurement("speed", case.scene.name, case.method, "run time", ratio / expected, "times", look)]
 
 
 def _calibration() -> float:
@@ -220,7 +220,7 @@ def _growth(name: str, samples: int) -> Array:
     return running_growth(load_frozen(name))[:samples]
 
 
-_KINDS: dict[str, Callable[[Case], Iterable[Measured]]] = {
+_KINDS: dict[str, Callable[[Case], Iterable[Measurement]]] = {
     "symmetry": _symmetry,
     "order": _order,
     "reference": _reference,

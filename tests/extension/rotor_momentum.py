@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotor_mbs.solution.quantities import Comparison, Plot, Quantity
+from rotor_mbs.solution.quantities import Plot, Quantity, QuantityMetric
 
 
 def momentum(scene, samples):
@@ -20,7 +20,7 @@ def momentum(scene, samples):
 
 QUANTITY = Quantity(
     "shaft_momentum", ("time",), "N m s", "angular momentum about the shaft", output="momentum", producer=momentum,
-    judgement=Comparison("shaft_momentum_error_max", bound=1.0, channel="momentum", unit="N m s",
+    judgement=QuantityMetric("shaft_momentum_error_max", bound=1.0, channel="momentum", unit="N m s",
                          fault="shaft momentum off by {value} N m s", look_at="angles or rates"),
     plot=Plot("Angular momentum about the shaft", "momentum (N m s)"),
 )  # fmt: skip

@@ -27,13 +27,13 @@ from rotor_mbs.store.read import open_results
 from rotor_mbs.store.write import write_run
 
 PLUG_IN = """
-from rotor_mbs.solution.quantities import Comparison, Quantity
+from rotor_mbs.solution.quantities import QuantityMetric, Quantity
 
 def heights(scene, samples):
     return samples.angles[:, 1:] ** 2
 
 SQUARES = Quantity("pitch_squares", ("time", "blade"), "rad2", "squares of the pitches", output="squares",
-                   producer=heights, judgement=Comparison("pitch_squares_error_max", bound=1e-6))
+                   producer=heights, judgement=QuantityMetric("pitch_squares_error_max", bound=1e-6))
 """
 SCENE = paper("fig08", duration=0.5, samples=11)
 ASKED = replace(SCENE, outputs=("angles", "squares"))

@@ -38,7 +38,7 @@ from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.store.digests import write_digests
 from rotor_mbs.studies import check, check_probes
-from rotor_mbs.studies.check_probes import Measured, measure, probe, probes
+from rotor_mbs.studies.check_probes import Measurement, measure, probe, probes
 
 ROOT = Path(__file__).parents[2]
 SCENES = ("check/general", "check/held")
@@ -581,7 +581,7 @@ def test_a_measurement_that_is_lost_fails() -> None:
     verdict = check.judge_measured(measured, load_bounds())
     assert not verdict.passed
     assert verdict.look_at == "its process died"
-    assert not check.judge_measured(Measured("tip", "s", METHOD, "c", math.nan, "", ""), load_bounds()).passed
+    assert not check.judge_measured(Measurement("tip", "s", METHOD, "c", math.nan, "", ""), load_bounds()).passed
 
 
 @pytest.mark.slow
