@@ -67,12 +67,11 @@ EQUIVALENT = {
         "U32,2 and U32 of a point mass are perpendicular: h_2_22 is zero identically"
     ),
     r"observables\.tip_path .*sign of -1 lost": "the last axis of three one-dimensional arrays is their axis 1",
-    r"outcome\._shaft_inertia_forms .*has_pitch_inertia: always": (
+    r"judgement\._shaft_inertia_forms .*has_pitch_inertia: always": (
         "without pitch inertia the products of inertia that would be divided are zero, too"
     ),
-    r"outcome\.allowed_of .*and, or in angle is None": "a method has a bound for both or for neither",
-    r"compare\.energy_error .*and, or in run\.kinetic_energy is None": "energies are all there or none is",
-    r"compare\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
+    r"judgement\.allowed_of .*and, or in angle is None": "a method has a bound for both or for neither",
+    r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
 }
 # Then what is not the original and is not seen all the same.
 UNSEEN = {
