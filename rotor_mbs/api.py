@@ -255,13 +255,11 @@ def sweep(
     *,
     methods: Sequence[str] = ("lagrange/taylor",),
     output: str | os.PathLike[str] | None = None,
-    workers: int = 1,
+    workers: int = 0,
     timeout: float = 60.0,
     **options: object,
 ) -> SweepData:
-    """One scene over all combinations of the values of its parameters, in worker processes, into one dataset.
-
-    In a script, the processes need the usual `if __name__ == "__main__":`.
+    """One scene over all combinations of the values of its parameters, into one dataset.
 
     Parameters
     ----------
@@ -269,7 +267,8 @@ def sweep(
         values, or a table as an [[axis]] of a sweep file has it, such as `{"uniform": [0.0, 1.0]}`.
     output : the dataset's file, from which the same call continues after an interruption; a temporary one where it is
         left out.
-    workers : parallel processes.
+    workers : parallel processes; 0 runs everything in this process. In a script, processes need the usual
+        `if __name__ == "__main__":`.
     timeout : s, for each run.
     **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation, settings, ...
 
@@ -288,12 +287,13 @@ def sweep(
     >>> data.to_xarray().angles.dims
     ('run', 'time', 'coordinate')
     """
+    from rotor_mbs.execution.pool import SerialPool
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import run_sweep
 
     study = sweep_of(scene, parameters, methods=list(methods), **options)
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
-    result = run_sweep(study, path, workers=workers, timeout_s=timeout)
+    result = run_sweep(study, path, workers=workers, engine="local" if workers else SerialPool(), timeout_s=timeout)
     data = SweepData(path, dict(result.statuses))
     if output is None:
         weakref.finalize(data, shutil.rmtree, path.parent, ignore_errors=True)

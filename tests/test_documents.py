@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -56,3 +58,18 @@ def test_lines_fit_an_editor(path: Path) -> None:
     """But tables, which cannot be wrapped."""
     long = [line for line in path.read_text().splitlines() if len(line) > 125 and not line.startswith("|")]
     assert not long
+
+
+def test_the_readmes_python_runs(tmp_path: Path) -> None:
+    """As a script: first the API, then the data example on a results file with the scene that it reads."""
+    first, second = re.findall(r"```python\n(.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
+    setup = (
+        "import rotor_mbs as rm\n"
+        "scene = rm.scene('paper/fig11').replace(samples=101)\n"
+        "rm.compare(scene, ['lagrange/taylor']).save('rotor-mbs-out/results.h5')\n"
+    )
+    for code in (first, setup, second):
+        script = tmp_path / "example.py"
+        script.write_text(code)
+        done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr

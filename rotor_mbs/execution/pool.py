@@ -166,6 +166,32 @@ class WorkerPool:
         return found
 
 
+class SerialPool:
+    """The same in this process, one task after the other, without time limits: where scripts must not start processes.
+
+    Examples
+    --------
+    >>> SerialPool().submit(abs, -3, timeout_s=10.0).result()
+    3
+    """
+
+    workers, shares_disk = 1, True
+
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:  # noqa: ARG002
+        future: Future[R] = Future()
+        try:
+            future.set_result(work(task))
+        except Exception as exc:
+            future.set_exception(exc)
+        return future
+
+    def failure(self, error: BaseException) -> str:  # noqa: ARG002
+        return "error"
+
+    def close(self) -> None:
+        pass
+
+
 def open_pool(workers: int, initializer: Callable[[], None] | None = None, core: int | None = None) -> WorkerPool:
     """A pool of worker processes of this machine; see `WorkerPool`."""
     return WorkerPool(workers, initializer, core)
