@@ -179,6 +179,18 @@ def test_torque_table_integrates_exactly() -> None:
         assert np.abs(run(scene, method).angles[:, 0] - exact).max() <= 1e-13
 
 
+def test_a_torque_that_rises_over_the_whole_run() -> None:
+    """A table without a row inside the run is one segment: zero pitch, no gravity, I q̈ = τ' t, a cubic."""
+    slope = 5e4
+    scene = paper("fig05", gravity=0.0, rotor_torque=((0.0, 0.0), (20.0, 20.0 * slope)))
+    inertia = 3 * MASS * (OFFSET**2 + ARM**2)
+    for method in (*METHODS, "reference"):
+        found = run(scene, method)
+        turned = slope * found.time**3 / (6 * inertia)
+        assert np.abs(found.angles[:, 0] - math.pi / 6 - turned).max() <= 1e-12
+        assert np.abs(found.work - slope**2 * found.time**4 / (8 * inertia)).max() <= 1e-12 * found.work.max()
+
+
 def test_shaft_damping_decays_exponentially() -> None:
     scene = paper("fig06", gravity=0.0, shaft_damping=5e6)
     rate = 5e6 / (3 * MASS * (OFFSET**2 + ARM**2))

@@ -14,7 +14,13 @@ from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
-from rotor_mbs.models.lagrange.parameters import RotorForm, TorqueSegment, rotor_form, torque_segments
+from rotor_mbs.models.lagrange.parameters import (
+    RotorForm,
+    TorqueSegment,
+    rotor_form,
+    torque_segments,
+    work_is_integrated,
+)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
@@ -47,7 +53,7 @@ class OdeSolver:
         form = rotor_form(scene)
         self._moving = (0, *(1 + i for i in form.moving))
         self._segments = torque_segments(scene)
-        has_work = scene.wants("energy") and (len(self._segments) > 1 or scene.has_damping)
+        has_work = work_is_integrated(scene)
         self._functions = [right_hand_side(form, segment, with_work=has_work) for segment in self._segments]
         columns = list(self._moving)
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]

@@ -199,6 +199,11 @@ def torque_segments(scene: Scene) -> list[TorqueSegment]:
     return segments
 
 
+def work_is_integrated(scene: Scene) -> bool:
+    """Whether the work is a variable of the equations: of a constant torque without dampers it is known exactly."""
+    return scene.wants("energy") and (scene.has_damping or not scene.has_constant_torque)
+
+
 # Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).
 _UNIT_FREQUENCY = 100.0
 

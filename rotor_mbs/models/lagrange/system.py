@@ -13,7 +13,13 @@ import numpy as np
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.parameters import RotorForm, TorqueSegment, rotor_form, torque_segments
+from rotor_mbs.models.lagrange.parameters import (
+    RotorForm,
+    TorqueSegment,
+    rotor_form,
+    torque_segments,
+    work_is_integrated,
+)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration
 
@@ -23,7 +29,7 @@ class EquationSystem:
     """First-order equations of a scene.
 
     equations   [(symbol, right-hand side)]: angles, rates, and the work where it is not known in closed form
-    parameters  their numbers; the last two are the torque's offset and slope where the torque changes
+    parameters  their numbers; the last two are the torque's offset and slope where the torque is not constant
     moving      column in `angles` of each state angle: 0, then 1 + number of each blade whose pitch moves
     """
 
@@ -32,10 +38,11 @@ class EquationSystem:
     moving: tuple[int, ...]
     has_work: bool
     segments: list[TorqueSegment]
+    has_constant_torque: bool
 
     @property
     def structure(self) -> tuple[int, ...]:
-        return (*self.parameters.structure, len(self.equations), len(self.segments) > 1)
+        return (*self.parameters.structure, len(self.equations), self.has_constant_torque)
 
 
 def build_system(scene: Scene) -> EquationSystem:
@@ -44,7 +51,7 @@ def build_system(scene: Scene) -> EquationSystem:
     parameters = Parameters()
     form, torque = equation_numbers(scene, parameters)
     segments = torque_segments(scene)
-    has_work = scene.wants("energy") and (len(segments) > 1 or scene.has_damping)
+    has_work = work_is_integrated(scene)
     count = 1 + len(form.blades)
     names = [f"q{i}" for i in range(count)] + [f"w{i}" for i in range(count)]
     symbols = engine.make_vars(*names)
@@ -53,16 +60,17 @@ def build_system(scene: Scene) -> EquationSystem:
     equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
     if has_work:
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, torque)))
-    return EquationSystem(equations, parameters, (0, *(1 + i for i in form.moving)), has_work, segments)
+    moving = (0, *(1 + i for i in form.moving))
+    return EquationSystem(equations, parameters, moving, has_work, segments, scene.has_constant_torque)
 
 
 def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, Any]:
     """Form, and torque in N m; takes the scene's numbers into `parameters`, in the order that integrators have them."""
     form = rotor_form(scene, parameters)
-    segments = torque_segments(scene)
-    if len(segments) > 1:
-        return form, parameters.own(segments[0].offset) + parameters.own(segments[0].slope) * heyoka().time
-    return form, parameters(segments[0].offset)
+    first = torque_segments(scene)[0]
+    if scene.has_constant_torque:
+        return form, parameters(first.offset)
+    return form, parameters.own(first.offset) + parameters.own(first.slope) * heyoka().time
 
 
 def initial_state(scene: Scene, system: EquationSystem) -> list[Fraction]:
@@ -98,7 +106,7 @@ class Propagation:
         self._initial = initial
         self._times = times
         self._segments = [_SegmentGrid(segment, times, initial.dtype) for segment in system.segments]
-        self._torque = len(system.parameters.values) - 2
+        self._torque = None if system.has_constant_torque else len(system.parameters.values) - 2
         self.states = initial[None, :]
 
     def run(self) -> Integration:
@@ -110,7 +118,7 @@ class Propagation:
         # Asked after every step, it costs a quarter of the run: only where there is a limit.
         callback = _within_time if deadline.is_set() else None
         for segment in self._segments:
-            if len(self._segments) > 1:
+            if self._torque is not None:
                 integrator.pars[self._torque :] = segment.torque
             with deadline.polled():
                 outcome, _, _, taken, _, states = integrator.propagate_grid(segment.grid, callback=callback)
