@@ -1,14 +1,18 @@
-"""The errata of the printed equations: each entry as checked by code, and what each erratum alone does to a scene."""
+"""The errata of the printed equations: the check of each printed entry, and what each erratum alone does to a scene."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.store.errata import read_errata
+from rotor_mbs.store import hdf5
 from rotor_mbs.store.read import Results, StoredScene
+from rotor_mbs.store.records import Record, read_record, write_records
 
 
 @dataclass(frozen=True)
@@ -34,31 +38,48 @@ class Effect:
     energy_gain: float | None
 
 
+_GROUP = "errata"
+_NUMBERS = {"difference": np.float64, "agrees": np.int8}
+_TEXTS = tuple(one.name for one in fields(CheckedEntry) if one.name not in _NUMBERS)
+
+
+def write_errata(path: Path, checks: Sequence[CheckedEntry], fingerprint: str) -> None:
+    """A results file with nothing but one record of the checks, and the fingerprint of the code that made them.
+
+    Raises StoreError.
+    """
+    texts = {name: [getattr(check, name) for check in checks] for name in _TEXTS}
+    numbers = {name: np.array([getattr(check, name) for check in checks], kind) for name, kind in _NUMBERS.items()}
+    write_records(path, [Record(_GROUP, "", "", {"fingerprint": fingerprint, **texts}, numbers)])
+
+
+def errata_fingerprint(results: Results) -> str:
+    """Of the code that made the checks in an open file; "" where it has none."""
+    return str(results.root[_GROUP].attrs["fingerprint"]) if _GROUP in results.root else ""
+
+
 def entries(results: Results) -> list[CheckedEntry]:
-    """Every checked entry in the order of the file; none where the file has no such group."""
-    return [_entry(check) for check in read_errata(results)]
+    """The checks in an open file, in order; none where it has none."""
+    if _GROUP not in results.root:
+        return []
+    record = read_record(_GROUP, results.root[_GROUP])
+    if not record.arrays:  # of an earlier version, which had a group for each entry
+        return [_entry(hdf5.attributes_of(check)) for check in results.root[_GROUP].values()]
+    columns = {**{name: record.attributes[name] for name in _TEXTS}, **record.arrays}
+    return [_entry(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+
+
+def _entry(values: Mapping[str, Any]) -> CheckedEntry:
+    texts = {name: str(values[name]) for name in _TEXTS}
+    return CheckedEntry(**texts, difference=float(values["difference"]), agrees=bool(values["agrees"]))
 
 
 def effects(scene: StoredScene) -> dict[str, Effect]:
     """By erratum, for those whose run the file has."""
-    found = {erratum: scene.methods.get(name) for erratum, name in errata_methods().items()}
-    return {erratum: _effect(run.attributes) for erratum, run in found.items() if run is not None}
-
-
-def _entry(attributes: Mapping[str, Any]) -> CheckedEntry:
-    texts = {name: str(attributes.get(name, "")) for name in ("equation", "entry", "printed", "right", "explained_by")}
-    difference = attributes.get("difference", 0.0)
-    return CheckedEntry(**texts, difference=float(difference), agrees=bool(attributes.get("agrees", 0)))
-
-
-def _effect(attributes: Mapping[str, Any]) -> Effect:
-    def number(name: str) -> float | None:
-        value = attributes.get(name)
-        return float(value) if isinstance(value, float | int) else None
-
-    return Effect(
-        str(attributes.get("status", "")),
-        number("angle_error_max"),
-        number("angle_error_whole"),
-        number("energy_gain_J"),
-    )
+    runs = {erratum: scene.methods.get(name) for erratum, name in errata_methods().items()}
+    names = ("angle_error_max", "angle_error_whole", "energy_gain_J")
+    return {
+        erratum: Effect(run.status, *(run.attributes.get(name) for name in names))
+        for erratum, run in runs.items()
+        if run is not None
+    }

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rotor_mbs.methods.catalogue import errata_methods, is_corrected, method_names
-from rotor_mbs.store.layout import REFERENCE
+from rotor_mbs.methods.catalogue import REFERENCE, errata_methods, is_corrected, method_names
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 PRINTED = "printed/ode45"

@@ -6,7 +6,7 @@ these attributes, so that the order of the list may differ between files.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,12 +20,6 @@ STATUSES = (*RUN_STATUSES, "left_out", "worker_died")
 def code_of(status: str) -> int:
     """The integer code of a status. Raises ValueError where there is no such status."""
     return STATUSES.index(status)
-
-
-def flags(meanings: Iterable[str] = STATUSES) -> dict[str, object]:
-    """The CF attributes of an array of codes."""
-    names = tuple(meanings)
-    return {"flag_values": np.arange(len(names), dtype=np.int64), "flag_meanings": " ".join(names)}
 
 
 def recode(codes: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[np.int64]:

@@ -1,17 +1,25 @@
-"""A file of references cut down to what cannot be computed again cheaply: the files under `reference/`."""
+"""Frozen references, the files under `reference/`: what cannot be computed again cheaply, with digests of its arrays.
+
+The digests stand in a text file beside each file of references: a changed number is found and located.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
+import numpy as np
+
+from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.solution.quantities import BUILT_IN
-from rotor_mbs.store import hdf5, layout
-from rotor_mbs.store.digests import write_digests
-from rotor_mbs.store.read import open_results
+from rotor_mbs.store import hdf5
+from rotor_mbs.store.read import Results, StoredRun, open_results
 from rotor_mbs.store.write import put_datasets
 
 # What cannot be computed again from angles and rates, and the scales.
-_KEPT = ("time", "coordinate", "angles", "rates", "work", "angle_uncertainty", "error_growth")
+_ARRAYS = ("time", "coordinate", "angles", "rates", "work", "angle_uncertainty", "error_growth")
+_ATTRIBUTES = ("settings", "steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s", "status")
 
 
 def freeze(source: Path, target: Path, date: str) -> None:
@@ -25,11 +33,53 @@ def freeze(source: Path, target: Path, date: str) -> None:
             if reference is None:
                 continue
             hdf5.put_attributes(hdf5.new_group(file, scene.name), scene.attributes)
-            group = hdf5.new_group(file, f"{scene.name}/{layout.REFERENCE}")
-            arrays = {name: reference.array(name) for name in _KEPT if name in reference}
+            group = hdf5.new_group(file, f"{scene.name}/{REFERENCE}")
+            arrays = {name: reference.array(name) for name in _ARRAYS if name in reference}
             put_datasets(group, arrays, BUILT_IN, reference.labels)
-            kept = ("settings", "steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s", "status")
-            facts = {name: reference.attributes[name] for name in kept}
+            facts = {name: reference.attributes[name] for name in _ATTRIBUTES}
             made = f"heyoka {results.attributes['heyoka']}, {date}"
             hdf5.put_attributes(group, {**facts, "frozen_with": made})
     write_digests(target)
+
+
+def write_digests(references: Path) -> None:
+    """`paper.sha256` beside `paper.h5`, atomically: a line "digest  scene channel" for every array of every reference.
+
+    Raises StoreError.
+    """
+    with open_results(references) as results:
+        lines = [f"{digest}  {scene} {name}\n" for (scene, name), digest in _digests(results).items()]
+    hdf5.replace_file(references.with_suffix(".sha256"), "".join(lines).encode())
+
+
+def changed_arrays(results: Results) -> dict[str, list[str]]:
+    """By scene, the arrays of its reference that are not what was frozen, are new or are gone; [] where all is well.
+
+    Raises StoreError where there is no digest file.
+    """
+    path = results.path.with_suffix(".sha256")
+    try:
+        rows = [line.split() for line in path.read_text().splitlines()]
+    except (OSError, UnicodeDecodeError) as exc:
+        raise StoreError(f"{path}: cannot be read ({exc}); `rotor-mbs reference` writes it") from exc
+    frozen = {(row[1], row[2]): row[0] for row in rows if len(row) == 3}
+    found = _digests(results)
+    scenes: dict[str, list[str]] = {}
+    for scene, name in {**found, **frozen}:
+        changed = scenes.setdefault(scene, [])
+        if frozen.get((scene, name)) != found.get((scene, name)):
+            changed.append(name)
+    return scenes
+
+
+def _digests(results: Results) -> dict[tuple[str, str], str]:
+    references = [scene.reference for scene in results.scenes.values()]
+    return {(run.scene, name): _digest(run, name) for run in references if run is not None for name in run.names}
+
+
+def _digest(run: StoredRun, name: str) -> str:
+    """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout."""
+    values = np.ascontiguousarray(run.array(name))
+    digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
+    digest.update(values.astype(values.dtype.newbyteorder("<")).tobytes())
+    return digest.hexdigest()

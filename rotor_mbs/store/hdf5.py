@@ -104,13 +104,16 @@ def new_group(parent: Any, name: str) -> Any:
 def put(group: Any, name: str, values: NDArray[Any], quantity: Column | Quantity, *, compress: bool = False) -> Any:
     """A dataset with unit and long name; its dimensions' scales must be there already. A scale is its own dimension."""
     options = {"compression": "gzip", "shuffle": True} if compress and values.ndim and values.size > 64 else {}
-    dataset = group.create_dataset(name, data=values, **options)
+    return _described(group.create_dataset(name, data=values, **options), group, quantity)
+
+
+def _described(dataset: Any, group: Any, quantity: Column | Quantity) -> Any:
     dataset.attrs["units"] = quantity.units
     dataset.attrs["long_name"] = quantity.long_name
-    if quantity.dimensions == (name,):
-        dataset.make_scale(name)
-    else:
-        for axis, dimension in enumerate(quantity.dimensions):
+    for axis, dimension in enumerate(quantity.dimensions):
+        if group[dimension] == dataset:
+            dataset.make_scale(dimension)
+        else:
             dataset.dims[axis].attach_scale(group[dimension])
     return dataset
 
@@ -177,12 +180,7 @@ def put_empty(
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
     if fill is not None:
         layout.set_fill_value(np.array(fill, kind))
-    dataset = group.create_dataset(name, shape, kind, dcpl=layout)
-    dataset.attrs["units"] = quantity.units
-    dataset.attrs["long_name"] = quantity.long_name
-    for axis, dimension in enumerate(quantity.dimensions):
-        dataset.dims[axis].attach_scale(group[dimension])
-    return dataset
+    return _described(group.create_dataset(name, shape, kind, dcpl=layout), group, quantity)
 
 
 def put_flags(dataset: Any, meanings: Sequence[str]) -> None:

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 FORMAT = "rotor_mbs"
 FORMAT_VERSION = 1
 CONVENTIONS = "CF-1.11"
-REFERENCE = "reference"
 
 # The attribute with the content hash of a run or a record; then its names in files of earlier versions.
 KEY = "run_hash"

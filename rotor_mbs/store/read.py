@@ -13,8 +13,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.scenario.names import RESERVED_GROUPS
-from rotor_mbs.store import hdf5, layout
+from rotor_mbs.store import hdf5
 
 
 @dataclass(frozen=True)
@@ -83,12 +84,12 @@ class StoredScene:
 
     @property
     def reference(self) -> StoredRun | None:
-        return self.runs.get(layout.REFERENCE)
+        return self.runs.get(REFERENCE)
 
     @property
     def methods(self) -> dict[str, StoredRun]:
         """The runs but the reference, in the order of the file."""
-        return {name: run for name, run in self.runs.items() if name != layout.REFERENCE}
+        return {name: run for name, run in self.runs.items() if name != REFERENCE}
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def _scenes(group: Any, name: str) -> Iterator[StoredScene]:
 
 def _runs(group: Any, scene: str) -> Iterator[StoredRun]:
     for model, item in group.items():
-        if model == layout.REFERENCE:
+        if model == REFERENCE:
             yield StoredRun(scene, model, item)
         elif hdf5.is_group(item):
             for integrator, run in item.items():

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.solution.status import STATUSES, flags, recode
+from rotor_mbs.solution.status import STATUSES, recode
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.layout import Column, key_of
 from rotor_mbs.store.read import open_results
@@ -108,11 +108,10 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
     """A results file with these records alone, atomically. Raises StoreError."""
     with hdf5.new_file(path) as file:
         for record in records:
-            put_record(file, record)
+            _put_record(file, record)
 
 
-def put_record(file: Any, record: Record) -> None:
-    """A record into a file that is being written."""
+def _put_record(file: Any, record: Record) -> None:
     group = hdf5.new_group(file, record.path)
     hdf5.put_attributes(group, {"record": 1, **record.attributes})
     dimension = _DIMENSIONS.get(record.kind, "row")
@@ -129,7 +128,7 @@ def put_record(file: Any, record: Record) -> None:
             values = values.astype(np.int64) if name in _INTEGERS else values
             dataset = hdf5.put(group, name, values, Column((dimension,), units, long_name))
             if name == "status":
-                dataset.attrs.update(flags())
+                hdf5.put_flags(dataset, STATUSES)
 
 
 def read_records(path: Path, *kinds: str) -> list[Record]:

@@ -1,13 +1,19 @@
-"""A results file as the place where records are kept: which keys it has, and new records merged into it."""
+"""A results file as the place where records are kept: which keys it has, and new records merged in. Judges nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
+from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.environment import machine, versions
-from rotor_mbs.store.merge import merge, refuse_other_kinds, stored_keys
+from rotor_mbs.scenario.names import RESERVED_GROUPS
+from rotor_mbs.store import hdf5
+from rotor_mbs.store.layout import key_of
+from rotor_mbs.store.read import Results, open_results
+from rotor_mbs.store.records import records_in
 
 
 @dataclass(frozen=True)
@@ -19,9 +25,83 @@ class ResultsFile:
     def stored_keys(self) -> set[str]:
         """Content hashes of all runs and records in the file. Raises StoreError."""
         refuse_other_kinds(self.path)
-        return stored_keys(self.path)
+        if not self.path.exists():
+            return set()
+        with open_results(self.path) as results:
+            return {key for _, _, _, key in _members(results) if key}
 
     def merge(self, parts: Sequence[Path], without: Collection[str] = frozenset()) -> None:
         """The records of `parts` into the file, atomically, and those of these keys out of it. Raises StoreError."""
         sources = [self.path, *parts] if self.path.exists() else parts
         merge(self.path, sources, {**versions(), **machine()}, without)
+
+
+def merge(
+    path: Path, sources: Sequence[Path], versions: Mapping[str, str], without: Collection[str] = frozenset()
+) -> None:
+    """All runs and records of `sources` into `path`, atomically; `path` may itself be among the sources.
+
+    A later run or record takes the place of an earlier one of the same name. Those of a scene whose numbers have
+    changed since (another scene_hash than in the last source that has it) belong to another rotor and are left out.
+
+    Parameters
+    ----------
+    versions : attributes of the new file, beside the time of its creation.
+    without : content hashes of what is left out.
+
+    Raises
+    ------
+    StoreError
+        Where a file cannot be read or written, or is not a batch's.
+    """
+    for source in sources:
+        refuse_other_kinds(source)
+    plan = _plan(sources, without)
+    with hdf5.new_file(path) as file:
+        hdf5.put_attributes(file, {**versions, "created": datetime.now(UTC).isoformat(timespec="seconds")})
+        for owner in sorted(plan, key=lambda name: (name.split("/")[0] in RESERVED_GROUPS, name)):
+            for source, names in _by_source(plan[owner]).items():
+                with open_results(source) as results:
+                    hdf5.new_group(file, owner).attrs.update(results.root[owner].attrs)
+                    for name in names:
+                        hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
+
+
+def refuse_other_kinds(path: Path) -> None:
+    """Raises StoreError where `path` has what a merge would not carry over: a sweep's dataset, which has its arrays at
+    the root, where a batch has groups alone."""
+    if not path.exists():
+        return
+    with open_results(path) as results:
+        if not all(hdf5.is_group(member) for member in results.root.values()):
+            raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
+
+
+def _members(results: Results) -> Iterator[tuple[str, str, str, str]]:
+    """(group above, scene_hash, group, content hash) of every run and record in an open file."""
+    for scene in results.scenes.values():
+        for method, run in scene.runs.items():
+            number = str(scene.attributes["scene_hash"])
+            yield scene.name, number, f"{scene.name}/{method}", key_of(run.attributes)
+    for name, group in records_in(results.root):
+        above = "/".join(name.split("/")[:-2]) or name
+        yield above, str(group.attrs.get("scene_hash", "")), name, key_of(group.attrs)
+
+
+def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[str, Path]]:
+    """Group above -> group -> the source to take it from."""
+    latest: dict[str, tuple[str, dict[str, Path]]] = {}
+    for source in sources:
+        with open_results(source) as results:
+            for above, number, name, key in _members(results):
+                if key not in without or not key:
+                    known, groups = latest.get(above, (number, {}))
+                    latest[above] = (number, {**(groups if known == number else {}), name: source})
+    return {above: groups for above, (_, groups) in latest.items()}
+
+
+def _by_source(groups: Mapping[str, Path]) -> dict[Path, list[str]]:
+    found: dict[Path, list[str]] = {}
+    for name, source in sorted(groups.items()):
+        found.setdefault(source, []).append(name)
+    return found

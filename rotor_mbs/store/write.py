@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.quantities import SCALES, Quantity, arrays, quantities, scale_values
+from rotor_mbs.solution.quantities import SCALES, Quantity, quantities, scale_values
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store import hdf5
 
@@ -20,11 +19,20 @@ def write_run(path: Path, scene_hash: str, run: Solution, attributes: Mapping[st
 
     attributes: what else is known of the run (status, metrics, hash). Raises StoreError.
     """
+    scene = run.scene
+    facts = {
+        "title": scene.title,
+        "figures": ", ".join(scene.figures),
+        "blades": len(scene.blades),
+        "scene_toml": scene.text,
+        "scene_hash": scene_hash,
+    }
+    refined = run.trajectory.get("refined_time")
+    datasets = {**scale_values(scene), "time": run.time, "refined_time": refined, **run.quantities}
     with hdf5.new_file(path) as file:
-        scene = run.scene
-        _put_scene(file, scene, scene_hash)
+        hdf5.put_attributes(hdf5.new_group(file, scene.name), facts)
         group = hdf5.new_group(file, f"{scene.name}/{run.method}")
-        put_datasets(group, _datasets(run), quantities(scene.outputs), list(scene.coordinate_labels))
+        put_datasets(group, datasets, quantities(scene.outputs), list(scene.coordinate_labels))
         hdf5.put_attributes(group, {**_facts(run), **attributes})
 
 
@@ -44,25 +52,6 @@ def _facts(run: Solution) -> dict[str, object]:
         if value is not None:
             facts[name] = value
     return facts
-
-
-def _datasets(run: Solution) -> dict[str, Any]:
-    """What of a run its scene asks to have stored, and the scales, by dataset name."""
-    trajectory = run.trajectory
-    scales = {**scale_values(run.scene), "time": trajectory.time, "refined_time": trajectory.get("refined_time")}
-    return {**scales, **arrays(run.scene, trajectory)}
-
-
-def _put_scene(file: Any, scene: Scene, scene_hash: str) -> None:
-    group = hdf5.new_group(file, scene.name)
-    facts = {
-        "title": scene.title,
-        "figures": ", ".join(scene.figures),
-        "blades": len(scene.blades),
-        "scene_toml": scene.text,
-        "scene_hash": scene_hash,
-    }
-    hdf5.put_attributes(group, facts)
 
 
 def put_datasets(group: Any, named: Mapping[str, Any], known: Sequence[Quantity], labels: Sequence[str]) -> None:

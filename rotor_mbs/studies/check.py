@@ -17,7 +17,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method,
 from rotor_mbs.scenario.bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.digests import changed_arrays
+from rotor_mbs.store.freeze import changed_arrays
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.check_probes import Measurement, perform_probe, probes, speed_probes
 from rotor_mbs.studies.frozen import shipped_files

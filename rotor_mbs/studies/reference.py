@@ -10,8 +10,8 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.execution.execute import OnProgress, ignore_progress
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import freeze
-from rotor_mbs.store.merge import refuse_other_kinds
 from rotor_mbs.store.read import open_results
+from rotor_mbs.store.results_file import refuse_other_kinds
 from rotor_mbs.studies.run import RunReport, run_scenes
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict
 from pathlib import Path
 
+from rotor_mbs.analysis.errata import CheckedEntry, errata_fingerprint, write_errata
 from rotor_mbs.execution.environment import numerics_fingerprint
 from rotor_mbs.execution.execute import OnProgress, ignore_progress
 from rotor_mbs.methods.catalogue import default_methods, errata_methods
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.errata import errata_fingerprint, write_errata
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import ResultsFile
 from rotor_mbs.studies.run import RunReport, able_methods, run_scenes
@@ -32,7 +32,9 @@ def _complete_errata(output: Path) -> None:
     with open_results(output) as results:
         if errata_fingerprint(results) == numerics_fingerprint():
             return
-    checks = [asdict(check) | {"explained_by": ", ".join(check.explained_by)} for check in check_errata()]
+    checks = [
+        CheckedEntry(**{**asdict(check), "explained_by": ", ".join(check.explained_by)}) for check in check_errata()
+    ]
     part = output.with_name(f"{output.name}.errata.h5")
     write_errata(part, checks, numerics_fingerprint())
     ResultsFile(output).merge([part])

@@ -22,7 +22,7 @@ from rotor_mbs.solution.judgement import judge, judged
 from rotor_mbs.solution.quantities import BUILT_IN, Quantity, shapes
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.status import STATUSES, flags, recode
+from rotor_mbs.solution.status import STATUSES, recode
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.write import write_run
 
@@ -171,4 +171,4 @@ def test_codes_of_statuses_are_read_by_their_meanings() -> None:
     assert [STATUSES[code] for code in codes[:2]] == ["ok", "worker_died"]
     assert codes[2] == -1
     same = np.arange(len(STATUSES))
-    np.testing.assert_array_equal(recode(same, flags()), same)
+    np.testing.assert_array_equal(recode(same, {}), same)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -11,18 +11,16 @@ import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
+from rotor_mbs.analysis.errata import CheckedEntry, entries, write_errata
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.store.errata import read_errata, write_errata
-from rotor_mbs.store.merge import merge, stored_keys
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import Record, read_records, write_records
+from rotor_mbs.store.results_file import ResultsFile, merge
 
-CHECKS: list[dict[str, Any]] = [
-    {"equation": "(8)", "entry": "row 1", "printed": "c", "right": "0", "difference": 1.0, "agrees": 0,
-     "explained_by": "E1"},
-    {"equation": "(9)", "entry": "row 2", "printed": "x", "right": "x", "difference": 0.0, "agrees": 1,
-     "explained_by": ""},
-]  # fmt: skip
+CHECKS = [
+    CheckedEntry("(8)", "row 1", "c", "0", 1.0, False, "E1"),
+    CheckedEntry("(9)", "row 2", "x", "x", 0.0, True, ""),
+]
 
 
 def ladder(scene: str, method: str, key: str, scene_hash: str = "1") -> Record:
@@ -51,7 +49,7 @@ def test_merging_replaces_by_name_drops_other_numbers_and_leaves_out_what_is_sta
     write_records(tmp_path / "old.h5", [one, two, elsewhere])
     write_records(tmp_path / "new.h5", [ladder("stiff/x", "exudyn_tree/rk44", "d")])
     merge(tmp_path / "all.h5", [tmp_path / "old.h5", tmp_path / "new.h5"], {})
-    assert stored_keys(tmp_path / "all.h5") == {"b", "c", "d"}
+    assert ResultsFile(tmp_path / "all.h5").stored_keys() == {"b", "c", "d"}
     merge(tmp_path / "all.h5", [tmp_path / "all.h5"], {}, without={"c"})
     assert named(tmp_path / "all.h5") == [f"stability/steps/stiff/x/exudyn_tree/{name}" for name in ("rk44", "rk67")]
     write_records(tmp_path / "new.h5", [ladder("stiff/x", "exudyn_tree/dopri5", "e", scene_hash="2")])
@@ -65,9 +63,9 @@ def test_runs_and_records_are_kept_side_by_side(tmp_path: Path) -> None:
     write_records(tmp_path / "record.h5", [ladder("paper/fig05", "lagrange/taylor", "record")])
     write_errata(tmp_path / "errata.h5", CHECKS, "f")
     merge(tmp_path / "all.h5", [tmp_path / f"{name}.h5" for name in ("runs", "record", "errata")], {})
-    assert stored_keys(tmp_path / "all.h5") == {"run", "record"}
+    assert ResultsFile(tmp_path / "all.h5").stored_keys() == {"run", "record"}
     with open_results(tmp_path / "all.h5") as results:
-        assert read_errata(results) == CHECKS
+        assert entries(results) == CHECKS
         assert list(results.scenes) == ["paper/fig05"]
 
 
@@ -81,12 +79,12 @@ def test_files_of_earlier_versions_are_read_and_merged(tmp_path: Path) -> None:
         group["status"][:] = [1, 0]
         file.create_group("errata").attrs["fingerprint"] = "f"
         for number, check in enumerate(CHECKS):
-            file.create_group(f"errata/{number:03d}").attrs.update(check)
+            file.create_group(f"errata/{number:03d}").attrs.update(asdict(check))
     merge(tmp_path / "b.h5", [tmp_path / "a.h5"], {})
     (found,) = read_records(tmp_path / "b.h5", "steps")
     assert (found.key, found.statuses) == ("k", ["left_out", "ok"])
     with open_results(tmp_path / "b.h5") as results:
-        assert read_errata(results) == CHECKS
+        assert entries(results) == CHECKS
 
 
 def test_records_open_in_xarray(tmp_path: Path) -> None:

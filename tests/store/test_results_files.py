@@ -15,8 +15,8 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.merge import merge
 from rotor_mbs.store.read import open_results
+from rotor_mbs.store.results_file import merge
 from rotor_mbs.store.write import write_run
 
 SCENE = paper("fig08", duration=1.0, samples=51)

@@ -30,8 +30,8 @@ from rotor_mbs.report.pages.bench_tables import (
 )
 from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store.merge import merge
 from rotor_mbs.store.records import Record, read_records, write_records
+from rotor_mbs.store.results_file import merge
 
 
 def curve(

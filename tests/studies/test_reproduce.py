@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from support.scenes import PAPER
 
+from rotor_mbs.analysis.errata import entries
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.scenario.resources import reference_folder
-from rotor_mbs.store.errata import read_errata
 from rotor_mbs.store.read import open_results
 
 METHODS = {"printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"}
@@ -59,11 +59,11 @@ def test_the_printed_model_makes_energy_and_the_right_ones_do_not(reproduced: Pa
 def test_the_errata_in_the_file_are_those_that_the_paper_is_charged_with(reproduced: Path) -> None:
     charged = tomllib.loads((reference_folder() / "errata.toml").read_text())["erratum"]
     with open_results(reproduced / "results.h5") as results:
-        checks = read_errata(results)
-    assert {check["equation"] for check in checks if not check["agrees"]} == {
+        checks = entries(results)
+    assert {check.equation for check in checks if not check.agrees} == {
         equation for erratum in charged for equation in (*erratum["stands_in"], *erratum["reaches"])
     }
-    assert all(check["explained_by"] for check in checks if not check["agrees"])
+    assert all(check.explained_by for check in checks if not check.agrees)
 
 
 def test_the_report_says_what_was_found(reproduced: Path) -> None:

@@ -17,7 +17,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.merge import merge
+from rotor_mbs.store.results_file import merge
 from rotor_mbs.store.write import write_run
 from rotor_mbs.studies import check
 from rotor_mbs.studies.frozen import load_reference

@@ -13,7 +13,7 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import compare
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.merge import merge
+from rotor_mbs.store.results_file import merge
 from rotor_mbs.store.write import write_run
 
 Curve = Callable[[Any], Any]  # time (n,) to angles (n, coordinates)

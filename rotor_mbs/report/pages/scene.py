@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, quantity
@@ -23,7 +24,6 @@ from rotor_mbs.report.paper_figures import HEADINGS
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.paths import paths
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
-from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[np.float64]

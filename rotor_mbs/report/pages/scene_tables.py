@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from rotor_mbs.analysis import methods
-from rotor_mbs.analysis.escape_rate import escape_rate
-from rotor_mbs.methods.catalogue import is_corrected
+from rotor_mbs.analysis.exact import escape_rate
+from rotor_mbs.analysis.rehydrate import scene_of
+from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.report.core.elements import PageTable, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, quantity
-from rotor_mbs.store.layout import REFERENCE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 
@@ -82,7 +82,8 @@ def metrics_notes(scene: StoredScene) -> list[str]:
         )
     if any("zero_pitch_max" in run.attributes for run in scene.runs.values()):
         text = "Zero pitch: whether pitches that are exactly zero in the reference stay below 10⁻⁹ rad."
-        rate = escape_rate(scene)
+        parsed = scene_of(scene)
+        rate = None if parsed is None else escape_rate(parsed)
         if rate is not None:
             text += (
                 " A pitch below the shaft is an inverted pendulum: rounding errors grow at up to √(g/c) = "
