@@ -53,8 +53,7 @@ class Condition(Table):
 class Published(Table):
     """A number or claim of the paper. A number has of, value, decimals; a claim has statement, tests.
 
-    matched: of a number that is amplified rounding error: the run's length and the order of adding the weights were
-    chosen so that it is reproduced.
+    rounding: of a number, whether it is amplified rounding error, which depends on how the equations are written.
     """
 
     id: Text = Field(description="a name")
@@ -65,7 +64,7 @@ class Published(Table):
     of: ReadOff | None = None
     value: Number = Field(0.0, description="the printed number")
     decimals: int = Field(0, ge=0, description="how many decimals are printed")
-    matched: bool = Field(False, description="true or false")
+    rounding: bool = Field(False, description="true or false")
     tests: Annotated[tuple[Condition, ...], Field(strict=False)] = Field((), description="a list of conditions")
 
     @model_validator(mode="after")

@@ -29,14 +29,14 @@ class Reproduced:
     """Published numbers of one figure that the printed model reproduces, and the conditions.
 
     gravity   m/s², None where it is not known; duration: s
-    matched   whether they are grown rounding error, for a run length and an order of adding chosen to match
+    rounding  whether they are amplified rounding error
     """
 
     figure: str
     count: int
     gravity: float | None
     duration: float
-    matched: bool
+    rounding: bool
 
 
 @dataclass(frozen=True)
@@ -116,10 +116,10 @@ def _on_condition(figure: str, numbers: Sequence[Claim], scenes: Mapping[str, St
     stored = scenes[of.scene]
     run = methods.printed_run(stored)
     assert run is not None  # it has given the number
-    matched = any(claim.published.matched for claim in numbers)
+    rounding = any(claim.published.rounding for claim in numbers)
     scene = scene_of(stored)
     gravity = None if scene is None else scene.gravity
-    return Reproduced(figure, len(numbers), gravity, float(run.array("time")[-1]), matched)
+    return Reproduced(figure, len(numbers), gravity, float(run.array("time")[-1]), rounding)
 
 
 def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:

@@ -38,9 +38,9 @@ def test_ids_are_unique():
 @pytest.mark.parametrize("entry", PUBLISHED, ids=lambda entry: entry["id"])
 def test_vocabulary(entry):
     expected = {"number": {"of", "value", "decimals"}, "claim": {"statement", "tests"}}[entry["kind"]]
-    assert entry.keys() - {"matched"} == {"id", "figure", "kind", "quote"} | expected
-    # What is matched is told to be so in the conditions, by its figure.
-    assert not entry.get("matched") or "both were chosen to match" in CONDITIONS[f"fig{int(entry['figure']):02d}"]
+    assert entry.keys() - {"rounding"} == {"id", "figure", "kind", "quote"} | expected
+    # A number that is rounding error is said to be so in the conditions, by its figure.
+    assert not entry.get("rounding") or "likelier reading" in CONDITIONS[f"fig{int(entry['figure']):02d}"]
     for scene, quantity, coordinate, statistic in measures(entry):
         assert (ROOT / "scenarios" / f"{scene}.toml").is_file()
         assert quantity in ("angle", "rate")

@@ -99,7 +99,7 @@ def test_shipped_scene_has_the_numbers_of_its_caption(paper: dict[str, Scene], n
         assert blade.tip == (c, 0.0, 33.38)
         assert blade.is_point_mass
     assert scene.gravity == 9.8
-    assert (scene.duration, scene.samples) == ((10.83, 1084) if name == "paper/fig05" else (10.0, 1001))
+    assert (scene.duration, scene.samples) == ((12.0, 1201) if name == "paper/fig05" else (10.0, 1001))
     assert scene.outputs == OUTPUTS
     assert not scene.has_damping
     assert scene.hub_inertia == 0.0

@@ -1,7 +1,9 @@
 """The paper's equations of motion as printed: (33) with (25), (29), (30), (32), one blade; (39)-(56), three blades.
 
 Nothing is corrected here: E1 and E2 are in the coefficients, E3 in the last terms of (53)-(55). Every formula is a
-function of the symbols it is printed with, so that its numbers and its text (see `symbols`) have one source.
+function of the symbols it is printed with, so that its numbers and its text (see `symbols`) have one source. It is
+run in the order of the print, with one exception: the factor of the first row of (56) is multiplied in, see
+`rotor_gravity`.
 
 s2, c2 .. s5, c5   sines and cosines of q2 (rotor), q3, q4, q5 (pitch of blade 1, 2, 3)
 w22, w23, w33, ..  products of rates: w23 = q̇2 q̇3, w33 = q̇3²; w3 = q̇3 to the first power, printed in (53)-(55)
@@ -10,19 +12,17 @@ root3              the square root of 3
 
 Where the machine reading of the print is damaged, the undamaged equation it follows from tells what was printed:
 (54), (55) are (30) at q2 + 2π/3 and q2 + 4π/3 by (35), (36); the pitch rows of (56) are (32) at the same angles.
-
-One row is run in the form it has before its printed simplification: the first of (56), see `rotor_gravity`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 ROOT3 = math.sqrt(3.0)
-PHASES = (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)  # (34)-(36), rad
 Row = tuple[Any, ...]
+RotorGravity = Callable[..., float]  # (m, c, d, g, q2, c3, c4, c5) -> N m
 
 
 def mass_one(m: Any, c: Any, d: Any, s3: Any, c3: Any) -> tuple[Row, Row]:
@@ -120,19 +120,16 @@ def gravity_three(
     )
 
 
-def rotor_gravity(m: float, c: float, d: float, g: float, q2: float, c3: float, c4: float, c5: float) -> float:
-    """First row of (32) summed over the blades by (34)-(36): (56) before d is cancelled out of it; N m.
+def rotor_gravity(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, root3: Any = ROOT3) -> Any:
+    """First row of (56) as it is run, N m: its factor c m g multiplied into the three terms.
 
-    Equal to the first row of (56) but for rounding, and that decides Fig. 5. Started at rest with every pitch at zero
-    the printed equations are in (unstable) equilibrium: (56) gives exactly zero and nothing ever moves, whereas the
-    figure does. In this sum the weights m g d sin(q2 + phase) cancel to within 1e-9 N m only, and what grows from that
-    is the published figure. The grouping of the products is chosen so that its digits come out.
+    Equal to the printed form but for rounding, which decides Fig. 5: it starts at rest in an unstable equilibrium of
+    these equations, so that its motion is amplified rounding error. There the printed bracket is exactly zero, and
+    nothing moves; the three terms leave -4.3e-13 N m, with which the three published numbers come out for T = 12 s.
+    Other ways of writing the row are in `gravity_rows`.
     """
-    turns = [q2 + phase for phase in PHASES]
-    moments = [
-        m * g * (c * math.cos(turn) * ck + d * math.sin(turn)) for turn, ck in zip(turns, (c3, c4, c5), strict=True)
-    ]
-    return -(moments[0] + moments[1] + moments[2])
+    second, third = c2 / 2 + root3 / 2 * s2, c2 / 2 - root3 / 2 * s2
+    return -c * m * g * c2 * c3 + c * m * g * second * c4 + c * m * g * third * c5
 
 
 def fixed_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: float, phases: Sequence[float]) -> float:
@@ -166,9 +163,17 @@ def one_blade_accelerations(
 
 
 def three_blade_accelerations(
-    m: float, c: float, d: float, g: float, torque: float, state: Sequence[float]
+    m: float,
+    c: float,
+    d: float,
+    g: float,
+    torque: float,
+    state: Sequence[float],
+    row: Callable[..., float] | None = None,
 ) -> tuple[float, float, float, float]:
     """(39)-(56) solved for q̈2..q̈5 in rad/s²; state (8,): q2..q5, q̇2..q̇5.
+
+    `row` takes the place of the first row of (56): (m, c, d, g, q2, c3, c4, c5) -> N m, see `gravity_rows`.
 
     By (39)-(41) each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one by one.
     """
@@ -185,7 +190,7 @@ def three_blade_accelerations(
     b4 = -h_4(m, c, s2, c2, s5, c5, v22, v25, v5)
     if g:
         _, f2, f3, f4 = gravity_three(m, c, g, s2, c2, s3, c3, s4, c4, s5, c5)
-        f1 = rotor_gravity(m, c, d, g, q2, c3, c4, c5)
+        f1 = rotor_gravity(m, c, g, s2, c2, c3, c4, c5) if row is None else row(m, c, d, g, q2, c3, c4, c5)
         b1, b2, b3, b4 = b1 - f1, b2 - f2, b3 - f3, b4 - f4
     r2, r3, r4 = d12 / d22, d13 / d33, d14 / d44
     a2 = (b1 - r2 * b2 - r3 * b3 - r4 * b4) / (d11 - r2 * d21 - r3 * d31 - r4 * d41)

@@ -1,21 +1,31 @@
-"""The methods printed/ode45, the paper's equations to the letter, and printed_e1, _e2, _e3/ode45, one erratum alone."""
+"""The methods printed/ode45, the paper's equations as printed, and printed_e1, _e2, _e3/ode45, one erratum alone."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from rotor_mbs.methods.base import Look, Method
+from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.ode45 import Ode45Result, Ode45Settings, RightHandSide, ode45
 from rotor_mbs.models.printed import literal, observables
 from rotor_mbs.models.printed.blades import PointMassRotor, point_mass_rotor
 from rotor_mbs.models.printed.derivation import DerivedRotor
+from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
+
+
+@dataclass(frozen=True)
+class PrintedSettings(Ode45Settings):
+    gravity_row: str = choice(
+        DEFAULT_ROW, tuple(GRAVITY_ROWS), doc="way of writing the first row of (56): equal but for rounding, see Fig. 5"
+    )
+
 
 # (torque in N m, angles and rates) -> accelerations; all of the coordinates that move.
 Accelerations = Callable[[float, Sequence[float]], Sequence[float]]
@@ -79,7 +89,7 @@ class PrintedSolver:
 
 
 class PrintedModel:
-    """The literal equations, or the paper's derivation with chosen errata."""
+    """The equations as printed, or the paper's derivation with chosen errata."""
 
     def __init__(self, name: str, errata: Errata | None = None) -> None:
         self._name = name
@@ -107,18 +117,19 @@ class PrintedModel:
             return (f"(24)-(38) derived anew, {left} left in",) * 2
         if blades == 1:
             return "(33), rotor row", "(33), pitch row"
-        return "(42)-(45), (52); of (56) the sum it stands for, (32)", "(46)-(51), (53)-(56)"
+        return "(42)-(45), (52), (56) with its factor multiplied in", "(46)-(51), (53)-(56)"
 
     def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
         rotor = self._rotor(scene)
         tolerances = settings.relative_tolerance, settings.absolute_tolerance
-        return PrintedSolver(scene, rotor, self._accelerations(rotor), *tolerances)
+        row = settings.gravity_row if isinstance(settings, PrintedSettings) else DEFAULT_ROW
+        return PrintedSolver(scene, rotor, self._accelerations(rotor, row), *tolerances)
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
         return point_mass_rotor(self._name, scene, blade_counts=() if self._errata else (1, 3))
 
-    def _accelerations(self, rotor: PointMassRotor) -> Accelerations:
+    def _accelerations(self, rotor: PointMassRotor, row: str) -> Accelerations:
         m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
         if not rotor.pitches_move:
             return lambda torque, state: [literal.fixed_pitch_acceleration(m, d, g, torque, state[0], rotor.phases)]
@@ -128,7 +139,8 @@ class PrintedModel:
             return lambda torque, state: derived.accelerations(torque, state[:n], state[n:])
         if len(rotor.phases) == 1:
             return lambda torque, state: literal.one_blade_accelerations(m, c, d, g, torque, state)
-        return lambda torque, state: literal.three_blade_accelerations(m, c, d, g, torque, state)
+        written = None if row == DEFAULT_ROW else GRAVITY_ROWS[row].moment
+        return lambda torque, state: literal.three_blade_accelerations(m, c, d, g, torque, state, written)
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
@@ -154,7 +166,7 @@ def _method(name: str, label: str, look: Look, errata: Errata | None = None, err
         look=look,
         build=model.build,
         items=model.items,
-        settings=Ode45Settings,
+        settings=Ode45Settings if erratum else PrintedSettings,
         is_corrected=False,
         is_default=not erratum,
         erratum=erratum,

@@ -10,7 +10,7 @@ from rotor_mbs.analysis.published import TrajectoryNumber
 from rotor_mbs.report.core.elements import PageTable, TableCell
 from rotor_mbs.report.core.numbers import fixed, number, quantity
 
-MATCHED = "for a run length and an order of adding the weights that were chosen to match"
+ROUNDING = "amplified rounding error, which depends on how the equations are written"
 _STATISTICS = {
     "min": "smallest",
     "max": "largest",
@@ -54,8 +54,8 @@ def _number_row(claim: Claim) -> list[TableCell]:
     item, printed, corrected = claim.published, claim.printed, claim.corrected
     assert item.of is not None  # every number has it
     verdict = _verdict(printed.holds, "reproduced", "not reproduced")
-    if item.matched and printed.holds:
-        verdict = replace(verdict, note=f"grown rounding error, {MATCHED}")
+    if item.rounding and printed.holds:
+        verdict = replace(verdict, note=ROUNDING)
     return [
         TableCell(item.figure),
         TableCell(f"{description_of(item.of)} ({unit_of(item.of)})", note=f"«{item.quote}»", note_language="es"),

@@ -138,10 +138,9 @@ def _reproduced(facts: Finding) -> str:
 def _condition(one: Reproduced) -> str:
     """ "that of Fig. 11 with g = 9.8 m/s² and 10 s"."""
     what = f"{'that' if one.count == 1 else f'the {one.count}'} of Fig. {one.figure}"
-    if one.matched:
-        return f"{what}, grown rounding error, {claim_tables.MATCHED}"
     gravity = "" if one.gravity is None else f"g = {number(one.gravity)} m/s² and "
-    return f"{what} with {gravity}{quantity(one.duration, 's')}"
+    note = f" ({claim_tables.ROUNDING})" if one.rounding else ""
+    return f"{what} with {gravity}{quantity(one.duration, 's')}{note}"
 
 
 def _printed_energy(energy: PrintedEnergy | None) -> str:

@@ -48,7 +48,7 @@ class WalkFigure:
     legend: Sequence[LegendEntry]
     panels: Sequence[WalkPanel]
     numbers: Sequence[str]
-    has_matched_number: bool
+    has_rounding_number: bool
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ def walk_figure(
         panels = [_torque_panel(figure, scenes, rows.get("", []), files)]
     else:
         panels = [_panel(figure, letter, scenes[name], rows.get(letter, []), files) for letter, name in figure.panels]
-    matched = any(claim.published.matched for claim in numbers)
-    return WalkFigure(figure.number, figure.kind, legend, panels, [_number(claim) for claim in numbers], matched)
+    rounding = any(claim.published.rounding for claim in numbers)
+    return WalkFigure(figure.number, figure.kind, legend, panels, [_number(claim) for claim in numbers], rounding)
 
 
 def _panel(
