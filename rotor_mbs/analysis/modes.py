@@ -40,7 +40,7 @@ class ModeSet:
     def undamped_frequencies(self) -> Array:
         """(n,) rad/s: root of the product of both eigenvalues; NaN where one of them grows without oscillating."""
         product = (self.eigenvalues[:, 0] * self.eigenvalues[:, 1]).real
-        return np.sqrt(np.where(product >= 0.0, product, np.nan))
+        return np.sqrt(np.where(product >= 0.0, np.abs(product), np.nan))
 
     @property
     def damped_frequencies(self) -> Array:

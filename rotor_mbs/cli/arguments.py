@@ -17,6 +17,8 @@ _DEFAULT_FOLDER = Path("rotor-mbs-out")
 _DEFAULT_TIMEOUT_S = 60.0
 # The suite has many runs that would reach any limit: with a shorter one it ends in minutes.
 _SUITE_TIMEOUT_S = 8.0
+_CHART_TIMEOUT_S = 600.0
+_LONGEST_SPAN = 10_000
 _DEFAULT_BUDGET_S = 28.0  # the paper's seventeen scenes in eight minutes
 
 
@@ -51,6 +53,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_check,
         _add_sweep,
         _add_stability,
+        _add_modes,
         _add_report,
         _add_export,
     ):
@@ -145,6 +148,26 @@ def _add_stability(commands: _Commands) -> None:
     _add_batch_options(stability, timeout_s=_SUITE_TIMEOUT_S)
 
 
+def _add_modes(commands: _Commands) -> None:
+    modes = _command(
+        commands, "modes", "natural frequencies at rest and over rotor speed, multipliers of a turn under gravity",
+        "modes:modes",
+    )  # fmt: skip
+    modes.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
+    modes.add_argument(
+        "--speeds", type=_span, default=(), metavar="FROM:TO:COUNT",
+        help="rad/s, equally spaced: Campbell diagram and Floquet multipliers, as 0:3:31 (default: at rest alone)",
+    )  # fmt: skip
+    modes.add_argument(
+        "--stiffness", type=_span, default=(), metavar="FROM:TO:COUNT",
+        help="N m/rad of every bearing: the stability chart over speed and stiffness",
+    )  # fmt: skip
+    modes.add_argument("-o", "--output", type=_file, default=Path("modes.h5"), metavar="FILE", help=_default("FILE"))
+    modes.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
+    modes.add_argument("--json", action="store_true", help="the table as JSON, for a script")
+    _add_batch_options(modes, timeout_s=_CHART_TIMEOUT_S)
+
+
 def _add_report(commands: _Commands) -> None:
     report = _command(commands, "report", "HTML pages from a results file", "reports:report")
     report.add_argument("file", type=Path, metavar="FILE", help="a results file")
@@ -195,6 +218,19 @@ def _add_sweep(commands: _Commands) -> None:
     sweep.add_argument("--yes", action="store_true", help="start a sweep of over a million runs")
     sweep.add_argument("--json", action="store_true", help="progress and summary as JSON lines")
     _add_batch_options(sweep)
+
+
+def _span(text: str) -> tuple[float, ...]:
+    """COUNT numbers from FROM to TO, both included, of "FROM:TO:COUNT"."""
+    try:
+        first, last, count = (kind(part) for kind, part in zip((float, float, int), text.split(":"), strict=True))
+        if 0.0 <= first < last < float("inf") and 2 <= count <= _LONGEST_SPAN:
+            return tuple(first + (last - first) * i / (count - 1) for i in range(int(count)))
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(
+        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO and COUNT from 2 to {_LONGEST_SPAN}"
+    )
 
 
 def _part(text: str) -> tuple[int, int]:

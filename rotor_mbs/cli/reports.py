@@ -10,6 +10,7 @@ from pathlib import Path
 from rotor_mbs.execution.environment import fingerprint
 from rotor_mbs.scenario.resources import reference_folder
 from rotor_mbs.store.hdf5 import replace_file
+from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import read_records
 
 _STAMP = ".made-from"
@@ -19,8 +20,15 @@ def report(arguments: argparse.Namespace) -> int:
     """Pages from `arguments.file` into `arguments.output`."""
     from rotor_mbs.report.build import write_report
     from rotor_mbs.report.pages.bench import write_bench_report
+    from rotor_mbs.report.pages.modes import write_modes_report
 
-    print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
+    has_modes = bool(read_records(arguments.file, "modes"))
+    with open_results(arguments.file) as results:
+        has_scenes = bool(results.scenes)
+    if has_scenes or not has_modes:
+        print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
+    if has_modes:
+        print(write_modes_report(arguments.file, arguments.output / "modes" if has_scenes else arguments.output))
     if read_records(arguments.file, "bench"):
         print(write_bench_report(arguments.file, arguments.output / "bench"))
     return 0

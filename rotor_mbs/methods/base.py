@@ -15,6 +15,7 @@ from rotor_mbs.methods.settings import Settings
 if TYPE_CHECKING:  # reading the catalogue needs none of them
     from rotor_mbs.scenario.bounds import Bound
     from rotor_mbs.scenario.scene import Scene
+    from rotor_mbs.solution.linearization import Linearization
     from rotor_mbs.solution.record import Integration, Item, Trajectory
 
 __all__ = ["Look", "Method", "Settings", "Solver", "stability_polynomial"]
@@ -53,6 +54,8 @@ class Method:
     relative_cost   run time as a multiple of the fastest method's, roughly: expensive methods are started first
     bounds          accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml
     solve_many      (scenes, settings) -> block of runs: a vectorized path for sweeps, or None
+    linearize       (scene, steady angles, rotor speed, rotor torque) -> the model linearized there, or None; one method
+                    of a model has it. Raises MethodRefusal for a state that the model cannot be linearized about
     load            imports what it computes with, and prevents the use of compiled code from an earlier process: before
                     timings, which exclude both
     """
@@ -77,6 +80,7 @@ class Method:
     relative_cost: float = 1.0
     bounds: tuple[Bound, ...] = ()
     solve_many: Callable[[Sequence[Scene], Any], Any] | None = None
+    linearize: Callable[[Scene, Any, float, float], Linearization] | None = None
     load: Callable[[], object] = lambda: None
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 # Groups at the top of a results file that are not scenes: no scene may take such a name.
-RESERVED_GROUPS = ("bench", "errata", "stability", "sweep")
+RESERVED_GROUPS = ("bench", "errata", "modes", "stability", "sweep")
 
 
 def natural_key(name: str) -> list[tuple[int, int, str]]:

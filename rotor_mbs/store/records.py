@@ -1,8 +1,9 @@
-"""Records beside the runs of a results file: arrays over one dimension, and attributes, in a group of their own.
+"""Records beside the runs of a results file: arrays and attributes in a group of their own.
 
     /bench/<scene>/<method>                  error against run time over `setting`
     /stability/<kind>/<scene>/<method>       step ladders, stability limits and conservation over `row`
     /errata                                  the check of the printed entries over `row`
+    /modes/<scene>/<model>/<kind>            modes over speed; its arrays have dimensions of their own
 Writes and reads them; judges nothing.
 """
 
@@ -30,6 +31,7 @@ _FOLDERS = {
     "limits": "stability/limits",
     "conservation": "stability/conservation",
     "errata": "errata",
+    "modes": "modes",
 }
 _DIMENSIONS = {"bench": "setting"}  # of the others: row
 _SETTING_UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
@@ -67,11 +69,12 @@ class Record:
 
     Attributes
     ----------
-    kind : "bench", "steps", "limits", "conservation" or "errata".
+    kind : "bench", "steps", "limits", "conservation", "errata" or "modes".
     scene : "paper/fig05"; "" where the record belongs to no scene.
     name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
     attributes : plain values; `run_hash` stands for all that decides the numbers.
     arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
+    columns : what the arrays are, scales first, where they are not the ones of all studies; for writing alone.
     """
 
     kind: str
@@ -79,6 +82,7 @@ class Record:
     name: str
     attributes: Mapping[str, Any] = field(default_factory=dict)
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    columns: Mapping[str, Column] = field(default_factory=dict)
 
     @property
     def path(self) -> str:
@@ -114,6 +118,12 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
 def _put_record(file: Any, record: Record) -> None:
     group = hdf5.new_group(file, record.path)
     hdf5.put_attributes(group, {"record": 1, **record.attributes})
+    for name, column in record.columns.items():
+        dataset = hdf5.put(group, name, np.asarray(record.arrays[name]), column)
+        if f"{name}_labels" in record.attributes:
+            hdf5.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
+    if record.columns:
+        return
     dimension = _DIMENSIONS.get(record.kind, "row")
     if dimension == "setting":
         kind = str(record.attributes["setting_kind"])

@@ -19,6 +19,7 @@ from rotor_mbs.models.exudyn import blueprint, chain, readings, schemes, tree
 from rotor_mbs.models.exudyn.energy import work_needs_rows
 from rotor_mbs.models.exudyn.timetable import RotorTorque
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.record import Item
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
@@ -75,6 +76,20 @@ def _chain(make: MakeScheme) -> Callable[[Scene, Any], Solver]:
         return MultibodySolver(scene, parts, torque, scheme, readings.chain_trajectory, rows_between=True)
 
     return build
+
+
+def _linearize_tree(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
+    from rotor_mbs.models.exudyn.linearization import linearize_tree
+
+    return linearize_tree(scene, angles, speed, torque)
+
+
+def _linearize_chain(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
+    from rotor_mbs.models.exudyn.linearization import linearize_chain
+
+    if speed or torque:
+        raise MethodRefusal("exudyn_chain: linearized at rest alone")
+    return linearize_chain(scene, angles)
 
 
 def _scheme(make: MakeScheme, scene: Scene, settings: Settings) -> schemes.Scheme:
@@ -142,7 +157,7 @@ METHODS = (
         # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
         # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
-        ladders=(step_ladder(8),), cost_scaling={"step": 1e-2},
+        ladders=(step_ladder(8),), cost_scaling={"step": 1e-2}, linearize=_linearize_tree,
     ),
     _method(
         "exudyn_tree", "dopri5", "DOPRI5", _tree(schemes.dopri5),
@@ -164,6 +179,7 @@ METHODS = (
         "exudyn_chain", "generalized_alpha", "generalized-α", _chain(schemes.generalized_alpha),
         look=Look(_GREEN, "-.", "^"), settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
         ladders=_CHAIN_ALPHA_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
+        linearize=_linearize_chain,
     ),
     _method(
         "exudyn_chain", "newmark_index2", "Newmark index 2", _chain(schemes.newmark_index2),

@@ -16,6 +16,7 @@ from rotor_mbs.models.lagrange import heyoka_adapter, reference, samples, taylor
 from rotor_mbs.models.lagrange.ode_solvers import Integrator, OdeSolver, ode45_integrator, scipy_integrator
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.linearization import Linearization
 
 _EPS = float(np.finfo(float).eps)
 _BLUE, _LIGHT_BLUE = "#0072b2", "#56b4e9"
@@ -57,6 +58,12 @@ def _taylor_many(scenes: Sequence[Scene], settings: TaylorSettings) -> Any:
     from rotor_mbs.models.lagrange.ensemble import solve_many
 
     return solve_many(scenes, settings.tolerance)
+
+
+def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
+    from rotor_mbs.models.lagrange.linearization import linearize
+
+    return linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], torque)
 
 
 def _ode_solver(make: Callable[[float, float], Integrator]) -> Callable[[Scene, Any], OdeSolver]:
@@ -114,6 +121,7 @@ METHODS = (
         items=samples.items,
         ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
         cost_scaling={"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
+        linearize=_linearize,
     ),
     _scipy_method(
         "DOP853", Look(_BLUE, "--", "D"), Dop853Settings,

@@ -20,6 +20,7 @@ from rotor_mbs.models.lagrange.linearization import (
     Jet,
     cosine,
     holding_torque,
+    linearize,
     moving_coordinates,
     sine,
     steady_rotation,
@@ -34,8 +35,11 @@ from rotor_mbs.solution.record import Array
 _CLOSED = 1e-13
 _ACCEPTED = 1e-9
 _CORRECTIONS = 12
-# Steps for one turn: a stiff bearing's ten thousand oscillations, not a blade that spins without end.
-_LONGEST = 50_000
+# Of the integrator: a turn of a stiff bearing takes about two steps for each of its oscillations; a rotor that has
+# left for good takes more and more.
+_STEPS, _STEPS_PER_OSCILLATION = 500, 10
+# rad: a motion that ends a turn this far from its start is not on its way to a periodic one.
+_LOST = 20.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
         mismatch = float(np.abs(residual).max())
         if best is None or mismatch < best.mismatch:
             best = Turn(speed, state, torque, end.by_state, *_invariants(scene, state, torque), end.trace, mismatch)
-        if mismatch < _CLOSED:
+        if mismatch < _CLOSED or mismatch > _LOST:
             break
         jacobian = np.column_stack([end.by_torque, (end.by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
         sizes = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
@@ -154,13 +158,21 @@ class _Variational:
 
         self._integrator = compiled(("turn", tuple(parameters.structure)), make)
         self._values = array_of(parameters.values, quad=False)
+        still = linearize(scene, scene.initial_angles, [0.0] * len(scene.initial_angles), 0.0)
+        self._frequency = math.sqrt(np.abs(still.stiffness).max())
+
+    def _most_steps(self, period: float) -> int:
+        return int(_STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi))
 
     def propagate(self, state: Array, torque: float, period: float) -> _End:
         count, integrator = len(state), self._integrator
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0
         integrator.state[:] = np.concatenate([state, np.eye(count, count + 1).ravel(), [0.0]])
-        message = failure(integrator.propagate_until(period, max_steps=_LONGEST)[0])
+        most = self._most_steps(period)
+        message = failure(integrator.propagate_until(period, max_steps=most)[0])
+        if "step_limit" in message:
+            message = f"no periodic motion found: a turn takes more than {most} steps"
         whole = np.array(integrator.state)
         derivatives = whole[count:-1].reshape(count, count + 1)
         return _End(whole[:count], derivatives[:, :count], derivatives[:, count], float(whole[-1]), message)

@@ -1,0 +1,165 @@
+"""The page of modes: Campbell diagram, shapes in multiblade coordinates, agreement of the models, multipliers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence
+from rotor_mbs.analysis.mode_records import read_modes
+from rotor_mbs.analysis.modes import multiblade
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, TableCell
+from rotor_mbs.report.core.environment import render
+from rotor_mbs.report.core.files import INDEX, write_pages
+from rotor_mbs.report.core.looks import with_capital
+from rotor_mbs.report.core.numbers import NOTHING, number
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.plots import modes as plots
+
+
+@dataclass(frozen=True)
+class SceneModesPart:
+    """What the page has of a scene; id: unique on the page."""
+
+    id: str
+    name: str
+    title: str
+    lead: Sequence[str]
+    rest: Section
+    campbell: Section
+    fastest: Section
+    turning: Section
+
+
+@dataclass(frozen=True)
+class ModesPage:
+    """The page."""
+
+    scenes: Sequence[SceneModesPart]
+
+
+def write_modes_report(results: Path, output: Path) -> Path:
+    """The page of all modes in a results file into a folder; its path. Raises StoreError where the file has none."""
+    found = read_modes(results)
+    parts = [scene_part(one, f"scene{i}") for i, one in enumerate(found.values())]
+    write_pages(output, {INDEX: render("modes", ModesPage(parts))})
+    return output / INDEX
+
+
+def scene_part(modes: SceneModes, name: str) -> SceneModesPart:
+    rest = next(iter(modes.rest.values()), None)
+    rotation = next(iter(modes.rotation.values()), None)
+    return SceneModesPart(
+        name,
+        modes.scene,
+        modes.title,
+        _lead(modes),
+        Section(tables=[] if rest is None else [_mode_table("", rest, 0), _shape_table(rest, 0)]),
+        *_rotation(rotation, name),
+        _turning(modes, name),
+    )
+
+
+def _lead(modes: SceneModes) -> list[str]:
+    sentences = []
+    sources = max((list(kind.values()) for kind in (modes.rest, modes.rotation)), key=len)
+    if len(sources) > 1:
+        labels = ", ".join(one.label for one in sources)
+        verdict = "agree on every frequency" if modes.agrees else "do not agree on the frequencies"
+        sentences.append(
+            f"{with_capital(labels)} {verdict}: the largest relative difference is {number(modes.disagreement)}."
+        )
+    if modes.floquet is not None:
+        sentences.append(f"{with_capital(floquet_sentence(modes.floquet))}.")
+    return [*sentences, *modes.notes]
+
+
+def _rotation(rotation: LinearModes | None, name: str) -> tuple[Section, Section]:
+    """The pictures over speed; the tables of the highest speed."""
+    if rotation is None or np.isnan(rotation.over_speed("growth_rates")).all():
+        return Section(), Section()
+    last = len(rotation.speeds) - 1
+    heading = f"At {number(float(rotation.speeds[last]), 4)} rad/s"
+    fastest = Section(tables=[_mode_table(heading, rotation, last), _shape_table(rotation, last)])
+    if last == 0:
+        return Section(), fastest
+    caption = (
+        "Campbell diagram: damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
+    )
+    drawn = [picture(plots.campbell(rotation), f"{name}-campbell", caption, caption)]
+    ratios = rotation.over_speed("damping_ratios")
+    if np.nanmax(np.abs(ratios), initial=0.0) > 1e-9 or np.nanmax(rotation.over_speed("growth_rates")) > 1e-9:
+        caption = "Damping ratios and growth rates"
+        drawn.append(picture(plots.damping(rotation), f"{name}-damping", caption, caption))
+    legend = [LegendEntry(label, plots.mode_look(k)) for k, label in enumerate(rotation.names)]
+    return Section(drawn, legend), fastest
+
+
+def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:
+    """Frequencies at the i-th speed."""
+    each = first.sets[i]
+    backward, forward = (values[i] for values in first.whirl)
+    rows = []
+    for k, name in enumerate(first.names):
+        undamped = float(each.undamped_frequencies[k])
+        numbers = [
+            undamped / (2.0 * math.pi),
+            undamped,
+            float(each.damped_frequencies[k]),
+            float(each.damping_ratios[k]),
+        ]
+        numbers += [float(each.growth_rates[k]), float(backward[k]), float(forward[k])]
+        rows.append([TableCell(name), *(TableCell(_shown(value, 7)) for value in numbers)])
+    head = (
+        "Mode", "undamped (Hz)", "undamped (rad/s)", "damped (rad/s)", "damping ratio", "growth rate (1/s)",
+        "backward whirl (rad/s)", "forward whirl (rad/s)",
+    )  # fmt: skip
+    return PageTable(caption, head, rows, tuple(range(1, len(head)))).without_empty_columns()
+
+
+def _shape_table(one: LinearModes, i: int) -> PageTable:
+    """Moduli of the amplitudes in multiblade coordinates."""
+    amplitudes = np.abs(one.multiblade_shapes[i])
+    rows = []
+    for name, shape in zip(one.names, amplitudes, strict=True):
+        largest = max(float(shape.max()), 1e-300)
+        rows.append([TableCell(name), *(TableCell(_shown(float(value) / largest, 3)) for value in shape)])
+    head = ("Shape", "rotor", *multiblade(one.blades)[0])
+    return PageTable("Amplitudes in multiblade coordinates, the largest 1", head, rows, tuple(range(1, len(head))))
+
+
+def _shown(value: float, digits: int) -> str:
+    if not math.isfinite(value):
+        return NOTHING
+    return number(0.0 if abs(value) < 1e-12 else value, digits)
+
+
+def _turning(modes: SceneModes, name: str) -> Section:
+    table = modes.floquet
+    if table is None:
+        return Section()
+    drawn: list[Picture] = []
+    if len(table.speeds) > 1 and np.isfinite(table.largest).any():
+        caption = "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
+        drawn.append(picture(plots.multipliers(table), f"{name}-multipliers", caption, caption))
+    if modes.chart is not None:
+        caption = "Stability chart: growth over a turn under gravity, over rotor speed and bearing stiffness"
+        drawn.append(picture(plots.chart(modes.chart), f"{name}-chart", caption, caption))
+    rows = [
+        [
+            TableCell(number(float(table.speeds[i]), 4)),
+            TableCell(
+                _shown(float(table.largest[i]), 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i]
+            ),
+            TableCell(_shown(float(table.growth_rates[i]), 4)),
+            TableCell(_shown(float(table.product_error[i]), 2)),
+            TableCell(_shown(float(table.torque[i]), 4)),
+        ]
+        for i in range(len(table.speeds))
+    ]
+    head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
+    return Section(drawn, (), [PageTable("Multipliers", head, rows, (0, 1, 2, 3, 4))])

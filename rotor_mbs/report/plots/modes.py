@@ -1,0 +1,98 @@
+"""Campbell diagram, damping ratios, Floquet multipliers and stability chart, from plain arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor_mbs.analysis.campbell import FloquetTable, LinearModes, StabilityChart
+from rotor_mbs.analysis.modes import GROWTH
+from rotor_mbs.report.core.canvas import Panels, colour_bar, panels
+from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
+
+SPEED_AXIS = "rotor speed (rad/s)"
+# Multiples of the rotor speed drawn as lines: gravity acts once a turn, a tower or yaw error on each blade in turn.
+_HARMONICS = (1, 2, 3, 6)
+_MARKS = ("o", "s", "^", "D", "v", "P", "x")
+# Growth over a turn beyond which the colours of the chart end.
+_MOST_GROWTH = 1e3
+_INK, _ACCENT = "#0072b2", "#d55e00"
+
+
+def mode_look(index: int) -> Look:
+    """Line and marker of a mode: equal frequencies lie on each other, so that each mode has its own marker."""
+    look = coordinate_look(index)
+    return Look(look.colour, look.line, _MARKS[index % len(_MARKS)])
+
+
+def campbell(modes: LinearModes) -> Panels:
+    """Damped frequencies (rad/s) over speed above their change since the lowest speed, with multiples of the speed."""
+    panel = panels((2.9, 1.7), SPEED_AXIS)
+    frequencies = modes.over_speed("damped_frequencies")
+    speeds = modes.speeds
+    top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
+    for k in _HARMONICS:
+        panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")
+        end = min(float(speeds[-1]), top / k)
+        panel.axes[0].annotate(f"{k}P", (end, k * end), color=GREY, ha="right", va="bottom", fontsize=8.0)
+    for k in range(frequencies.shape[1]):
+        look = mode_look(k)
+        every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
+        known = frequencies[:, k]
+        panel.axes[0].plot(speeds, known, color=look.colour, linestyle=look.line, marker=look.marker, markevery=every,
+                           markersize=4.0, fillstyle="none")  # fmt: skip
+        change = np.where(np.nanmax(known) > 1e-6 * top, known - known[np.flatnonzero(np.isfinite(known))[:1]], np.nan)
+        panel.axes[1].plot(speeds, change, color=look.colour, linestyle=look.line, marker=look.marker,
+                           markevery=every, markersize=4.0, fillstyle="none")  # fmt: skip
+    panel.axes[0].set_ylim(0.0, top)
+    panel.axes[0].set_ylabel("frequency (rad/s)")
+    panel.axes[1].set_ylabel("change (rad/s)")
+    return panel
+
+
+def damping(modes: LinearModes) -> Panels:
+    """Damping ratio and growth rate (1/s) of each mode over speed."""
+    panel = panels((2.0, 2.0), SPEED_AXIS)
+    for axes, name, label in (
+        (panel.axes[0], "damping_ratios", "damping ratio"),
+        (panel.axes[1], "growth_rates", "growth rate (1/s)"),
+    ):
+        for k, values in enumerate(modes.over_speed(name).T):
+            look = mode_look(k)
+            axes.plot(modes.speeds, values, color=look.colour, linestyle=look.line)
+        axes.set_ylabel(label)
+    return panel
+
+
+def multipliers(table: FloquetTable) -> Panels:
+    """Modulus of every multiplier over speed on a log scale, with the largest one marked."""
+    panel = panels((2.6,), SPEED_AXIS)
+    axes = panel.axes[0]
+    sizes = np.abs(table.multipliers)
+    axes.plot(
+        table.speeds, np.where(sizes > 0.0, sizes, np.nan), color=_INK, linestyle="none", marker=".", markersize=4.0
+    )
+    axes.plot(table.speeds, table.largest, color=_ACCENT, linestyle="-")
+    axes.axhline(1.0, color=GREY, linewidth=0.8)
+    known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+    if len(known) and known.max() / known.min() > 10.0:
+        axes.set_yscale("log")
+    elif len(known) and known.max() / known.min() < 1.0 + 10.0 * GROWTH:
+        axes.set_ylim(0.9, 1.1)
+    axes.set_ylabel("modulus of the multipliers")
+    return panel
+
+
+def chart(found: StabilityChart) -> Panels:
+    """Growth over a turn as colour over speed and stiffness, with the boundary of stability."""
+    panel = panels((3.6,), SPEED_AXIS)
+    axes = panel.axes[0]
+    levels = np.log10(np.clip(found.largest, 1.0, _MOST_GROWTH))
+    mesh = axes.pcolormesh(found.speeds, found.stiffnesses, levels, cmap="cividis", shading="nearest", vmin=0.0,
+                           vmax=np.log10(_MOST_GROWTH), rasterized=True)  # fmt: skip
+    boundary = np.where(np.isfinite(found.largest), found.largest, _MOST_GROWTH) - (1.0 + GROWTH)
+    if min(found.largest.shape) > 1 and boundary.min() < 0.0 < boundary.max():
+        axes.contour(found.speeds, found.stiffnesses, boundary, levels=[0.0], colors=[_ACCENT], linewidths=1.0)
+    axes.grid(visible=False)
+    axes.set_ylabel("bearing stiffness (N m/rad)")
+    colour_bar(panel.figure, axes, mesh, "growth over a turn (powers of ten)")
+    return panel

@@ -1,0 +1,258 @@
+"""Modes of a scene by every model that can be linearized: at rest, over rotor speed, and over a turn under gravity.
+
+What is linearized about, the steady state, is found by the closed form and handed to all models; each says for itself
+how far from steady it is there.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from rotor_mbs.analysis.campbell import (
+    REST,
+    ROTATION,
+    FloquetTable,
+    LinearModes,
+    SceneModes,
+    StabilityChart,
+)
+from rotor_mbs.analysis.mode_records import to_records
+from rotor_mbs.analysis.modes import Array, Floquet, ModeSet, floquet, isotropic_modes, modes_of, track
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
+from rotor_mbs.methods.base import Method
+from rotor_mbs.methods.catalogue import methods
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.linearization import Linearization
+from rotor_mbs.store.records import write_records
+from rotor_mbs.store.results_file import ResultsFile
+
+if TYPE_CHECKING:
+    from rotor_mbs.models.lagrange.turn import Turn
+
+# Whose text decides a record, besides what decides a run.
+_SOURCES = ("analysis/modes.py", "analysis/campbell.py", "analysis/mode_records.py", "studies/modes.py")
+# The method that a case names; the study asks every model.
+_METHOD = "lagrange/taylor"
+# A source whose accelerations at the steady state are above this share of its largest stiffness is not steady there.
+_STEADY = 1e-7
+
+_Point: TypeAlias = "tuple[Scene, Array, float, float]"
+
+
+def modes_of_scenes(
+    scenes: Sequence[Scene],
+    output: Path,
+    *,
+    speeds: Sequence[float] = (),
+    stiffnesses: Sequence[float] = (),
+    workers: int,
+    timeout_s: float,
+    on_progress: OnProgress = ignore_progress,
+) -> list[Outcome]:
+    """The modes of every scene into the results file `output`; what it has already is kept.
+
+    speeds        rad/s, of the Campbell diagram and the Floquet multipliers
+    stiffnesses   N m/rad, of every bearing, for the stability chart over speed
+
+    Raises InputError for a negative or repeated speed or stiffness, StoreError, KeyboardInterrupt.
+    """
+    options = {"speeds": _increasing(speeds, "speeds"), "stiffnesses": _increasing(stiffnesses, "stiffnesses")}
+    cases = [Case(scene, _METHOD, study="modes", options=options, sources=_SOURCES) for scene in scenes]
+    return execute(cases, perform_modes, ResultsFile(output), workers, timeout_s, on_progress)
+
+
+def perform_modes(job: Job) -> Result:
+    """Computes and stores the modes of one scene, in a worker process. Raises StoreError."""
+    case = job.case
+    speeds, stiffnesses = (np.array(case.options[name], dtype=float) for name in ("speeds", "stiffnesses"))
+    found = compute_modes(case.scene, speeds, stiffnesses)
+    write_records(job.part, to_records(found, {"scene_hash": case.scene_hash, "run_hash": case.key}))
+    if not found.agrees:
+        return Result("inaccurate", f"frequencies of two models differ by {found.disagreement:.1e} of their size")
+    return Result("ok", "; ".join(found.notes))
+
+
+def compute_modes(
+    scene: Scene, speeds: Sequence[float] | Array = (), stiffnesses: Sequence[float] | Array = ()
+) -> SceneModes:
+    """All modes of `scene`: at rest under gravity; in steady rotation without gravity at `speeds` (rad/s); multipliers
+    of a turn under gravity at those above 0; their stability chart over `stiffnesses` (N m/rad) of the bearings.
+
+    The torque of the scene is left out: the drive holds the rotor's speed.
+    """
+    notes: list[str] = []
+    speeds, stiffnesses = (
+        np.array(_increasing(given, name)) for given, name in ((speeds, "speeds"), (stiffnesses, "stiffnesses"))
+    )
+    rest = _linear(scene, REST, np.zeros(1), notes)
+    rotation = _linear(scene, ROTATION, speeds, notes) if len(speeds) else {}
+    turning = speeds[speeds > 0.0]
+    table = chart = None
+    if scene.gravity and len(turning):
+        try:
+            table = floquet_table(scene, turning)
+            chart = stability_chart(scene, turning, stiffnesses) if len(stiffnesses) else None
+        except MethodRefusal as exc:
+            notes.append(f"no Floquet multipliers: {exc}")
+    title, blades = scene.title, len(scene.blades)
+    return SceneModes(scene.name, title, blades, scene.gravity, rest, rotation, table, chart, tuple(notes))
+
+
+def linearizing_methods() -> dict[str, Method]:
+    """By model, the method that linearizes it, of those that are installed; the closed form first."""
+    return {method.model: method for method in methods() if method.linearize is not None and method.is_installed}
+
+
+def is_isotropic(scene: Scene, pitches: Array) -> bool:
+    """Whether all blades and bearings are equal, move and stand at equal pitches, and no gravity tells them apart."""
+    same = all(len(set(values)) <= 1 for values in (scene.blades, scene.bearing_stiffness, scene.bearing_damping))
+    return same and scene.blades[0].has_pitch_inertia and scene.gravity == 0.0 and bool(np.ptp(pitches) < 1e-9)
+
+
+def _linear(scene: Scene, kind: str, speeds: Array, notes: list[str]) -> dict[str, LinearModes]:
+    """By model; a model that cannot do any of the speeds is left out, with a note."""
+    points, messages = _steady_states(scene, kind, speeds)
+    if not any(points):
+        notes.append(messages[0])
+        return {}
+    symmetric = all(is_isotropic(at, angles[1:]) for at, angles, _, _ in filter(None, points))
+    found = {}
+    for model, method in linearizing_methods().items():
+        assert method.linearize is not None  # linearizing_methods says so
+        try:
+            made = [None if point is None else _checked(method.linearize, model, point) for point in points]
+        except MethodRefusal as exc:
+            if kind == REST:
+                notes.append(str(exc))
+            continue
+        found[model] = _modes_over_speed(scene, kind, method, speeds, points, made, messages, symmetric)
+    return found
+
+
+def _steady_states(scene: Scene, kind: str, speeds: Array) -> tuple[list[_Point | None], list[str]]:
+    """(scene as it is linearized, angles, speed, torque) at each speed; None and the reason where there is no such."""
+    from rotor_mbs.models.lagrange.linearization import equilibrium, holding_torque, steady_rotation
+
+    at = scene if kind == REST else replace(scene, gravity=0.0)
+    start = scene  # of each slower speed: the pitches before, so that one branch is followed down to rest
+    found: list[tuple[_Point | None, str]] = []
+    for speed in map(float, speeds[::-1]):
+        try:
+            angles = equilibrium(start) if kind == REST else steady_rotation(start, speed)
+        except InputError as exc:
+            found.append((None, str(exc)))
+        except ZeroDivisionError:
+            found.append((None, f"{scene.name}: singular at {speed:g} rad/s"))
+        else:
+            start = replace(start, initial_angles=tuple(angles.tolist()))
+            found.append(((replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed)), ""))
+    return [point for point, _ in found[::-1]], [message for _, message in found[::-1]]
+
+
+def _checked(linearize: Callable[..., Linearization], model: str, point: _Point) -> Linearization:
+    made = linearize(*point)
+    left = np.abs(made.residual).max(initial=0.0)
+    if left > _STEADY * max(np.abs(made.stiffness).max(), 1e-12):
+        raise MethodRefusal(f"{model}: accelerates by {left:.1e} rad/s^2 where the closed form is steady")
+    return made
+
+
+def _modes_over_speed(
+    scene: Scene,
+    kind: str,
+    method: Method,
+    speeds: Array,
+    points: Sequence[_Point | None],
+    made: Sequence[Linearization | None],
+    messages: Sequence[str],
+    symmetric: bool,
+) -> LinearModes:
+    from rotor_mbs.models.lagrange.linearization import moving_coordinates
+
+    columns = list(moving_coordinates(scene))
+    n = len(columns)
+    unknown = np.full((n, n), np.nan)
+    sets = []
+    for point, one in zip(points, made, strict=True):
+        if one is None or point is None:
+            continue
+        if symmetric:
+            sets.append(isotropic_modes(one.stiffness, one.damping))
+        else:
+            sets.append(modes_of(one.stiffness, one.damping, is_cyclic=point[0].gravity == 0.0))
+    tracked = iter(track(sets))
+    nothing = ModeSet(np.full((n, 2), complex(np.nan, np.nan)), unknown.astype(complex), sets[0].names)
+    return LinearModes(
+        method.model,
+        method.model_label,
+        kind,
+        len(scene.blades),
+        speeds,
+        tuple(scene.coordinate_labels[column] for column in columns),
+        np.array([np.full(n, np.nan) if point is None else point[1][columns] for point in points]),
+        np.array([unknown if one is None else one.stiffness for one in made]),
+        np.array([unknown if one is None else one.damping for one in made]),
+        tuple(nothing if one is None else next(tracked) for one in made),
+        tuple(messages),
+    )
+
+
+def floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
+    """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down.
+
+    Raises MethodRefusal where heyoka is not installed.
+    """
+    from rotor_mbs.models.lagrange.turn import periodic_turn
+
+    turns: list[Turn] = []
+    for speed in map(float, speeds[::-1]):
+        turn = periodic_turn(scene, speed, turns[-1] if turns and not turns[-1].message else None)
+        turns.append(turn)
+    turns.reverse()
+    found = [floquet(turn.transition, turn.flow, turn.gradient, turn.speed) for turn in turns]
+    known = [not turn.message for turn in turns]
+    return FloquetTable(
+        speeds,
+        np.array([one.multipliers for one in found]),
+        np.array([one.largest for one in found]),
+        np.array([int(one.is_stable) if ok else -1 for one, ok in zip(found, known, strict=True)]),
+        np.array([_product_error(one, turn) for one, turn in zip(found, turns, strict=True)]),
+        np.array([turn.torque for turn in turns]),
+        np.array([turn.mismatch for turn in turns]),
+        tuple(turn.message for turn in turns),
+    )
+
+
+def _product_error(found: Floquet, turn: Turn) -> float:
+    """ln of the product of the multipliers less the integrated trace; NaN where rounding leaves under six digits."""
+    sizes = np.abs(found.multipliers)
+    rounding = np.finfo(float).eps * np.linalg.norm(turn.transition)
+    if turn.message or not rounding < 1e-6 * sizes.min():
+        return float("nan")
+    return float(np.log(sizes).sum() - turn.trace_integral)
+
+
+def stability_chart(scene: Scene, speeds: Array, stiffnesses: Array) -> StabilityChart:
+    """The largest multiplier over speed, for every stiffness of all bearings. Raises MethodRefusal as above."""
+    rows = []
+    for stiffness in map(float, stiffnesses):
+        changed = replace(scene, bearing_stiffness=(stiffness,) * len(scene.blades))
+        rows.append(floquet_table(changed, speeds).largest)
+    return StabilityChart(speeds, stiffnesses, np.array(rows))
+
+
+def _increasing(values: Sequence[float] | Array, name: str) -> list[float]:
+    numbers = [float(value) for value in values]
+    if any(not 0.0 <= value < float("inf") for value in numbers) or any(
+        later <= earlier for earlier, later in itertools.pairwise(numbers)
+    ):
+        raise InputError(f"{name}: allowed: increasing numbers from 0 up")
+    return numbers
