@@ -7,6 +7,7 @@ The Python API. Everything is loaded when it is first used: importing this packa
     compare                  one scene by several methods, against its reference: a `Comparison`
     sweep                    one scene over the values of its parameters: a `SweepData`
     export                   a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark problem
+    modes                    natural frequencies, damping and shapes over rotor speed: `Modes`
     open                     a results file: runs by their path; the dataset of a sweep
 
 Examples
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from rotor_mbs.api import SweepData as SweepData
     from rotor_mbs.api import compare as compare
     from rotor_mbs.api import load as load
+    from rotor_mbs.api import modes as modes
     from rotor_mbs.api import open as open
     from rotor_mbs.api import run as run
     from rotor_mbs.api import scene as scene
@@ -51,6 +53,7 @@ _PLACES = {
         "SweepData",
         "compare",
         "load",
+        "modes",
         "open",
         "run",
         "scene",

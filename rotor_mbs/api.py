@@ -26,10 +26,12 @@ from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.solution.metrics import compare as metrics_of
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution, need_xarray
+from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
+    from rotor_mbs.report.mode_study import Modes
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
 
 
@@ -328,6 +330,36 @@ class SweepData:
         return f"{self.path}: {sum(self.statuses.values())} runs: {counts}"
 
 
+def modes(scene: Scene, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
+    """Natural frequencies, damping ratios and mode shapes of a scene, by every model that can be linearized.
+
+    At rest under gravity; over `speeds` in steady rotation without gravity (Campbell diagram); under gravity by the
+    Floquet multipliers of a turn. The torque of the scene is left out: the drive keeps the speed.
+
+    Parameters
+    ----------
+    speeds : rad/s of the rotor, increasing, from 0 up.
+    stiffnesses : N m/rad of every bearing, for the stability chart over speed and stiffness.
+
+    Raises
+    ------
+    InputError
+        For speeds or stiffnesses that do not increase, or are negative.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> study = rm.modes(rm.scene("stiff/nrel-5mw").replace(gravity=0.0), speeds=[0.0, 1.2])
+    >>> study.agrees, list(study.rotation)[:2]
+    (True, ['lagrange', 'exudyn_tree'])
+    >>> study.rotation["lagrange"].names
+    ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
+    """
+    from rotor_mbs.report.mode_study import modes_study  # late: matplotlib
+
+    return modes_study(scene, speeds, stiffnesses)
+
+
 def open(path: str | os.PathLike[str]) -> ResultsTree:
     """The results file at `path`: its scenes and runs by path. Raises StoreError where it is none.
 
@@ -394,28 +426,6 @@ def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
 
 def _with_reference(solution: Solution, reference: Trajectory | None) -> Run:
     return Run(**{one.name: getattr(solution, one.name) for one in fields(Solution)}, reference=reference)
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """Rows of text under a heading; printed in columns, a table in a notebook."""
-
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-
-    def __str__(self) -> str:
-        lines = [self.head, *self.rows]
-        widths = [max(len(line[i]) for line in lines) for i in range(len(self.head))]
-        return "\n".join(
-            "  ".join(f"{cell:{w}}" for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines
-        )
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        head = "".join(f"<th>{escape(cell)}</th>" for cell in self.head)
-        rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows)
-        return f"<table><tr>{head}</tr>{rows}</table>"
 
 
 def _row(run: Run) -> tuple[str, ...]:

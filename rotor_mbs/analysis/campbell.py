@@ -163,7 +163,7 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
         for one in list(kind.values())[:1]:
             rows += [
                 {
-                    "state": "at rest under gravity" if one.kind == REST else "steady rotation without gravity",
+                    "state": "at rest" if one.kind == REST else "steady rotation without gravity",
                     "speed": float(one.speeds[i]),
                     "mode": name,
                     "undamped_frequency": _number(each.undamped_frequencies[k]),
@@ -196,7 +196,7 @@ def modes_summary(modes: SceneModes) -> list[str]:
 
 
 def _state_lines(one: LinearModes, i: int) -> list[str]:
-    state = "at rest under gravity" if one.kind == REST else f"at {one.speeds[i]:.4g} rad/s without gravity"
+    state = "at rest" if one.kind == REST else f"at {one.speeds[i]:.4g} rad/s without gravity"
     if one.messages[i]:
         return [f"  {state}: {one.messages[i]}"]
     lines = [f"  {state}"]

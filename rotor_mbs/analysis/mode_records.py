@@ -26,7 +26,7 @@ from rotor_mbs.analysis.campbell import (
     StabilityChart,
 )
 from rotor_mbs.analysis.modes import Complex, ModeSet, multiblade
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.store.layout import Column
 from rotor_mbs.store.records import Record, read_records
 
@@ -73,6 +73,25 @@ _CHART = {
         ("bearing_stiffness", "speed"), "1", "largest modulus of a multiplier, those that are always 1 left out"
     ),
 }
+
+
+def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
+    """All sources of one state as an xarray.Dataset with the dimension `solver`; `xarray` is the module."""
+    if not sources:
+        raise InputError("no modes of this state; allowed: a state that was computed")
+    sets = []
+    for one in sources.values():
+        record = _linear_record("", one, {})
+        labels = {name: record.attributes.get(f"{name}_labels") for name in _LINEAR}
+        variables = {
+            name: (column.dimensions, labels[name] or values, {"units": column.units, "long_name": column.long_name})
+            for name, column in _LINEAR.items()
+            for values in (record.arrays[name],)
+        }
+        coordinates = {name: value for name, value in variables.items() if value[0] == (name,)}
+        data = {name: value for name, value in variables.items() if name not in coordinates}
+        sets.append(xarray.Dataset(data, coords=coordinates))
+    return xarray.concat(sets, xarray.Variable("solver", list(sources)), join="override", combine_attrs="override")
 
 
 def to_records(modes: SceneModes, attributes: Mapping[str, Any]) -> list[Record]:

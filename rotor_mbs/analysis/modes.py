@@ -52,12 +52,13 @@ class ModeSet:
         """(n,) share of critical damping, above 1 where overdamped; NaN where there is no undamped frequency or 0."""
         frequencies = self.undamped_frequencies
         rate = -0.5 * (self.eigenvalues[:, 0] + self.eigenvalues[:, 1]).real
-        return np.asarray(np.divide(rate, frequencies, out=np.full_like(rate, np.nan), where=frequencies > 0.0))
+        ratios = np.divide(rate, frequencies, out=np.full_like(rate, np.nan), where=frequencies > 0.0)
+        return np.asarray(ratios + 0.0)  # no -0
 
     @property
     def growth_rates(self) -> Array:
         """(n,) 1/s: the larger real part of each mode; above 0 it is unstable."""
-        return np.asarray(self.eigenvalues.real.max(axis=1))
+        return np.asarray(self.eigenvalues.real.max(axis=1) + 0.0)
 
 
 def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
@@ -99,9 +100,12 @@ def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool) -> ModeSet:
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
     first = 1 if is_cyclic else 0
     values, vectors = np.linalg.eig(matrix[first:, first:])
-    values = np.where(np.abs(values) ** 2 <= 4e-16 * n * np.abs(stiffness).max(initial=0.0), 0.0, values)
+    values = np.where(np.abs(values) ** 2 <= 4e-16 * n * np.abs(stiffness).max(initial=0.0), 0.0, values).astype(
+        complex
+    )
+    values.real[np.abs(values.real) < 1e-14 * np.abs(values).max(initial=0.0)] = 0.0  # rounding of undamped modes
     shapes = [_shape(vectors[:, k], n, first) for k in range(len(values))]
-    pairs = _pairs(values.astype(complex), shapes, is_cyclic)
+    pairs = _pairs(values, shapes, is_cyclic)
     found = ModeSet(np.array([pair for pair, _ in pairs]), np.array([shape for _, shape in pairs]))
     order = np.argsort(np.nan_to_num(found.undamped_frequencies), kind="stable")
     return ModeSet(found.eigenvalues[order], found.shapes[order])

@@ -58,6 +58,8 @@ def show(arguments: argparse.Namespace) -> int:
         print(f"\n{model.name}  ({', '.join(model.methods)})")
         if model.refused:
             print(f"  cannot represent this scene: {model.refused}")
+        if model.is_linearized:
+            print("  linearized by rotor-mbs modes")
         for item in model.items if arguments.build else ():
             print(f"  {item.kind:9} {item.name:28} {item.detail}".rstrip())
     return 0
@@ -95,6 +97,7 @@ class _Model:
     methods: list[str]
     items: list[Item] = field(default_factory=list)
     refused: str = ""
+    is_linearized: bool = False
 
 
 def _models(scene: Scene) -> list[_Model]:
@@ -104,6 +107,7 @@ def _models(scene: Scene) -> list[_Model]:
     for method in methods():
         known = models.setdefault(method.model, _Model(method.model, []))
         known.methods.append(method.name)
+        known.is_linearized |= method.linearize is not None
         if known.items:
             continue
         try:

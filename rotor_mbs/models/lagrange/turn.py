@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.linearization import (
@@ -75,12 +76,15 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
 
     Found by Newton's method from `guess`, or from steady rotation without gravity. The constant torque is an unknown.
 
-    Raises MethodRefusal where heyoka is not installed, InputError where there is no steady rotation to start from.
+    Where there is none, `message` says why. Raises MethodRefusal where heyoka is not installed.
     """
     system = _Variational(scene)
     n = system.coordinates
     if guess is None:
-        angles = steady_rotation(scene, speed)[list(moving_coordinates(scene))]
+        try:
+            angles = steady_rotation(scene, speed)[list(moving_coordinates(scene))]
+        except InputError as exc:
+            return _not_found(speed, n, str(exc))
         state, torque = np.concatenate([angles, [speed], np.zeros(n - 1)]), holding_torque(scene, speed)
     else:
         state, torque = guess.start * np.repeat([1.0, speed / guess.speed], n), guess.torque

@@ -44,8 +44,12 @@ class ModesPage:
 
 def write_modes_report(results: Path, output: Path) -> Path:
     """The page of all modes in a results file into a folder; its path. Raises StoreError where the file has none."""
-    found = read_modes(results)
-    parts = [scene_part(one, f"scene{i}") for i, one in enumerate(found.values())]
+    return write_modes_pages(list(read_modes(results).values()), output)
+
+
+def write_modes_pages(modes: Sequence[SceneModes], output: Path) -> Path:
+    """The page of modes that are in memory; its path. Raises StoreError where it cannot be written."""
+    parts = [scene_part(one, f"scene{i}") for i, one in enumerate(modes)]
     write_pages(output, {INDEX: render("modes", ModesPage(parts))})
     return output / INDEX
 

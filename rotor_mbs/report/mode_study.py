@@ -1,0 +1,117 @@
+"""The modes of a scene in memory, with tables, figures, files: what `rotor_mbs.modes` returns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from rotor_mbs.analysis.campbell import LinearModes, SceneModes, mode_rows
+from rotor_mbs.analysis.mode_records import linear_dataset, to_records
+from rotor_mbs.errors import InputError
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.pages.modes import write_modes_pages
+from rotor_mbs.report.plots import modes as plots
+from rotor_mbs.report.run_plots import Drawing
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution.solution import need_xarray
+from rotor_mbs.solution.text_table import TextTable
+from rotor_mbs.store.records import write_records
+from rotor_mbs.studies.modes import compute_modes
+
+
+def modes_study(scene: Scene, speeds: Sequence[float], stiffnesses: Sequence[float]) -> Modes:
+    """As `rotor_mbs.modes`."""
+    found = compute_modes(scene, speeds, stiffnesses)
+    return Modes(**{one.name: getattr(found, one.name) for one in fields(SceneModes)}, hash=scene_hash(scene))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modes(SceneModes):
+    """The modes of a scene: see `rotor_mbs.modes`.
+
+    Attributes
+    ----------
+    rest, rotation : by model, its modes at rest under gravity, and over speed without; the closed form first.
+    floquet, chart : multipliers of a turn under gravity, and the largest over speed and stiffness; None without.
+    notes : what could not be done, and why.
+    agrees, disagreement : whether the models have the same frequencies, and their largest relative difference.
+    plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`, `.chart()`.
+    """
+
+    hash: str
+
+    @property
+    def plot(self) -> ModePlots:
+        return ModePlots(self)
+
+    def table(self) -> TextTable:
+        """A row for each state, speed and mode of the closed form: rad/s, damping ratio, 1/s."""
+        rows = mode_rows(self)
+        cells = [
+            tuple("" if v is None else f"{v:.7g}" if isinstance(v, float) else str(v) for v in row.values())
+            for row in rows
+        ]
+        return TextTable(tuple(name.replace("_", " ") for name in rows[0]) if rows else (), cells)
+
+    def to_xarray(self, state: str = "rotation") -> Any:
+        """The modes of one state, "rotation" or "rest", as an xarray.Dataset with the dimension `solver`."""
+        return linear_dataset(self.rest if state == "rest" else self.rotation, need_xarray())
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """A results file that `rotor-mbs report` reads. Replaces the file."""
+        write_records(Path(path), to_records(self, {"scene_hash": self.hash}))
+        return Path(path)
+
+    def to_html(self, folder: str | os.PathLike[str]) -> Path:
+        """The page into a folder; its path."""
+        return write_modes_pages([self], Path(folder))
+
+    def _repr_html_(self) -> str:
+        drawn = self.plot()._repr_svg_() if self.rotation else ""
+        return f"<p>{escape(self.scene)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
+
+
+class ModePlots:
+    """Figures of the modes of one scene."""
+
+    def __init__(self, modes: SceneModes) -> None:
+        self._modes = modes
+
+    def __call__(self) -> Drawing:
+        """Campbell diagram: damped frequencies (rad/s) over rotor speed. Raises InputError without speeds."""
+        rotation = self._rotation()
+        panels = plots.campbell(rotation)
+        looks = [plots.mode_look(k) for k in range(len(rotation.names))]
+        canvas.legend_inside(panels.axes[0], list(zip(rotation.names, looks, strict=True)))
+        return Drawing(panels.figure)
+
+    def damping(self) -> Drawing:
+        """Damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
+        return Drawing(plots.damping(self._rotation()).figure)
+
+    def multipliers(self) -> Drawing:
+        """Moduli of the Floquet multipliers over rotor speed. Raises InputError where there are none."""
+        if self._modes.floquet is None:
+            raise InputError(f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0")
+        return Drawing(plots.multipliers(self._modes.floquet).figure)
+
+    def chart(self) -> Drawing:
+        """Growth over a turn over speed and bearing stiffness. Raises InputError where there is none."""
+        if self._modes.chart is None:
+            raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
+        return Drawing(plots.chart(self._modes.chart).figure)
+
+    def _rotation(self) -> LinearModes:
+        for one in self._modes.rotation.values():
+            return one
+        raise InputError(f"{self._modes.scene}: no modes over speed; ask for speeds")

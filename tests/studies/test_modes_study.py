@@ -1,0 +1,139 @@
+"""The modes study: models agree and a planted error shows, records keep every number, the command, page and API."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import general
+
+import rotor_mbs as rm
+from rotor_mbs.analysis.mode_records import read_modes, to_records
+from rotor_mbs.cli import main
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.store.records import write_records
+from rotor_mbs.studies import modes as study
+
+NREL = find_scenes(["stiff/nrel-5mw"])[0]
+SOFT = replace(
+    NREL, name="soft", bearing_stiffness=(1e5,) * 3, bearing_damping=(5e3,) * 3, initial_angles=(0.5, 0.0, 0.0, 0.0)
+)
+
+
+def test_all_models_agree_on_the_nrel_rotor():
+    found = study.compute_modes(replace(SOFT, gravity=0.0), [0.0, 1.2, 3.0])
+    assert found.notes == ()
+    assert list(found.rest)[:3] == ["lagrange", "exudyn_tree", "exudyn_chain"]
+    assert list(found.rotation)[:2] == ["lagrange", "exudyn_tree"]
+    assert found.agrees
+    closed = found.rotation["lagrange"]
+    assert closed.names == ("rotor", "collective pitch", "cosine pitch", "sine pitch")
+    frequencies = closed.over_speed("undamped_frequencies")
+    assert (np.diff(frequencies[:, 1]) > 0.0).all()  # centrifugal stiffening
+    for other in list(found.rotation.values())[1:]:
+        np.testing.assert_allclose(other.over_speed("undamped_frequencies"), frequencies, rtol=1e-8)
+        np.testing.assert_allclose(other.over_speed("damping_ratios"), closed.over_speed("damping_ratios"), rtol=1e-7)
+
+
+def test_a_model_of_another_rotor_is_found_out(monkeypatch):
+    """One blade a millionth stiffer in one model alone."""
+    method = find_method("exudyn_tree/rk67")
+    right = method.linearize
+
+    def wrong(scene, *state):
+        stiffer = (scene.bearing_stiffness[0] * (1.0 + 1e-6), *scene.bearing_stiffness[1:])
+        return right(replace(scene, bearing_stiffness=stiffer), *state)
+
+    monkeypatch.setitem(method.__dict__, "linearize", wrong)
+    found = study.compute_modes(general(gravity=0.0))
+    assert not found.agrees
+    assert found.disagreement == pytest.approx(5e-7, rel=0.2)
+
+
+def test_blades_that_differ_have_numbered_modes_and_unknown_speeds_a_message():
+    found = study.compute_modes(general(gravity=0.0), [1.0])
+    assert found.rotation["lagrange"].names == ("mode 1", "mode 2", "mode 3", "mode 4")
+    light = study.compute_modes(find_scenes(["extreme/light-1e-8"])[0], [1.2])
+    assert not light.rotation
+    assert any("steady state" in note for note in light.notes)
+
+
+def test_records_keep_every_number(tmp_path):
+    pytest.importorskip("heyoka")
+    found = study.compute_modes(SOFT, [0.0, 1.2, 3.0], [5e4, 2e5])
+    write_records(tmp_path / "modes.h5", to_records(found, {"scene_hash": "0"}))
+    read = read_modes(tmp_path / "modes.h5")["soft"]
+    assert (read.title, read.blades, read.gravity, read.notes) == (found.title, 3, found.gravity, found.notes)
+    assert set(read.rest) == set(found.rest)
+    assert next(iter(read.rotation)) == "lagrange"
+    for model, one in found.rotation.items():
+        other = read.rotation[model]
+        assert (other.names, other.label, other.coordinates) == (one.names, one.label, one.coordinates)
+        for name in ("speeds", "angles", "stiffness", "damping", "eigenvalues", "shapes", "multiblade_shapes"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+    for name in ("speeds", "multipliers", "largest", "stable", "torque", "mismatch"):
+        np.testing.assert_array_equal(getattr(read.floquet, name), getattr(found.floquet, name))
+    np.testing.assert_array_equal(read.chart.largest, found.chart.largest)
+    assert found.chart.largest.shape == (2, 2)
+    assert np.nanmax(np.abs(found.floquet.product_error)) < 1e-9
+    write_records(tmp_path / "none.h5", [])
+    with pytest.raises(StoreError, match="no modes"):
+        read_modes(tmp_path / "none.h5")
+
+
+@pytest.mark.parametrize("speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),)])
+def test_speeds_that_do_not_increase_from_zero_are_refused(speeds):
+    with pytest.raises(InputError, match="speeds: allowed"):
+        study.compute_modes(SOFT, speeds)
+
+
+def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Path, capsys):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("heyoka")
+    output = tmp_path / "modes.h5"
+    assert main(["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", str(output), "-j", "1"]) == 0
+    assert "agree: frequencies differ by" in capsys.readouterr().out
+    page = (tmp_path / "modes-report" / "index.html").read_text(encoding="utf-8")
+    for text in ("Campbell diagram", "collective pitch", "Floquet multipliers", "forward whirl"):
+        assert text in page
+    with xarray.open_datatree(output, engine="netcdf4") as tree:
+        data = tree["modes/stiff/nrel-5mw/exudyn_tree/rotation"].load()
+        assert data.undamped_frequency.dims == ("speed", "mode")
+        assert data.undamped_frequency.units == "rad/s"
+        assert list(data.coordinate.labels) == ["rotor", "pitch 1", "pitch 2", "pitch 3"]
+    before = output.stat().st_mtime_ns
+    assert main(["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", str(output), "-j", "1", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["stiff/nrel-5mw"]
+    assert len(rows) == 4 + 4 * 4
+    assert output.stat().st_mtime_ns == before  # nothing to do
+    assert main(["report", str(output), "-o", str(tmp_path / "again")]) == 0
+    assert (tmp_path / "again" / "index.html").is_file()
+
+
+@pytest.mark.parametrize("span", ["3", "0:3", "3:0:4", "0:3:1", "-1:3:4", "0:nan:4", "0:3:x"])
+def test_a_span_that_means_nothing_is_bad_usage(span, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["modes", "stiff/nrel-5mw", f"--speeds={span}"])
+    assert ended.value.code == 2
+    assert "FROM:TO:COUNT" in capsys.readouterr().err
+
+
+def test_the_api_has_tables_figures_files(tmp_path):
+    found = rm.modes(SOFT.replace(gravity=0.0), speeds=np.linspace(0.0, 3.0, 3))
+    assert str(found.table()).count("collective pitch") == 4  # at rest, and at three speeds
+    assert "<svg" in found._repr_html_()
+    found.plot().save(tmp_path / "campbell.png")
+    assert (tmp_path / "campbell.png").stat().st_size > 10_000
+    assert found.to_html(tmp_path / "pages").read_text(encoding="utf-8").count("<svg") >= 2
+    assert read_modes(found.save(tmp_path / "modes.h5"))["soft"].agrees
+    with pytest.raises(InputError, match="no Floquet multipliers"):
+        found.plot.multipliers()
+    pytest.importorskip("xarray")
+    data = found.to_xarray()
+    expected = found.rotation["lagrange"].over_speed("undamped_frequencies")[:, 2]
+    np.testing.assert_array_equal(data.undamped_frequency.sel(solver="lagrange", mode="cosine pitch"), expected)
