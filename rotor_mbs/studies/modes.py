@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
 # Whose text decides a record, besides what decides a run.
 _SOURCES = ("analysis/modes.py", "analysis/campbell.py", "analysis/mode_records.py", "studies/modes.py")
-# The method that a case names; the study asks every model.
-_METHOD = "lagrange/taylor"
 # A source whose accelerations at the steady state are above this share of its largest stiffness is not steady there.
 _STEADY = 1e-7
 
@@ -65,7 +63,8 @@ def modes_of_scenes(
     Raises InputError for a negative or repeated speed or stiffness, StoreError, KeyboardInterrupt.
     """
     options = {"speeds": _increasing(speeds, "speeds"), "stiffnesses": _increasing(stiffnesses, "stiffnesses")}
-    cases = [Case(scene, _METHOD, study="modes", options=options, sources=_SOURCES) for scene in scenes]
+    method = next(iter(linearizing_methods().values())).name  # a case names one; the study asks all of them
+    cases = [Case(scene, method, study="modes", options=options, sources=_SOURCES) for scene in scenes]
     return execute(cases, perform_modes, ResultsFile(output), workers, timeout_s, on_progress)
 
 
