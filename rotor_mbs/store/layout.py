@@ -20,6 +20,9 @@ CONVENTIONS = "CF-1.11"
 KEY = "run_hash"
 _KEY_NAMES = (KEY, "bench_hash", "record_hash")
 
+# The attribute, equal for all records of a scene that one case writes: older ones of the same study go when they come.
+TOGETHER = "written_together"
+
 
 class Column(NamedTuple):
     """A dataset: its dimensions (names of scales in the same group), units, and what it is."""

@@ -11,7 +11,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.environment import machine, versions
 from rotor_mbs.scenario.names import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.layout import key_of
+from rotor_mbs.store.layout import TOGETHER, key_of
 from rotor_mbs.store.read import Results, open_results
 from rotor_mbs.store.records import records_in
 
@@ -42,7 +42,8 @@ def merge(
     """All runs and records of `sources` into `path`, atomically; `path` may itself be among the sources.
 
     A later run or record takes the place of an earlier one of the same name. Those of a scene whose numbers have
-    changed since (another scene_hash than in the last source that has it) belong to another rotor and are left out.
+    changed since (another scene_hash than in the last source that has it) belong to another rotor and are left out;
+    so are older ones of records that are replaced together (`layout.TOGETHER`).
 
     Parameters
     ----------
@@ -78,14 +79,15 @@ def refuse_other_kinds(path: Path) -> None:
 
 
 def _members(results: Results) -> Iterator[tuple[str, str, str, str]]:
-    """(group above, scene_hash, group, content hash) of every run and record in an open file."""
+    """(group above, what it belongs to, group, content hash) of every run and record in an open file."""
     for scene in results.scenes.values():
         for method, run in scene.runs.items():
             number = str(scene.attributes["scene_hash"])
             yield scene.name, number, f"{scene.name}/{method}", key_of(run.attributes)
     for name, group in records_in(results.root):
         above = "/".join(name.split("/")[:-2]) or name
-        yield above, str(group.attrs.get("scene_hash", "")), name, key_of(group.attrs)
+        owner = group.attrs.get(TOGETHER, group.attrs.get("scene_hash", ""))
+        yield above, str(owner), name, key_of(group.attrs)
 
 
 def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[str, Path]]:

@@ -31,6 +31,7 @@ from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
+from rotor_mbs.store.layout import TOGETHER
 from rotor_mbs.store.records import write_records
 from rotor_mbs.store.results_file import ResultsFile
 
@@ -73,7 +74,8 @@ def perform_modes(job: Job) -> Result:
     case = job.case
     speeds, stiffnesses = (np.array(case.options[name], dtype=float) for name in ("speeds", "stiffnesses"))
     found = compute_modes(case.scene, speeds, stiffnesses)
-    write_records(job.part, to_records(found, {"scene_hash": case.scene_hash, "run_hash": case.key}))
+    facts = {"scene_hash": case.scene_hash, "run_hash": case.key, TOGETHER: case.key}
+    write_records(job.part, to_records(found, facts))
     if not found.agrees:
         return Result("inaccurate", f"frequencies of two models differ by {found.disagreement:.1e} of their size")
     return Result("ok", "; ".join(found.notes))

@@ -115,6 +115,25 @@ def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Pat
     assert (tmp_path / "again" / "index.html").is_file()
 
 
+def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_path):
+    scene = replace(SOFT, gravity=0.0)
+    output = tmp_path / "modes.h5"
+    study.modes_of_scenes([scene, general(gravity=0.0)], output, speeds=[0.0, 1.0], workers=0, timeout_s=60.0)
+    assert read_modes(output)["soft"].rotation
+    study.modes_of_scenes([scene], output, workers=0, timeout_s=60.0)
+    found = read_modes(output)
+    assert found["soft"].rest
+    assert not found["soft"].rotation
+    assert found["general"].rotation
+    made = study.modes_of_scenes([scene], output, speeds=[0.0, 1.0], workers=0, timeout_s=60.0)
+    assert [one.result.status for one in made] == ["ok"]
+
+
+def test_show_says_which_models_are_linearized(capsys):
+    assert main(["show", "stiff/nrel-5mw"]) == 0
+    assert capsys.readouterr().out.count("linearized by rotor-mbs modes") >= 3
+
+
 @pytest.mark.parametrize("span", ["3", "0:3", "3:0:4", "0:3:1", "-1:3:4", "0:nan:4", "0:3:x"])
 def test_a_span_that_means_nothing_is_bad_usage(span, capsys):
     with pytest.raises(SystemExit) as ended:

@@ -30,8 +30,11 @@ def campbell(modes: LinearModes) -> Panels:
     frequencies = modes.over_speed("damped_frequencies")
     speeds = modes.speeds
     top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
+    apart = float(speeds[-1]) > 0.05 * top  # else the labels would lie on each other
     for k in _HARMONICS:
         panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")
+        if not apart and k != _HARMONICS[-1]:
+            continue
         end = min(float(speeds[-1]), top / k)
         panel.axes[0].annotate(f"{k}P", (end, k * end), color=GREY, ha="right", va="bottom", fontsize=8.0)
     for k in range(frequencies.shape[1]):
