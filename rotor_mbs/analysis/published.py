@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NamedTuple, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
 from rotor_mbs.scenario.validation import Number, Table, Text, invalid, validate_file
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.rehydrate import scene_of
-from rotor_mbs.scenario.names import natural_order
+from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import StoredScene
 
 # Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that

@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 from rotor_mbs.execution.environment import fingerprint
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import read_records

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rotor_mbs.analysis.sweep_map import stability_map
-from rotor_mbs.analysis.sweep_spread import spread_of
+from rotor_mbs.analysis.sweep_numbers import spread_of, stability_map
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep

@@ -19,7 +19,7 @@ from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, write_p
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.walk import WalkFigure, WalkPage
-from rotor_mbs.scenario.names import natural_order
+from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import Results, StoredScene, open_results
 
 _BATCHES = 2  # per worker

@@ -13,7 +13,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 CHECKS = (

@@ -1,4 +1,4 @@
-"""Which scenes are shipped, and which ones the arguments of a command mean. Must not know models."""
+"""The scenes that are shipped, their names, and which ones the arguments of a command mean. Must not know models."""
 
 from __future__ import annotations
 
@@ -8,16 +8,56 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.names import RESERVED_GROUPS, natural_key
-from rotor_mbs.scenario.resources import scenarios_folder, sweeps_folder
+from rotor_mbs.errors import InputError, RotorError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
+# Groups at the top of a results file that are not scenes: no scene may take such a name.
+RESERVED_GROUPS = ("bench", "errata", "modes", "stability", "sweep")
+
+_PACKAGE = Path(__file__).resolve().parents[1]
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
 _NAME = re.compile(rf"{_PIECE}(?:/{_PIECE})*")
 _NAME_RULE = "of the characters A-Z a-z 0-9 . _ -, with no dot in front"
+
+
+def scenarios_folder() -> Path:
+    """The shipped scenes. Raises RotorError in an incomplete installation."""
+    return _folder("scenarios")
+
+
+def sweeps_folder() -> Path:
+    """The shipped sweeps: TOML files that vary a scene."""
+    return scenarios_folder() / "sweeps"
+
+
+def reference_folder() -> Path:
+    """The shipped reference data: published numbers, errata, bounds, trajectories. Raises RotorError as above."""
+    return _folder("reference")
+
+
+def _folder(name: str) -> Path:
+    # A wheel carries the folders inside the package; an editable install has them at the top of the checkout.
+    for candidate in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
+        if candidate.is_dir():
+            return candidate
+    raise RotorError(f"{_PACKAGE}: the folder {name} is missing; install rotor_mbs again")
+
+
+def natural_key(name: str) -> list[tuple[int, int, str]]:
+    """Sort key under which digits count as whole numbers: 1kNm, 10kNm, 50kNm, 100kNm."""
+    pieces = re.findall(r"[0-9]+|[^0-9]+", name)
+    return [(0, int(piece), piece) if piece.isascii() and piece.isdigit() else (1, 0, piece) for piece in pieces]
+
+
+def natural_order(names: Iterable[str]) -> list[str]:
+    """The names, sorted by `natural_key`.
+
+    >>> natural_order(["fig15-10kNm", "fig15-1kNm", "fig05"])
+    ['fig05', 'fig15-1kNm', 'fig15-10kNm']
+    """
+    return sorted(names, key=natural_key)
 
 
 class _File(NamedTuple):

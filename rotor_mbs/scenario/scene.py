@@ -6,6 +6,7 @@ The scene's hash, its rotor key, the units of a sweep and the written scene file
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import math
@@ -14,9 +15,19 @@ from dataclasses import Field, dataclass, field, fields
 from operator import attrgetter
 from typing import Any, Literal
 
-OUTPUTS = ("angles", "rates", "tip", "energy")
+OUTPUTS = ("angles", "rates", "tip", "energy")  # built in
+ENTRY_POINT_GROUP = "rotor_mbs.quantities"  # a package adds the output that its entry point in this group is called
 
 Part = Literal["label", "run", "start", "rotor"]
+
+
+@functools.cache
+def known_outputs() -> tuple[str, ...]:
+    """The outputs that a scene may ask for: the built-in ones, then those of installed packages, sorted."""
+    from importlib.metadata import entry_points
+
+    added = {point.name for point in entry_points(group=ENTRY_POINT_GROUP)}
+    return (*OUTPUTS, *sorted(added - set(OUTPUTS)))
 
 
 def file_key(

@@ -13,7 +13,6 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 
 from rotor_mbs.scenario import scene
 from rotor_mbs.scenario.bounds import CHECKS
-from rotor_mbs.scenario.outputs import is_known_output, known_outputs
 from rotor_mbs.scenario.validation import Line, NotNegative, Number, PerBlade, Table, Text, Vector, invalid, nearest
 
 MAX_BLADES = 10_000
@@ -65,8 +64,9 @@ def values_per_sample(blades: int, outputs: Collection[str]) -> int:
 
 
 def _output(name: str) -> str:
-    if not is_known_output(name):
-        raise invalid("{shown} is not one of them" + nearest(name, list(known_outputs())))
+    # Installed packages are searched only for what is not built in.
+    if name not in scene.OUTPUTS and name not in scene.known_outputs():
+        raise invalid("{shown} is not one of them" + nearest(name, list(scene.known_outputs())))
     return name
 
 

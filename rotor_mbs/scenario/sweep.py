@@ -5,7 +5,8 @@ Importing this module costs 0.2 s (pydantic).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import functools
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,8 +15,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.resources import scenarios_folder, sweeps_folder
+from rotor_mbs.scenario.catalogue import find_scenes, scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import scene_tables
 from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
@@ -34,8 +34,6 @@ _INTERVALS = ("initial", "gravity", "hub", "shaft", "bearing")
 _ROWS_AT_ONCE = 4096
 _MAX_ROW_ERRORS = 20
 
-Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-
 
 def _varied_key(key: str) -> str:
     if not is_key(key):
@@ -44,6 +42,23 @@ def _varied_key(key: str) -> str:
     if table in _OF_ONE_SHAPE:
         raise invalid(f"all runs of a dataset share one {table}", "a sweep for each, or a key that keeps the shape")
     return key
+
+
+def _rising(pair: list[float]) -> list[float]:
+    if not pair[0] < pair[1]:
+        raise invalid("the first number is not below the second")
+    return pair
+
+
+def _with_spread(pair: list[float]) -> list[float]:
+    if not pair[1] > 0.0:
+        raise invalid("the standard deviation is not above 0")
+    return pair
+
+
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Range = Annotated[Pair, AfterValidator(_rising)]
+Normal = Annotated[Pair, AfterValidator(_with_spread)]
 
 
 class RangeTable(Table):
@@ -61,9 +76,9 @@ class AxisTable(Table):
     values: list[Number] | None = Field(None, min_length=1, description="a list of numbers")
     linear: RangeTable | None = Field(None, description="a table with start, end, count")
     log: RangeTable | None = Field(None, description="a table with start, end, count, both ends above 0")
-    uniform: Pair | None = Field(None, description="two numbers [low, high]")
-    normal: Pair | None = Field(None, description="two numbers [mean, standard deviation], the second one above 0")
-    sobol: Pair | None = Field(None, description="two numbers [low, high]")
+    uniform: Range | None = Field(None, description="two numbers [low, high]")
+    normal: Normal | None = Field(None, description="two numbers [mean, standard deviation], the second one above 0")
+    sobol: Range | None = Field(None, description="two numbers [low, high]")
 
     @field_validator("log")
     @classmethod
@@ -71,20 +86,6 @@ class AxisTable(Table):
         if log is not None and min(log.start, log.end) <= 0.0:
             raise invalid("a logarithmic range reaches 0 or less")
         return log
-
-    @field_validator("uniform", "sobol")
-    @classmethod
-    def _is_a_range(cls, pair: list[float] | None) -> list[float] | None:
-        if pair is not None and not pair[0] < pair[1]:
-            raise invalid("the first number is not below the second")
-        return pair
-
-    @field_validator("normal")
-    @classmethod
-    def _has_a_spread(cls, pair: list[float] | None) -> list[float] | None:
-        if pair is not None and not pair[1] > 0.0:
-            raise invalid("the standard deviation is not above 0")
-        return pair
 
     @model_validator(mode="after")
     def _varies_in_one_way(self) -> AxisTable:
@@ -109,16 +110,16 @@ class SweepTable(Table):
     combine: Literal["grid", "zip"] = Field("grid", description='"grid" or "zip"')
     draws: int | None = Field(None, ge=1, le=MAX_COUNT, description="a whole number from 1 up, with random axes")
     seed: int = Field(0, ge=0, le=2**63 - 1, description="a whole number from 0 up")
-    validation: Number | None = Field(None, gt=0, lt=1, description="a share between 0 and 1")
-    test: Number | None = Field(None, gt=0, lt=1, description="a share between 0 and 1, less than 1 with validation")
+    validation: Number = Field(0.0, gt=0, lt=1, description="a share between 0 and 1")
+    test: Number = Field(0.0, gt=0, lt=1, description="a share between 0 and 1, less than 1 with validation")
     file_bytes: Number | None = Field(None, ge=1e5, description="a number of at least 1e5, without effect")
     picture: Literal["spread", "map"] | None = Field(None, description='"spread" or "map"')
     axis: list[AxisTable] = Field(min_length=1, description="one or more [[axis]] tables")
 
     @field_validator("test")
     @classmethod
-    def _leaves_rows_for_training(cls, test: float | None, info: ValidationInfo) -> float | None:
-        if test is not None and test + (info.data.get("validation") or 0.0) >= 1.0:
+    def _leaves_rows_for_training(cls, test: float, info: ValidationInfo) -> float:
+        if test + info.data.get("validation", 0.0) >= 1.0:
             raise invalid("validation and test leave no rows for training")
         return test
 
@@ -175,7 +176,7 @@ class Sweep:
 
     def problem(self, key: KeyPath, message: str) -> str:
         """A line about what the file says at `key`, for an InputError: for errors that only a caller can find."""
-        return f"{self.path}:{line_of(find_lines(self.text), key)}: {message}"
+        return _problem(self.path, self.text, key, message)
 
     def variants(self) -> Variants:
         """From rows to scenes. They always ask for the energy: every run's balance is checked."""
@@ -192,7 +193,7 @@ def load_sweep(path: Path) -> Sweep:
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
     text, tables = read_toml(path)
-    return _Reader(path, text, validate_file(SweepTable, tables, text, shown_path(path))).sweep()
+    return _sweep(path, text, validate_file(SweepTable, tables, text, shown_path(path)))
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
@@ -225,83 +226,80 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
         listed.append({"key": key, **(plain if isinstance(plain, Mapping) else {"values": plain})})
     parts = [_toml(tables), *("\n[[axis]]\n" + _toml(axis) for axis in listed)]
     text, tables["axis"] = "".join(parts), listed
-    return _Reader(Path("sweep"), text, validate_file(SweepTable, tables, text, "sweep"), scene).sweep()
+    return _sweep(Path("sweep"), text, validate_file(SweepTable, tables, text, "sweep"), scene)
 
 
 def _toml(table: Mapping[str, object]) -> str:
     return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
-class _Reader:
+Problem = Callable[[KeyPath, str], str]
+
+
+def _problem(source: str, text: str, key: KeyPath, message: str) -> str:
+    return f"{source}:{line_of(find_lines(text), key)}: {message}"
+
+
+def _sweep(path: Path, text: str, table: SweepTable, base: Scene | None = None) -> Sweep:
     """What the file's model cannot check: the base scene, the keys of the axes in it, and how many rows there are."""
+    problem = functools.partial(_problem, shown_path(path), text)
+    base = _changed(base or _base(path, table.scene, problem), table, problem)
+    design = _design(table, problem)
+    sweep = Sweep(
+        name=path.stem,
+        title=table.title,
+        base=base,
+        design=design,
+        units=tuple(unit_of(parse_key(axis.key)) for axis in design.axes),
+        methods=tuple(dict.fromkeys(table.methods)),
+        settings=table.settings,
+        outputs=base.outputs if table.outputs is None else tuple(table.outputs),
+        precision=table.precision,
+        validation=table.validation,
+        test=table.test,
+        picture=table.picture,
+        text=text,
+        path=shown_path(path),
+    )
+    _check_rows(sweep)
+    return sweep
 
-    def __init__(self, path: Path, text: str, table: SweepTable, base: Scene | None = None) -> None:
-        self._path, self._text, self._table, self._given = path, text, table, base
-        self._lines = find_lines(text)
 
-    def sweep(self) -> Sweep:
-        table = self._table
-        base = self._changed(self._base())
-        design = self._design()
-        sweep = Sweep(
-            name=self._path.stem,
-            title=table.title,
-            base=base,
-            design=design,
-            units=tuple(unit_of(parse_key(axis.key)) for axis in design.axes),
-            methods=tuple(dict.fromkeys(table.methods)),
-            settings=dict(table.settings),
-            outputs=base.outputs if table.outputs is None else tuple(table.outputs),
-            precision=table.precision,
-            validation=table.validation or 0.0,
-            test=table.test or 0.0,
-            picture=table.picture,
-            text=self._text,
-            path=shown_path(self._path),
-        )
-        check_rows(sweep)
-        return sweep
+def _base(path: Path, asked: str, problem: Problem) -> Scene:
+    is_shipped = (scenarios_folder() / f"{asked}.toml").is_file()
+    try:
+        found = find_scenes([str(path.parent / asked) if asked.endswith(".toml") and not is_shipped else asked])
+    except InputError as error:
+        raise InputError(problem(("scene",), f"scene: {error}")) from error
+    if len(found) != 1:
+        wrong = f"scene: {asked} is {len(found)} scenes; allowed: one scene's name or file"
+        raise InputError(problem(("scene",), wrong))
+    return found[0]
 
-    def _problem(self, key: KeyPath, message: str) -> str:
-        return f"{shown_path(self._path)}:{line_of(self._lines, key)}: {message}"
 
-    def _base(self) -> Scene:
-        if self._given is not None:
-            return self._given
-        asked = self._table.scene
-        is_shipped = (scenarios_folder() / f"{asked}.toml").is_file()
-        try:
-            is_file = asked.endswith(".toml") and not is_shipped
-            found = find_scenes([str(self._path.parent / asked) if is_file else asked])
-        except InputError as error:
-            raise InputError(self._problem(("scene",), f"scene: {error}")) from error
-        if len(found) != 1:
-            wrong = f"scene: {asked} is {len(found)} scenes; allowed: one scene's name or file"
-            raise InputError(self._problem(("scene",), wrong))
-        return found[0]
+def _changed(base: Scene, table: SweepTable, problem: Problem) -> Scene:
+    changes: dict[str, object] = dict(table.change)
+    if table.samples is not None:
+        changes["samples"] = table.samples
+    if table.outputs:
+        changes["outputs"] = table.outputs
+    try:
+        return base.replace(**changes) if changes else base
+    except InputError as error:
+        key = next(key for key in ("change", "samples", "outputs") if getattr(table, key))
+        raise InputError([problem((key,), f"{key}: {one}") for one in error.problems]) from error
 
-    def _changed(self, base: Scene) -> Scene:
-        changes: dict[str, object] = dict(self._table.change)
-        if self._table.samples is not None:
-            changes["samples"] = self._table.samples
-        if self._table.outputs:
-            changes["outputs"] = self._table.outputs
-        try:
-            return base.replace(**changes) if changes else base
-        except InputError as error:
-            key = next(key for key in ("change", "samples", "outputs") if getattr(self._table, key))
-            raise InputError([self._problem((key,), f"{key}: {problem}") for problem in error.problems]) from error
 
-    def _design(self) -> Design:
-        axes = tuple(_axis(axis, self._table.draws or 0) for axis in self._table.axis)
-        if self._table.combine == "zip" and len({axis.count for axis in axes}) > 1:
-            counts = ", ".join(f"{axis.key} has {axis.count}" for axis in axes)
-            wrong = f"combine: {counts}; allowed with zip: as many values in every axis"
-            raise InputError(self._problem(("combine",), wrong))
-        design = Design(axes, self._table.combine, self._table.seed)
-        if design.count > MAX_ROWS:
-            raise InputError(self._problem(("axis",), f"axis: {design.count:,} runs; allowed: at most {MAX_ROWS:,}"))
-        return design
+def _design(table: SweepTable, problem: Problem) -> Design:
+    axes = tuple(_axis(axis, table.draws or 0) for axis in table.axis)
+    if table.combine == "zip" and len({axis.count for axis in axes}) > 1:
+        counts = ", ".join(f"{axis.key} has {axis.count}" for axis in axes)
+        wrong = f"combine: {counts}; allowed with zip: as many values in every axis"
+        raise InputError(problem(("combine",), wrong))
+    design = Design(axes, table.combine, table.seed)
+    if design.count > MAX_ROWS:
+        raise InputError(problem(("axis",), f"axis: {design.count:,} runs; allowed: at most {MAX_ROWS:,}"))
+    return design
 
 
 def _axis(table: AxisTable, draws: int) -> Axis:
@@ -312,7 +310,7 @@ def _axis(table: AxisTable, draws: int) -> Axis:
     return Axis(table.key, kind, tuple(given), draws if kind in DRAWN else len(given))
 
 
-def check_rows(sweep: Sweep) -> None:
+def _check_rows(sweep: Sweep) -> None:
     """Validates the scenes of the ends of every axis, or of every row where that is needed.
 
     Raises InputError with a line for each error.

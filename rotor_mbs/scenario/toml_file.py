@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -137,103 +137,64 @@ def _syntax_error(message: str, text: str) -> str:
 def find_lines(text: str) -> dict[KeyPath, int]:
     """Line number, counted from 1, of every key and array entry of a text that is valid TOML.
 
-    ("blade", 1, "mass") is in the second [[blade]] table. In a text that is not TOML some lines are missing or wrong.
+    ("blade", 1, "mass") is in the second [[blade]] table. Left out are the keys of inline tables, which TOML has on one
+    line. In a text that is not TOML some lines are missing or wrong.
     """
-    return _Scanner(text).scan()
+    lines: dict[KeyPath, int] = {}
+    table_counts: dict[KeyPath, int] = {}  # of every array of tables
+    table: KeyPath = ()
+    for statement in _statements(text):
+        is_header = statement[0][0] == "["
+        of_array = [token for token, _ in statement[:2]] == ["[", "["]
+        end = next((i for i, (token, _) in enumerate(statement) if token == "="), len(statement))
+        path = () if is_header else table
+        # Escapes in a quoted key are left as they are: its line is then the one of the table around it.
+        names = [(token, line) for token, line in statement[:end] if token not in _MARKS]
+        for i, (name, line) in enumerate(names):
+            path = (*path, name[1:-1] if name[0] in "\"'" else name)
+            lines.setdefault(path, line)
+            if of_array and i == len(names) - 1:
+                table_counts[path] = table_counts.get(path, 0) + 1
+            if is_header and path in table_counts:
+                path = (*path, table_counts[path] - 1)
+                lines.setdefault(path, line)
+        if is_header:
+            table = path
+        _number_entries(path, statement[end + 1 :], lines)
+    return lines
+
+
+def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
+    """The tokens of each table header or `key = value` with their lines; newlines inside brackets are left out."""
+    statement: list[tuple[str, int]] = []
+    line, depth = 1, 0
+    for match in _TOKEN.finditer(text):
+        token = match[1]
+        if token and token != "\n":
+            statement.append((token, line))
+            depth += (token in "[{") - (token in "]}")
+        elif token and depth <= 0 and statement:
+            yield statement
+            statement, depth = [], 0
+        line += match[0].count("\n")
+    if statement:
+        yield statement
+
+
+def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict[KeyPath, int]) -> None:
+    """Notes the line of each entry of an array, and of the arrays inside it."""
+    numbers: list[int] = []
+    for token, line in value:
+        if token in "]}":
+            del numbers[-1:]
+        elif token == ",":
+            numbers[-1:] = [number + 1 for number in numbers[-1:]]
+        else:
+            lines.setdefault((*path, *numbers), line)
+            if token in "[{":
+                numbers.append(0)
 
 
 def line_of(lines: Mapping[KeyPath, int], path: KeyPath) -> int:
     """The line of `path`, else of the nearest key that encloses it, else 1."""
     return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), 1)
-
-
-class _Scanner:
-    """One pass over the tokens of a TOML text: brackets and other marks, newlines, strings, bare pieces."""
-
-    def __init__(self, text: str) -> None:
-        self._tokens: list[tuple[str, int]] = []
-        self._position = 0
-        self._lines: dict[KeyPath, int] = {}
-        self._table_counts: dict[KeyPath, int] = {}
-        line = 1
-        for match in _TOKEN.finditer(text):
-            if match[1]:
-                self._tokens.append((match[1], line))
-            line += match[0].count("\n")
-        self._end = ("", line)
-
-    def scan(self) -> dict[KeyPath, int]:
-        table: KeyPath = ()
-        while self._next:
-            if self._next == "\n":
-                self._position += 1
-            elif self._next == "[":
-                table = self._header()
-            else:
-                self._entry(table)
-        return self._lines
-
-    @property
-    def _token(self) -> tuple[str, int]:
-        return self._tokens[self._position] if self._position < len(self._tokens) else self._end
-
-    @property
-    def _next(self) -> str:
-        return self._token[0]
-
-    def _header(self) -> KeyPath:
-        """Reads [a.b] or [[a.b]]; a part that is an array of tables is followed by the number of its last table."""
-        self._position += 1
-        of_array = self._next == "["
-        self._position += of_array
-        path: KeyPath = ()
-        parts = self._key_parts("]")
-        for i, (name, line) in enumerate(parts):
-            path = self._add((*path, name), line)
-            if of_array and i == len(parts) - 1:
-                self._table_counts[path] = self._table_counts.get(path, 0) + 1
-            if path in self._table_counts:
-                path = self._add((*path, self._table_counts[path] - 1), line)
-        self._position += of_array
-        return path
-
-    def _entry(self, path: KeyPath) -> None:
-        """Reads `a.b = value`."""
-        for name, line in self._key_parts("="):
-            path = self._add((*path, name), line)
-        self._value(path)
-
-    def _add(self, path: KeyPath, line: int) -> KeyPath:
-        self._lines.setdefault(path, line)
-        return path
-
-    def _key_parts(self, end: str) -> list[tuple[str, int]]:
-        """Names and lines of the parts of a dotted key, up to and over the mark that ends it."""
-        parts = []
-        while self._next not in (end, "\n", ""):
-            name, line = self._token
-            if name not in _MARKS:
-                # Escapes in a quoted key are left as they are: its line is then the one of the table around it.
-                parts.append((name[1:-1] if name[0] in "\"'" else name, line))
-            self._position += 1
-        self._position += 1
-        return parts
-
-    def _value(self, path: KeyPath) -> None:
-        """Reads a scalar (which may be several tokens: 1.5, or a date and a time), an array or an inline table."""
-        opening = self._next
-        if opening not in ("[", "{"):
-            while self._next not in (",", "]", "}", "\n", ""):
-                self._position += 1
-            return
-        self._position += 1
-        entry = 0
-        while self._next not in ("]", "}", ""):
-            if self._next in (",", "\n"):
-                entry += self._next == ","
-                self._position += 1
-            elif opening == "{":
-                self._entry(path)
-            else:
-                self._value(self._add((*path, entry), self._token[1]))
-        self._position += 1

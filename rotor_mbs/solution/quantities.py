@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.outputs import ENTRY_POINT_GROUP
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import ENTRY_POINT_GROUP, Scene
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.scenario.names import RESERVED_GROUPS
+from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
 
 

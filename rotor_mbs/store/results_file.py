@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.environment import machine, versions
-from rotor_mbs.scenario.names import RESERVED_GROUPS
+from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.layout import TOGETHER, key_of
 from rotor_mbs.store.read import Results, open_results

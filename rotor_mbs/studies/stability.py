@@ -27,9 +27,7 @@ _RECORD_LIMIT_S = 40.0
 # Scenes on which conservation is looked at: one without gravity, one regular with it.
 _SYMMETRY_SCENES = ("extreme/zero-gravity", "extreme/light-1e-2")
 _DRIFT_CASE = ("extreme/zero-gravity", "lagrange/taylor")
-_SOURCES = (
-    "studies/step_limits.py", "studies/conservation.py", "analysis/step_limits.py", "analysis/conservation.py",
-)  # fmt: skip
+_SOURCES = ("studies/step_limits.py", "studies/conservation.py", "analysis/exact.py")
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,19 @@
-"""Step limits of a fixed-step method on a scene: a ladder of steps, and the largest stable step by bisection."""
+"""Step limits of a fixed-step method on a scene: a ladder of steps, and the largest stable step, seen and in theory.
+
+In theory |R(hλ)| <= 1 for the stability function R and every eigenvalue λ (Hairer & Wanner, Solving Ordinary
+Differential Equations II, IV.2).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import cmath
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.analysis.step_limits import largest_stable_step, oscillator_modes
+from rotor_mbs.analysis.stability import TARGET
 from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
@@ -20,7 +26,6 @@ from rotor_mbs.store.records import Record
 from rotor_mbs.studies.frozen import load_reference
 
 STEPS, LIMIT = "steps", "limits"
-TARGET = 1e-6  # rad
 
 # A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to take this long.
 _FACTOR = 4
@@ -137,3 +142,34 @@ def _stays(scene: Scene, method: str, steps: int) -> bool:
     pitches = np.abs(run.trajectory.angles[:, 1:])
     complete = len(pitches) == scene.samples
     return complete and float(pitches.max()) <= _GROWTH * max(map(abs, scene.initial_angles[1:]))
+
+
+def oscillator_modes(inertia: float, stiffness: float, damping: float) -> tuple[complex, complex]:
+    """λ in 1/s of J θ̈ + d θ̇ + k θ = 0 (kg m², N m/rad, N m s/rad)."""
+    root = cmath.sqrt(damping * damping - 4.0 * inertia * stiffness)
+    return (-damping + root) / (2.0 * inertia), (-damping - root) / (2.0 * inertia)
+
+
+def largest_stable_step(
+    stability_function: Callable[[complex], complex], modes: Sequence[complex], window: float, growth: float
+) -> float:
+    """s: where the first range of steps ends on which no mode grows more than `growth`-fold in `window` s.
+
+    Growth within a window, not |R| <= 1 itself, is what a run can show: RK67 has |R| > 1 on the whole imaginary axis,
+    by so little at small steps that nothing comes of it. By scan and bisection.
+    """
+    fastest = max(abs(mode) for mode in modes)
+
+    def stable(h: float) -> bool:
+        largest = max(abs(stability_function(h * mode)) for mode in modes)
+        return window / h * math.log(largest) <= math.log(growth)
+
+    width = 0.01 / fastest
+    step = width
+    while stable(step + width):
+        step += width
+    low, high = step, step + width
+    while high - low > 1e-6 / fastest:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low

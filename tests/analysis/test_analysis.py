@@ -17,7 +17,7 @@ from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, errata, published
 from rotor_mbs.analysis.statistics import STATISTICS, measure
 from rotor_mbs.analysis.summary import finding
-from rotor_mbs.scenario.names import natural_order
+from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import open_results
 
 FIG11 = paper("fig11", samples=501)

@@ -7,7 +7,7 @@ import pytest
 from support.scenes import PAPER, paper
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.store.read import open_results
 

@@ -11,8 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from support.scenes import ARM, GRAVITY, MASS, OFFSET, paper
 
-from rotor_mbs.analysis.sweep_map import StabilityMap, stability_map
-from rotor_mbs.analysis.sweep_spread import Spread, lyapunov_exponent, spread_of
+from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
 from rotor_mbs.cli.sweep_picture import draw
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.plots.sweep import map_figure, spread_figure

@@ -12,8 +12,7 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
-from rotor_mbs.scenario.outputs import ENTRY_POINT_GROUP, known_outputs
-from rotor_mbs.scenario.scene import OUTPUTS, Scene, scene_hash
+from rotor_mbs.scenario.scene import ENTRY_POINT_GROUP, OUTPUTS, Scene, known_outputs, scene_hash
 from rotor_mbs.scenario.scene_file import load_scene, new_scene_text, parse_scene, scene_toml
 
 # A file key, a value that differs from check/general, and the field that it reaches.

@@ -19,8 +19,7 @@ from hypothesis.extra.numpy import arrays
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import catalogue
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
-from rotor_mbs.scenario.resources import reference_folder, scenarios_folder
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import OUTPUTS, Scene, scene_hash
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.scenario.schema import is_rigid_body_inertia, values_per_sample
@@ -279,7 +278,7 @@ def test_the_line_of_every_key(newline: str) -> None:
     leaves = _leaves(tomllib.loads(NUMBERED))
     assert len(leaves) == 22
     lines = find_lines(NUMBERED.replace("\n", newline))
-    assert [(path, lines.get(path)) for path, _ in leaves] == leaves
+    assert [(path, line_of(lines, path)) for path, _ in leaves] == leaves
 
 
 def test_a_key_that_is_not_there_has_the_line_of_what_encloses_it() -> None:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
-from rotor_mbs.scenario.resources import sweeps_folder
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
 from rotor_mbs.scenario.scene_file import scene_tables
 from rotor_mbs.scenario.sweep import Sweep, load_sweep, sweep_of
 from rotor_mbs.scenario.sweep_design import Axis, Design, split_rows

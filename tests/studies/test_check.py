@@ -35,7 +35,7 @@ from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario import resources
 from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.freeze import write_digests
 from rotor_mbs.studies import check, check_probes
 from rotor_mbs.studies.check_probes import Measurement, measure, probe, probes

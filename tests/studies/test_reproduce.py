@@ -13,7 +13,7 @@ from support.scenes import PAPER
 
 from rotor_mbs.analysis.errata import entries
 from rotor_mbs.methods.catalogue import is_corrected
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.read import open_results
 
 METHODS = {"printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"}

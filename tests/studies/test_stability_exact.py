@@ -10,16 +10,14 @@ import pytest
 from support.quadrature import Passage
 from support.references import TAYLOR, reference, run, scene
 
-from rotor_mbs.analysis.step_limits import largest_stable_step
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import compare, horizon_samples
 from rotor_mbs.studies.conservation import SYMMETRY, conservation_record, drift_record
-from rotor_mbs.studies.step_limits import LIMIT, STEPS, ladder_record, limit_record, step_for
+from rotor_mbs.studies.step_limits import LIMIT, STEPS, ladder_record, largest_stable_step, limit_record, step_for
 
 LIGHT = ("light-1e-2", "light-1e-4", "light-1e-6", "light-1e-8", "light-1e-4-hub", "light-1e-8-hub", "feather")
 

@@ -7,8 +7,7 @@ import functools
 import pytest
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.resources import reference_folder
+from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution

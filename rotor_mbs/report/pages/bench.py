@@ -21,7 +21,7 @@ from rotor_mbs.report.pages import bench_tables as tables
 from rotor_mbs.report.pages.bench_tables import curve_label, target_text
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
-from rotor_mbs.scenario.names import natural_order
+from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import COST_SCALING, Record, read_records
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotor_mbs.analysis.sweep_map import GROWN, StabilityMap
-from rotor_mbs.analysis.sweep_spread import Spread
+from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap
 from rotor_mbs.report.core.canvas import colour_bar, log_axis, panels, svg_text
 
 _INK, _ACCENT = "#0072b2", "#d55e00"  # Okabe-Ito blue and vermillion
