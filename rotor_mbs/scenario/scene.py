@@ -123,6 +123,11 @@ class Scene:
         return ("rotor", *(f"pitch {i + 1}" for i in range(len(self.blades))))
 
     @property
+    def moving_coordinates(self) -> list[int]:
+        """Columns of the angles that move: 0, the rotor, then 1 + i for each blade i whose pitch has inertia."""
+        return [0, *(1 + i for i, blade in enumerate(self.blades) if blade.has_pitch_inertia)]
+
+    @property
     def rotor_key(self) -> tuple[object, ...]:
         """The rotor's parameters and loads: equal for scenes that differ in start, run or label alone."""
         key: tuple[object, ...] = _rotor_values(self)

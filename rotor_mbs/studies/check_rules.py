@@ -122,7 +122,7 @@ def shares_off(scene: Scene) -> float:
             rates = [np.eye(count)[i] + sign * np.eye(count)[j] for sign in (1.0, -1.0)]
             plus, minus = (kinematics.kinetic_energy(scene, angles, rate[None])[0] for rate in rates)
             mass[i, j] = 0.5 * (plus - minus)
-        free = [1 + i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
+        free = scene.moving_coordinates[1:]
         share = 1.0 - sum(mass[0, i] ** 2 / mass[i, i] for i in free) / mass[0, 0]
         off = abs(float(rotor_inertia_shares(scene, angles)[0]) - share)
         worst = off if not off <= worst else worst

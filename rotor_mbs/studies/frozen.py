@@ -68,11 +68,11 @@ def reference_trajectory(scene: Scene, stored: StoredRun) -> Trajectory:
     from rotor_mbs.models.lagrange import samples
 
     angles, rates = stored.array("angles"), stored.array("rates")
-    moving = [0] + [1 + i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
+    moving = scene.moving_coordinates
     states = [angles[:, moving], rates[:, moving]]
     if "work" in stored:
         states.append(stored.array("work")[:, None])
-    result = samples.trajectory(scene, stored.array("time"), np.hstack(states), tuple(moving))
+    result = samples.trajectory(scene, stored.array("time"), np.hstack(states))
     result.angle_uncertainty = stored.array("angle_uncertainty")
     result.error_growth = stored.array("error_growth") if "error_growth" in stored else None
     return result

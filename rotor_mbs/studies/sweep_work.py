@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.models.lagrange.ensemble_samples import Block
+from rotor_mbs.models.lagrange.ensemble import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
@@ -62,8 +61,7 @@ class Chunk:
 
 
 def prepare() -> None:
-    """Loads, with this module, the fast path, and its engine where it is installed."""
-    import_module("rotor_mbs.models.lagrange.ensemble")
+    """Loads, with this module, the fast path's engine where it is installed."""
     is_available()
 
 

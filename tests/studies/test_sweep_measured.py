@@ -30,7 +30,7 @@ from support.scenes import paper
 from rotor_mbs.cli import main
 from rotor_mbs.execution.engines import open_engine
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange import ensemble, ensemble_samples
+from rotor_mbs.models.lagrange import ensemble
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.system import build_system
 from rotor_mbs.scenario.scene import Scene
@@ -150,7 +150,7 @@ def _shares(chunks: Sequence[Chunk]) -> tuple[float, float, float]:
     """s of all their runs: in all, of that what is not integration, and of that what fills the arrays."""
     made: list[_Timed] = []
     filling = [0.0]
-    integrator, put = ensemble._integrator, ensemble_samples.put
+    integrator, put = ensemble._integrator, ensemble._Group.put
 
     def timed(*arguments: Any) -> Any:
         made.append(_Timed(integrator(*arguments)))
@@ -161,14 +161,14 @@ def _shares(chunks: Sequence[Chunk]) -> tuple[float, float, float]:
         put(*arguments)
         filling[0] += time.perf_counter() - start
 
-    ensemble._integrator, ensemble_samples.put = timed, timed_put
+    ensemble._integrator, ensemble._Group.put = timed, timed_put
     try:
         start = time.perf_counter()
         for chunk in chunks:
             rows_of(chunk)
         spent = time.perf_counter() - start
     finally:
-        ensemble._integrator, ensemble_samples.put = integrator, put
+        ensemble._integrator, ensemble._Group.put = integrator, put
     return spent, spent - sum(one.spent for one in made), filling[0]
 
 

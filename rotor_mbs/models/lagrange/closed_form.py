@@ -101,15 +101,6 @@ def _kinetic(blade: BladeForm, s: Number, c: Number, spin: Number, rate: Number)
     return 0.5 * inertia * (spin * spin) + coupling * spin * rate + 0.5 * blade.pitch_inertia * (rate * rate)
 
 
-def schur_complement(angles: Sequence[Number], form: RotorForm, sin: Function, cos: Function) -> Number:
-    """S in kg m²: the rotor's inertia with every pitch free; its zero is the singular configuration."""
-    total = form.inertia
-    for blade, theta in zip(form.blades, angles[1:], strict=True):
-        s, c = sin(theta), cos(theta)
-        total = total + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
-    return total
-
-
 def point_path(
     azimuth: Number, pitch: Number, point: Sequence[float], sin: Function, cos: Function
 ) -> tuple[Number, Number, Number]:

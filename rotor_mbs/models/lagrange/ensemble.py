@@ -6,23 +6,20 @@ bits. Runs in one process and one thread: processes are the parallelism.
 
 from __future__ import annotations
 
-import functools
-import threading
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange import ensemble_samples
-from rotor_mbs.models.lagrange.ensemble_samples import Block
-from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka, one_at_a_time
+from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.observables import CompiledObservables, tip_numbers
-from rotor_mbs.models.lagrange.system import build_system, equation_numbers, set_parameters
+from rotor_mbs.models.lagrange.parameters import work_is_integrated
+from rotor_mbs.models.lagrange.system import build_system, compiled, equation_numbers, is_compact, set_parameters
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 # rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
 _HUGE = 1e13
@@ -30,19 +27,58 @@ _HUGE = 1e13
 # Samples of all runs side by side: what is worked on stays near the processor.
 _AT_ONCE = 4096
 
-# Unrolled code is fastest, but its compile time grows with the number of blades (and with the lanes).
-_UNROLLED_BLADES = 4
+
+@dataclass
+class Block:
+    """Samples of k runs, NaN after a run broke off; what the scenes do not ask for is None.
+
+    angles, rates   (k, n, 1 + blades) rad, rad/s
+    tip             (k, n, blades, 3) m
+    kinetic_energy, potential_energy, work   (k, n) J
+    integrations    the engine's report of each run; samples: how many rows of each are finite
+    """
+
+    time: Array
+    angles: Array
+    rates: Array
+    tip: Array | None
+    kinetic_energy: Array | None
+    potential_energy: Array | None
+    work: Array | None
+    integrations: list[Integration]
+    samples: list[int]
+
+    @property
+    def quantities(self) -> dict[str, Array]:
+        """Arrays by name, but for the time and those that are None."""
+        names = ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work")
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    def trajectory(self, i: int) -> Trajectory:
+        """Run i alone, cut where it broke off."""
+        n = self.samples[i]
+        return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
+
+    def end(self, i: int, integration: Integration, samples: int) -> None:
+        """Run i has so many samples, though a fixed pitch, or a term that vanishes, stays finite for longer."""
+        if samples < self.time.shape[1]:
+            for values in self.quantities.values():
+                values[i, samples:] = np.nan
+        integration.time_reached = float(self.time[i, max(samples - 1, 0)])
+        self.integrations[i], self.samples[i] = integration, samples
 
 
-class _Ready(threading.local):
-    """Compiled code, which holds a state: each thread has its own."""
-
-    def __init__(self) -> None:
-        self.integrators: dict[tuple[tuple[int, ...], float], Any] = {}
-        self.observables: dict[tuple[int, ...], CompiledObservables] = {}
-
-
-_ready = _Ready()
+def empty_block(scenes: Sequence[Scene]) -> Block:
+    """Room for their samples, all of which are to be put there."""
+    first, runs = scenes[0], len(scenes)
+    shape = (runs, first.samples)
+    columns = 1 + len(first.blades)
+    time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
+    tip = np.empty((*shape, len(first.blades), 3)) if first.wants("tip") else None
+    kinetic, potential, work = (np.empty(shape) if first.wants("energy") else None for _ in range(3))
+    angles, rates = np.empty((*shape, columns)), np.empty((*shape, columns))
+    integrations = [Integration(False)] * runs
+    return Block(time, angles, rates, tip, kinetic, potential, work, integrations, [0] * runs)
 
 
 @dataclass(frozen=True)
@@ -50,15 +86,11 @@ class _RotorNumbers:
     """What runs of one rotor share.
 
     numbers     (parameters,) of the equations, then of the tips
-    equations, observables   structures: rotors that agree in them share compiled code
-    moving      columns of the angles that move
+    structure   rotors that agree in it share compiled code
     """
 
     numbers: Array
-    equations: tuple[int, ...]
-    observables: tuple[int, ...]
-    moving: tuple[int, ...]
-    is_smooth: bool
+    structure: tuple[int, ...]
 
 
 def lanes() -> int:
@@ -71,109 +103,76 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
 
     Raises MethodRefusal where heyoka is not installed. A run that breaks off is in the result, cut and with its reason.
     """
-    rotors = _all_numbers(scenes)
-    block = ensemble_samples.empty_block(scenes)
-    for numbers in _groups(rotors):
-        if rotors[numbers[0]].is_smooth:
-            alike = [scenes[i] for i in numbers], [rotors[i] for i in numbers]
-            _propagate(block, _group(numbers, *alike, tolerance))
+    block = empty_block(scenes)
+    rotors: dict[tuple[object, ...], _RotorNumbers] = {}
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for i, scene in enumerate(scenes):
+        if not scene.has_constant_torque:
+            _solve_alone(block, i, scene, tolerance)
             continue
-        for i in numbers:
-            ensemble_samples.put_single(block, i, _single(scenes[i], tolerance))
+        key = scene.rotor_key
+        if key not in rotors:
+            rotors[key] = _rotor_numbers(scene)
+        groups.setdefault(rotors[key].structure, []).append(i)
+    for places in groups.values():
+        of_group = [scenes[i] for i in places]
+        _propagate(block, _Group(places, of_group, [rotors[scene.rotor_key] for scene in of_group], tolerance))
     return block
 
 
-def _all_numbers(scenes: Sequence[Scene]) -> list[_RotorNumbers]:
-    """Of every scene; scenes of one rotor share one."""
-    found: dict[tuple[object, ...], _RotorNumbers] = {}
-    rotors = []
-    for scene in scenes:
-        key = scene.rotor_key
-        if key not in found:
-            found[key] = _rotor_numbers(_without_start(scene))
-        rotors.append(found[key])
-    return rotors
+def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
+    """A torque that changes is integrated segment by segment, which runs in one batch would do at different times."""
+    run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
+    n = len(run.trajectory.time)
+    for name, values in block.quantities.items():
+        values[i, :n] = getattr(run.trajectory, name)
+    block.end(i, run.integration, n)
 
 
-def _without_start(scene: Scene) -> Scene:
-    zeros = (0.0,) * len(scene.initial_angles)
-    return replace(scene, initial_angles=zeros, initial_rates=zeros, duration=1.0, samples=2, title="", name="")
-
-
-@functools.lru_cache(maxsize=512)
 def _rotor_numbers(scene: Scene) -> _RotorNumbers:
     parameters = Parameters()
-    form, _ = equation_numbers(scene, parameters)
-    has_work = scene.wants("energy") and scene.has_damping
-    equations = (*parameters.structure, 2 * (1 + len(form.blades)) + has_work)
+    equation_numbers(scene, parameters)
     tip_numbers(scene, parameters)
-    return _RotorNumbers(
-        array_of(parameters.values, quad=False),
-        equations,
-        (*parameters.structure, scene.wants("tip"), scene.wants("energy")),
-        (0, *(1 + i for i in form.moving)),
-        scene.has_constant_torque,
-    )
-
-
-def _groups(rotors: Sequence[_RotorNumbers]) -> Iterator[list[int]]:
-    """Numbers of the runs of each structure, in order."""
-    found: dict[tuple[object, ...], list[int]] = {}
-    for i, rotor in enumerate(rotors):
-        key = (rotor.equations, rotor.observables, rotor.moving, rotor.is_smooth)
-        found.setdefault(key, []).append(i)
-    yield from found.values()
-
-
-def _single(scene: Scene, tolerance: float) -> Any:
-    """A torque that changes is integrated segment by segment, which runs in one batch would do at different times."""
-    return solve("lagrange/taylor", scene, {"tolerance": tolerance})
+    structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
+    return _RotorNumbers(array_of(parameters.values, quad=False), structure)
 
 
 def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
-    """The integrator of this structure, compiled once per computer (engine's cache on disk), made once per thread."""
-    cache = _ready.integrators
-    if (structure, tolerance) not in cache:
-        engine = heyoka()
-        system = build_system(example)
-        state = np.zeros((len(system.equations), lanes()))
-        with one_at_a_time("rotor_mbs-heyoka"):
-            cache[structure, tolerance] = engine.taylor_adaptive_batch(
-                system.equations, state=state, tol=tolerance, compact_mode=_is_compact(example), high_accuracy=True
-            )
-    return cache[structure, tolerance]
+    """Compiled once per computer (engine's cache on disk)."""
+
+    def make() -> Any:
+        equations = build_system(example).equations
+        options = {"tol": tolerance, "compact_mode": is_compact(example), "high_accuracy": True}
+        return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
+
+    return compiled(("batch", tolerance, structure), make)
 
 
-def _observables(structure: tuple[int, ...], example: Scene) -> CompiledObservables:
-    """The same for tips and energies, which compile fast: no process waits for another."""
-    cache = _ready.observables
-    if structure not in cache:
-        cache[structure] = CompiledObservables(example, compact=_is_compact(example))
-    return cache[structure]
-
-
-def _is_compact(scene: Scene) -> bool:
-    return len(scene.blades) > _UNROLLED_BLADES
-
-
-@dataclass(frozen=True)
 class _Group:
     """Runs of one structure, and the compiled code for them.
 
     places, scenes   of each run, in the block
-    moving      columns of the angles that move
-    initial     (variables, k) state; times: (samples, k) s
-    numbers     (parameters, k) of the rotor, then the pitches that are fixed
+    initial          (variables, k) state
+    times            (samples, k) s
+    numbers          (parameters, k) of the rotor, then the pitches that are fixed
     """
 
-    integrator: Any
-    observables: CompiledObservables
-    places: list[int]
-    scenes: list[Scene]
-    moving: tuple[int, ...]
-    initial: Array
-    times: Array
-    numbers: Array
+    def __init__(
+        self, places: list[int], scenes: list[Scene], rotors: Sequence[_RotorNumbers], tolerance: float
+    ) -> None:
+        example, structure = scenes[0], rotors[0].structure
+        self.places, self.scenes = places, scenes
+        self.integrator = _integrator(structure, tolerance, example)
+        outputs = example.wants("tip"), example.wants("energy")
+        self.observables = compiled(("observables", *outputs, structure), lambda: CompiledObservables(example))
+        self.moving = example.moving_coordinates
+        fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
+        angles = np.array([scene.initial_angles for scene in scenes]).T
+        rates = np.array([scene.initial_rates for scene in scenes]).T
+        self.initial = np.zeros((self.integrator.state.shape[0], len(scenes)))
+        self.initial[: 2 * len(self.moving)] = np.concatenate([angles[self.moving], rates[self.moving]])
+        self.times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), example.samples)
+        self.numbers = np.concatenate([np.stack([rotor.numbers for rotor in rotors], axis=1), angles[fixed]])
 
     def solve(self, columns: Sequence[int]) -> tuple[Array, list[Integration]]:
         """(variables, columns, samples) states, and the engine's status of each; they fill the lanes in turn."""
@@ -196,9 +195,32 @@ class _Group:
     def put(self, block: Block, columns: Sequence[int], states: Array, integrations: Sequence[Integration]) -> None:
         """The runs of the first len(integrations) columns into the block, with their tips and energies."""
         found = self.observables(states, self.numbers[:, columns])
-        runs = len(integrations)
+        runs, count = len(integrations), len(self.moving)
+        states, found = states[:, :runs], found[:, :runs]
         places, scenes = [self.places[i] for i in columns[:runs]], [self.scenes[i] for i in columns[:runs]]
-        ensemble_samples.put(block, places, scenes, self.moving, states[:, :runs], found[:, :runs], integrations)
+        block.angles[places] = np.array([scene.initial_angles for scene in scenes])[:, None]
+        block.rates[places] = 0.0
+        for i, column in enumerate(self.moving):
+            block.angles[places, :, column], block.rates[places, :, column] = states[i], states[count + i]
+        rows = 0
+        if block.tip is not None:
+            tip = block.tip.reshape(*block.time.shape, -1)
+            rows = tip.shape[2]
+            tip[places] = found[:rows].transpose(1, 2, 0)
+        if block.kinetic_energy is not None and block.potential_energy is not None and block.work is not None:
+            block.kinetic_energy[places], block.potential_energy[places] = found[rows], found[rows + 1]
+            has_work = len(states) > 2 * count
+            block.work[places] = states[2 * count] if has_work else _constant_work(scenes, states[0])
+        samples = states.shape[2] - np.isnan(states[0]).sum(axis=1)
+        for i, integration, n in zip(places, integrations, samples.tolist(), strict=True):
+            block.end(i, integration, n)
+
+
+def _constant_work(scenes: Sequence[Scene], angles: Array) -> Array:
+    """Of constant torques: τ·(q2 - q2(0)), exact."""
+    torques = np.array([scene.torque_at(0.0) for scene in scenes])
+    work: Array = torques[:, None] * (angles - angles[:, :1])
+    return work
 
 
 def _propagate(block: Block, group: _Group) -> None:
@@ -227,20 +249,3 @@ def _are_independent(states: Array, integrations: Sequence[Integration]) -> NDAr
     independent = (angles < _HUGE).all(axis=0) & np.isfinite(sizes).all(axis=0)
     found: NDArray[np.bool_] = independent & np.array([integration.success for integration in integrations])
     return found
-
-
-def _group(places: list[int], scenes: list[Scene], rotors: Sequence[_RotorNumbers], tolerance: float) -> _Group:
-    """Of runs whose rotors have one structure."""
-    first = rotors[0]
-    example = _without_start(scenes[0])
-    integrator = _integrator(first.equations, tolerance, example)
-    moving = list(first.moving)
-    fixed = [i for i in range(len(scenes[0].initial_angles)) if i not in moving]
-    angles = np.array([scene.initial_angles for scene in scenes]).T
-    rates = np.array([scene.initial_rates for scene in scenes]).T
-    initial = np.zeros((integrator.state.shape[0], len(scenes)))
-    initial[: 2 * len(moving)] = np.concatenate([angles[moving], rates[moving]])
-    times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), scenes[0].samples)
-    numbers = np.concatenate([np.stack([rotor.numbers for rotor in rotors], axis=1), angles[fixed]])
-    observables = _observables(first.observables, example)
-    return _Group(integrator, observables, places, scenes, first.moving, initial, times, numbers)

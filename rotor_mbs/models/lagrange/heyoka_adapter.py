@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import functools
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from fractions import Fraction
-from getpass import getuser
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -18,7 +14,6 @@ from rotor_mbs.errors import MethodRefusal
 
 # Of any processor that the engine runs on. A time limit for a batch counts on no more.
 LEAST_LANES = 2
-
 
 HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge elsewhere"
 
@@ -96,20 +91,3 @@ def failure(outcome: Any) -> str:
     if outcome == outcomes.err_nf_state:
         return "the state stopped being finite (heyoka: err_nf_state)"
     return f"heyoka: {str(outcome).rsplit('.', 1)[-1]}"
-
-
-@contextmanager
-def one_at_a_time(name: str) -> Iterator[None]:
-    """One compilation at a time on a computer, so that the next process finds the code in the engine's cache on disk.
-
-    Waits for other processes of this user inside a block of the same name; does not wait on systems without locks.
-    """
-    try:
-        import fcntl
-    except ImportError:  # Windows: two processes then compile the same code, which costs time and nothing else
-        yield
-        return
-    path = Path(tempfile.gettempdir()) / f"{name}-{getuser()}.lock"
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

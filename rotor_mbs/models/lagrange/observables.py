@@ -12,7 +12,7 @@ import numpy as np
 
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, heyoka
-from rotor_mbs.models.lagrange.system import equation_numbers
+from rotor_mbs.models.lagrange.system import equation_numbers, is_compact, state_symbols
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
 
@@ -32,16 +32,14 @@ class CompiledObservables:
     Source: `closed_form.point_path` and `closed_form.energies`, evaluated in symbols.
     """
 
-    def __init__(self, example: Scene, *, compact: bool) -> None:
+    def __init__(self, example: Scene) -> None:
         engine = heyoka()
         parameters = Parameters()
         form, _ = equation_numbers(example, parameters)
         points = tip_numbers(example, parameters)
-        count = 1 + len(form.blades)
-        symbols = engine.make_vars(*[f"q{i}" for i in range(count)], *[f"w{i}" for i in range(count)])
-        angles, rates = symbols[:count], symbols[count:]
-        moving = dict(zip(form.moving, angles[1:], strict=True))
-        pitches = [moving[i] if i in moving else parameters.own(Fraction(0)) for i in range(len(example.blades))]
+        angles, rates = state_symbols(form)
+        moving = dict(zip(example.moving_coordinates, angles, strict=True))
+        pitches = [moving[i] if i in moving else parameters.own(Fraction(0)) for i in range(1, 1 + len(example.blades))]
         found: list[Any] = []
         for i, point in enumerate(points):
             azimuth = angles[0] + example.phases[i]
@@ -50,8 +48,7 @@ class CompiledObservables:
             found += closed_form.energies(angles, rates, form, engine.sin, engine.cos)
         # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
         rows = [engine.expression(0.0) + row for row in found]
-        self._function = engine.cfunc(rows, symbols, compact_mode=compact) if rows else None
-        self._last: tuple[tuple[object, ...], Array] = ((), np.empty((0, 0)))
+        self._function = engine.cfunc(rows, [*angles, *rates], compact_mode=is_compact(example)) if rows else None
 
     def __call__(self, states: Array, numbers: Array) -> Array:
         """(rows, runs, samples): x y z in m of each blade's tip, then kinetic and potential energy in J, as far as the
@@ -70,17 +67,9 @@ class CompiledObservables:
     def _evaluated(self, states: Array, numbers: Array) -> Array:
         assert self._function is not None
         inputs, numbers = states[: self._function.nvars], numbers[: self._function.nparams]
-        spread = self._spread(numbers, states.shape[2])
-        found: Array = self._function(_in_rows(inputs), pars=spread, batch_parallel=False)
+        spread = np.broadcast_to(numbers[:, :, None], (*numbers.shape, states.shape[2]))  # anew for every sample
+        found: Array = self._function(_in_rows(inputs), pars=_in_rows(spread), batch_parallel=False)
         return found.reshape(-1, *states.shape[1:])
-
-    def _spread(self, numbers: Array, samples: int) -> Array:
-        """(parameters, runs · samples): the function wants its numbers anew for every sample. Runs of one rotor, a
-        chunk of a sweep, have the same."""
-        key = (numbers.tobytes(), numbers.shape, samples)
-        if self._last[0] != key:
-            self._last = key, _in_rows(np.broadcast_to(numbers[:, :, None], (*numbers.shape, samples)))
-        return self._last[1]
 
 
 def _in_rows(values: Array) -> Array:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,23 +20,11 @@ from rotor_mbs.models.lagrange.parameters import (
     torque_segments,
     work_is_integrated,
 )
+from rotor_mbs.models.lagrange.samples import Advance, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
-
-
-class Advance(NamedTuple):
-    """An integrator over one segment: states at the samples it reached, where it ended, its cost and its status.
-
-    message is "" where the end of the segment was reached.
-    """
-
-    states: Array  # (samples reached, variables)
-    end: Array  # (variables,)
-    steps: int
-    evaluations: int
-    message: str
 
 
 # (right-hand side, start, end, state at the start, sample times inside) -> Advance
@@ -50,36 +37,25 @@ class OdeSolver:
     def __init__(self, scene: Scene, integrator: Integrator) -> None:
         self._scene = scene
         self._integrator = integrator
-        form = rotor_form(scene)
-        self._moving = (0, *(1 + i for i in form.moving))
+        self._form = rotor_form(scene)
         self._segments = torque_segments(scene)
-        has_work = work_is_integrated(scene)
-        self._functions = [right_hand_side(form, segment, with_work=has_work) for segment in self._segments]
-        columns = list(self._moving)
+        self._has_work = work_is_integrated(scene)
+        columns = scene.moving_coordinates
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
-        self._initial = np.concatenate([*start, np.zeros(int(has_work))])
+        self._initial = np.concatenate([*start, np.zeros(int(self._has_work))])
         self._times = np.linspace(0.0, scene.duration, scene.samples)
         self._states: Array = self._initial[None, :]
 
     def integrate(self) -> Integration:
-        state, rows = self._initial, [self._initial[None, :]]
-        steps, evaluations, message = 0, 0, ""
-        for segment, function in zip(self._segments, self._functions, strict=True):
-            inside = self._times[(self._times > segment.start) & (self._times <= segment.end)]
-            part = self._integrator(function, segment.start, segment.end, state, inside)
-            steps, evaluations = steps + part.steps, evaluations + part.evaluations
-            rows.append(part.states)
-            state, message = part.end, part.message
-            if message:
-                break
-        states = np.concatenate(rows)
-        finite = np.isfinite(states).all(axis=1)
-        self._states = states[: len(finite) if finite.all() else int(np.argmin(finite))]
-        reached = float(self._times[max(len(self._states) - 1, 0)])
-        return Integration(not message, message, reached, steps, evaluations, message == deadline.message())
+        self._states, integration = over_segments(self._times, self._segments, self._initial, self._advance)
+        return integration
+
+    def _advance(self, segment: TorqueSegment, state: Array, times: Array) -> Advance:
+        function = right_hand_side(self._form, segment, with_work=self._has_work)
+        return self._integrator(function, segment.start, segment.end, state, times)
 
     def observe(self) -> Trajectory:
-        return samples.trajectory(self._scene, self._times[: len(self._states)], self._states, self._moving)
+        return samples.trajectory(self._scene, self._times, self._states)
 
 
 def right_hand_side(form: RotorForm, segment: TorqueSegment, *, with_work: bool) -> RightHandSide:

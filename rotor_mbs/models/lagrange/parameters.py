@@ -72,13 +72,12 @@ class BladeForm:
 class RotorForm:
     """Coefficients of the whole rotor.
 
-    blades      the blades whose pitch moves, in order; `moving` holds their numbers (from 0)
-    fixed        (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
+    blades      the blades whose pitch moves, in order
+    fixed       (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
     inertia     kg m²: hub, and the blades that are fixed
     """
 
     blades: tuple[BladeForm, ...]
-    moving: tuple[int, ...]
     fixed: tuple[tuple[Number, Number, Number], ...]
     inertia: Number
     shaft_damping: Number
@@ -92,7 +91,6 @@ def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
-    moving: list[int] = []
     fixed: list[tuple[Number, Number, Number]] = []
     inertia = Fraction(scene.hub_inertia)
     for i, blade in enumerate(scene.blades):
@@ -102,14 +100,11 @@ def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
             damping = Fraction(scene.bearing_damping[i]) if scene.bearing_damping else Fraction(0)
             values = [*phase, *_coefficients(blade, gravity), stiffness, damping, *_rotor_inertia(blade)]
             forms.append(BladeForm(*(convert(value) for value in values)))
-            moving.append(i)
         else:
             inertia += _rotor_inertia(blade)[1]
             weight = Fraction(blade.mass) * gravity * Fraction(blade.centre_of_mass[2])
             fixed.append((convert(weight), convert(phase[0]), convert(phase[1])))
-    return RotorForm(
-        tuple(forms), tuple(moving), tuple(fixed), convert(inertia), convert(Fraction(scene.shaft_damping))
-    )
+    return RotorForm(tuple(forms), tuple(fixed), convert(inertia), convert(Fraction(scene.shaft_damping)))
 
 
 def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rotor_mbs.models.lagrange import samples
-from rotor_mbs.models.lagrange.heyoka_adapter import array_of, heyoka, is_available
+from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import rate_units
-from rotor_mbs.models.lagrange.system import (
-    EquationSystem,
-    Propagation,
-    build_system,
-    compiled,
-    initial_state,
-    set_parameters,
-)
+from rotor_mbs.models.lagrange.system import Propagation, build_system
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
@@ -32,22 +26,22 @@ class ReferenceSolver:
 
     def __init__(self, scene: Scene, tolerance: float, check_tolerance: float) -> None:
         self._scene = scene
-        self._system = build_system(scene)
-        self._runs = [_quad_propagation(scene, self._system, tol) for tol in (tolerance, check_tolerance)]
+        system = build_system(scene)
+        self._runs = [
+            Propagation(scene, system, quad=True, tol=tol, compact_mode=True) for tol in (tolerance, check_tolerance)
+        ]
 
     def integrate(self) -> Integration:
         best, check = (run.run() for run in self._runs)
-        self._rows = min(len(run.states) for run in self._runs)
         return best if not best.success else replace(check, time_reached=best.time_reached, steps=best.steps)
 
     def observe(self) -> Trajectory:
-        best, check = (run.states[: self._rows] for run in self._runs)
-        moving = self._system.moving
-        time = np.linspace(0.0, self._scene.duration, self._scene.samples)
-        result = samples.trajectory(self._scene, time[: self._rows], best.astype(float), moving)
-        difference = np.abs((best - check)[:, : len(moving)]).astype(float)
+        rows = min(len(run.states) for run in self._runs)
+        best, check = (run.states[:rows] for run in self._runs)
+        result = samples.trajectory(self._scene, self._runs[0].times, best.astype(float))
+        difference = np.abs((best - check)[:, : len(self._scene.moving_coordinates)]).astype(float)
         result.angle_uncertainty = difference.max(axis=1)
-        result.error_growth = error_growth(self._scene)[: self._rows]
+        result.error_growth = error_growth(self._scene)[:rows]
         return result
 
 
@@ -58,50 +52,24 @@ def build(scene: Scene, settings: Any) -> ReferenceSolver | FallbackReference:
     return ReferenceSolver(scene, settings.tolerance, settings.check_tolerance)
 
 
-def _quad_propagation(scene: Scene, system: EquationSystem, tolerance: float) -> Propagation:
-    engine = heyoka()
-    pars = array_of(system.parameters.values, quad=True)
-    initial = array_of(initial_state(scene, system), quad=True)
-    integrator = compiled(
-        ("quad", tolerance, system.structure),
-        lambda: engine.taylor_adaptive(
-            system.equations,
-            state=initial,
-            tol=engine.real128(tolerance),
-            compact_mode=True,
-            fp_type=engine.real128,
-        ),
-    )
-    set_parameters(integrator, pars)
-    return Propagation(integrator, system, initial, np.linspace(0.0, scene.duration, scene.samples))
-
-
 def error_growth(scene: Scene) -> Array:
     """(samples,) How many times a small error of the initial state may have grown by each sample, at most.
 
     The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the
     variational equations of the closed form; infinite once it is past what double precision can hold.
     """
-    engine = heyoka()
-    system = build_system(scene)
-    count = 2 * len(system.moving)
-    equations = system.equations[:count]
-    variational = engine.var_ode_sys(equations, args=engine.var_args.vars, order=1)
-    pars = array_of(system.parameters.values, quad=False)
-    initial = array_of(initial_state(scene, system)[:count], quad=False)
-    integrator = compiled(
-        ("growth", system.structure),
-        lambda: engine.taylor_adaptive(variational, state=initial, compact_mode=True),
-    )
-    set_parameters(integrator, pars)
-    whole = np.concatenate([initial, np.eye(count).ravel()])
-    times = np.linspace(0.0, scene.duration, scene.samples)
-    propagation = Propagation(integrator, system, whole, times)
+    count = 2 * len(scene.moving_coordinates)
+    propagation = Propagation(scene, build_system(scene), variational=True, compact_mode=True)
     propagation.run()
+    return _largest_growth(scene, propagation.states[:, count:].reshape(-1, count, count))
+
+
+def _largest_growth(scene: Scene, matrices: Array) -> Array:
+    """(samples,) from the state transition matrices of the first samples, as far as they are finite."""
+    units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
     growth = np.full(scene.samples, np.inf)
-    units = np.concatenate([np.ones(count // 2), rate_units(scene)])
-    matrices = propagation.states[:, count:].reshape(-1, count, count) * units / units[:, None]
-    growth[: len(matrices)] = np.linalg.norm(matrices, ord=2, axis=(1, 2))
+    finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+    growth[finite] = np.linalg.norm(matrices[finite] * units / units[:, None], ord=2, axis=(1, 2))
     return growth
 
 
@@ -136,40 +104,30 @@ class FallbackReference:
         return result
 
     def _growth(self, result: Trajectory) -> Array:
-        """(n,) by the same measure as the variational equations: largest singular value of the difference quotients."""
-        state = np.hstack([result.angles, result.rates])
-        moving = rate_units(self._scene)
-        all_rates = np.ones(result.rates.shape[1])
-        all_rates[_moving(self._scene)] = moving
-        by_row = np.concatenate([np.ones(len(all_rates)), all_rates])
-        by_column = np.stack([np.ones(len(moving)), moving], axis=1).ravel()  # the neighbours' order
+        """(n,) by the same measure as the variational equations, of difference quotients."""
+        moving = self._scene.moving_coordinates
+        state = _state(result, moving)
         columns = []
-        for neighbour in _neighbours(self._scene):
+        for neighbour in _neighbours(self._scene, moving):
             solver = OdeSolver(neighbour, scipy_integrator("DOP853", *_TIGHTEST))
             solver.integrate()
-            near = solver.observe()
+            near = _state(solver.observe(), moving)
             column = np.full_like(state, np.inf)
-            rows = min(len(near.time), len(state))
-            column[:rows] = (np.hstack([near.angles, near.rates])[:rows] - state[:rows]) / _PERTURBATION
+            rows = min(len(near), len(state))
+            column[:rows] = (near[:rows] - state[:rows]) / _PERTURBATION
             columns.append(column)
-        matrices = np.stack(columns, axis=-1) * by_column / by_row[:, None]
-        growth = np.full(len(state), np.inf)
-        finite = np.isfinite(matrices).all(axis=(1, 2))
-        growth[finite] = np.linalg.norm(matrices[finite], ord=2, axis=(1, 2))
-        return growth
+        return _largest_growth(self._scene, np.stack(columns, axis=-1))[: len(state)]
 
 
-def _neighbours(scene: Scene) -> list[Scene]:
-    """The scene started a little off, in one angle or rate each; pitches without inertia have no neighbour."""
-    found = []
-    for i in _moving(scene):
-        angles, rates = list(scene.initial_angles), list(scene.initial_rates)
-        angles[i] += _PERTURBATION
-        rates[i] += _PERTURBATION
-        found.append(replace(scene, initial_angles=tuple(angles)))
-        found.append(replace(scene, initial_rates=tuple(rates)))
-    return found
+def _state(run: Trajectory, moving: Sequence[int]) -> Array:
+    return np.hstack([run.angles[:, moving], run.rates[:, moving]])
 
 
-def _moving(scene: Scene) -> list[int]:
-    return [0] + [1 + i for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
+def _neighbours(scene: Scene, moving: Sequence[int]) -> list[Scene]:
+    """The scene started a little off in one angle, then in one rate each."""
+
+    def beside(values: Sequence[float], i: int) -> tuple[float, ...]:
+        return (*values[:i], values[i] + _PERTURBATION, *values[i + 1 :])
+
+    angles = [replace(scene, initial_angles=beside(scene.initial_angles, i)) for i in moving]
+    return angles + [replace(scene, initial_rates=beside(scene.initial_rates, i)) for i in moving]

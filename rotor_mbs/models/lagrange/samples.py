@@ -1,23 +1,72 @@
-"""From states of the closed form to a trajectory: fixed pitches, tip path, energies. Knows no integrator."""
+"""The run of any integrator from segment to segment of the torque, and what its states are as a trajectory."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
 import numpy as np
 
+from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.parameters import TorqueSegment, rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Item, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
 
 
-def trajectory(scene: Scene, time: Array, states: Array, moving: tuple[int, ...]) -> Trajectory:
+class Advance(NamedTuple):
+    """What an integrator made of one segment.
+
+    states       (samples reached, variables)
+    end          (variables,) state at the end of the segment
+    evaluations  of the right-hand side; None where they are not counted
+    message      why the end was not reached; "" where it was
+    """
+
+    states: Any
+    end: Any
+    steps: int
+    evaluations: int | None
+    message: str
+
+
+def over_segments(
+    times: Array,
+    segments: Sequence[TorqueSegment],
+    initial: Any,
+    advance: Callable[[TorqueSegment, Any, Array], Advance],
+) -> tuple[Any, Integration]:
+    """States at the samples, (n, variables), cut before the first row that is not finite; and the engine's report.
+
+    times    (samples,) s, of which the first is that of the `initial` state
+    advance  (segment, state at its start, sample times inside) -> Advance
+    """
+    state, rows = initial, [initial[None, :]]
+    steps, evaluations, message = 0, None, ""
+    for segment in segments:
+        inside = times[(times > segment.start) & (times <= segment.end)]
+        part = advance(segment, state, inside)
+        rows.append(part.states)
+        steps, state, message = steps + part.steps, part.end, part.message
+        if part.evaluations is not None:
+            evaluations = (evaluations or 0) + part.evaluations
+        if message:
+            break
+    states = np.concatenate(rows)
+    finite = np.isfinite(states.astype(float, copy=False)).all(axis=1)
+    states = states[: len(states) if finite.all() else int(np.argmin(finite))]
+    reached = float(times[max(len(states) - 1, 0)])
+    return states, Integration(not message, message, reached, steps, evaluations, message == deadline.message())
+
+
+def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     """What the scene asks for.
 
-    time (n,) s; states (n, 2·len(moving)) or with the work in J as one more column; moving: the columns of
-    the angles that the state holds.
+    times   (n or more,) s
+    states  (n, 2k) angles, then rates, of the k coordinates that move; with the work in J as one more column, or not
     """
-    count = len(moving)
-    columns = list(moving)
+    columns, time = scene.moving_coordinates, times[: len(states)]
+    count = len(columns)
     angles = np.tile(np.array(scene.initial_angles, dtype=float), (len(time), 1))
     rates = np.zeros_like(angles)
     angles[:, columns] = states[:, :count]
@@ -46,13 +95,12 @@ def _constant_work(scene: Scene, angles: Array) -> Array:
 
 def items(scene: Scene) -> list[Item]:
     """The equations and terms the closed form has for this scene."""
-    form = rotor_form(scene)
-    built = [Item("equation", "rotor")]
-    built += [Item("equation", f"pitch {i + 1}") for i in form.moving]
+    moving = scene.moving_coordinates
+    built = [Item("equation", scene.coordinate_labels[i]) for i in moving]
     built += [
-        Item("term", f"blade {i + 1} fixed", "its pitch has no inertia")
-        for i in range(len(scene.blades))
-        if i not in form.moving
+        Item("term", f"blade {i} fixed", "its pitch has no inertia")
+        for i in range(1, 1 + len(scene.blades))
+        if i not in moving
     ]
     optional = {
         "hub inertia": scene.hub_inertia != 0.0,

@@ -73,7 +73,7 @@ def sympy_text(scene: Scene) -> str:
     of torque and dampers, the mass matrix M and the right-hand side f by Lagrange's equations, and the initial state.
     """
     form = rotor_form(scene, _constant)
-    moving = [0, *(1 + i for i in form.moving)]
+    moving = scene.moving_coordinates
     q, w = ([_Term(f"{name}{i}") for i in moving] for name in "qw")
     kinetic, potential = closed_form.energies(
         q, w, form, lambda x: _Term(f"sin({x.text})"), lambda x: _Term(f"cos({x.text})")

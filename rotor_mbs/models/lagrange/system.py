@@ -1,4 +1,4 @@
-"""The closed form as a symbolic system of heyoka, and one propagation of it over the sample times."""
+"""lagrange/taylor: the closed form as a symbolic system of heyoka, its propagation over the samples, and the solver."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
-from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import (
     RotorForm,
@@ -20,8 +20,12 @@ from rotor_mbs.models.lagrange.parameters import (
     torque_segments,
     work_is_integrated,
 )
+from rotor_mbs.models.lagrange.samples import Advance, over_segments
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration
+from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
+
+# Unrolled code is twice as fast as compact code, but its compile time grows with the number of blades.
+_UNROLLED_BLADES = 4
 
 
 @dataclass
@@ -30,14 +34,10 @@ class EquationSystem:
 
     equations   [(symbol, right-hand side)]: angles, rates, and the work where it is not known in closed form
     parameters  their numbers; the last two are the torque's offset and slope where the torque is not constant
-    moving      column in `angles` of each state angle: 0, then 1 + number of each blade whose pitch moves
     """
 
     equations: list[tuple[Any, Any]]
     parameters: Parameters
-    moving: tuple[int, ...]
-    has_work: bool
-    segments: list[TorqueSegment]
     has_constant_torque: bool
 
     @property
@@ -50,18 +50,19 @@ def build_system(scene: Scene) -> EquationSystem:
     engine = heyoka()
     parameters = Parameters()
     form, torque = equation_numbers(scene, parameters)
-    segments = torque_segments(scene)
-    has_work = work_is_integrated(scene)
-    count = 1 + len(form.blades)
-    names = [f"q{i}" for i in range(count)] + [f"w{i}" for i in range(count)]
-    symbols = engine.make_vars(*names)
-    angles, rates = symbols[:count], symbols[count:]
+    angles, rates = state_symbols(form)
     found = closed_form.accelerations(angles, rates, form, torque, engine.sin, engine.cos)
     equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
-    if has_work:
+    if work_is_integrated(scene):
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, torque)))
-    moving = (0, *(1 + i for i in form.moving))
-    return EquationSystem(equations, parameters, moving, has_work, segments, scene.has_constant_torque)
+    return EquationSystem(equations, parameters, scene.has_constant_torque)
+
+
+def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
+    """Angles and rates: rotor, then the pitches that move."""
+    count = 1 + len(form.blades)
+    symbols = heyoka().make_vars(*[f"q{i}" for i in range(count)], *[f"w{i}" for i in range(count)])
+    return symbols[:count], symbols[count:]
 
 
 def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, Any]:
@@ -73,18 +74,11 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, A
     return form, parameters.own(first.offset) + parameters.own(first.slope) * heyoka().time
 
 
-def initial_state(scene: Scene, system: EquationSystem) -> list[Fraction]:
-    """The scene's doubles, exact, in the order of the equations."""
-    columns = system.moving
-    values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
-    return [Fraction(value) for value in values] + [Fraction(0)] * system.has_work
-
-
 _compiled: dict[tuple[object, ...], Any] = {}
 
 
 def compiled(key: tuple[object, ...], make: Callable[[], Any]) -> Any:
-    """An integrator of its own for the caller, compiled once per process and structure."""
+    """Compiled code of its own for the caller, since it holds a state; made once per process and structure."""
     if key not in _compiled:
         _compiled[key] = make()
     return copy.deepcopy(_compiled[key])
@@ -95,55 +89,84 @@ def set_parameters(integrator: Any, values: Any) -> None:
     integrator.pars[:] = values[: len(integrator.pars)]
 
 
-class Propagation:
-    """One integrator, one initial state, one row of sample times (s); run as often as wanted.
+def is_compact(scene: Scene) -> bool:
+    """Whether code for the scene is to be compiled in loops."""
+    return len(scene.blades) > _UNROLLED_BLADES
 
-    The state at the samples is in `states` ((n, variables), cut before the first row that is not finite).
+
+class Propagation:
+    """The equations of a scene under heyoka's Taylor method, run from its initial state as often as wanted.
+
+    quad         in quad precision; the scene's doubles are taken as exact
+    variational  with the state transition matrix (without the work) as further variables, row by row
+    options      of the engine's integrator
+    states       (n, variables) at the samples of the last run, cut before the first row that is not finite
     """
 
-    def __init__(self, integrator: Any, system: EquationSystem, initial: Any, times: Array) -> None:
-        self._integrator = integrator
-        self._initial = initial
-        self._times = times
-        self._segments = [_SegmentGrid(segment, times, initial.dtype) for segment in system.segments]
+    def __init__(
+        self, scene: Scene, system: EquationSystem, *, quad: bool = False, variational: bool = False, **options: Any
+    ) -> None:
+        engine = heyoka()
+        columns, count = scene.moving_coordinates, 2 * len(scene.moving_coordinates)
+        equations = system.equations
+        values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
+        start = array_of([Fraction(value) for value in [*values, *[0.0] * (len(equations) - count)]], quad=quad)
+        key = (quad, variational, *options.items(), system.structure)
+        if quad:
+            options |= {"tol": engine.real128(options["tol"]), "fp_type": engine.real128}
+        if variational:
+            equations, start = equations[:count], start[:count]
+            equations = engine.var_ode_sys(equations, args=engine.var_args.vars, order=1)
+        self._integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options))
+        set_parameters(self._integrator, array_of(system.parameters.values, quad=quad))
+        self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
         self._torque = None if system.has_constant_torque else len(system.parameters.values) - 2
-        self.states = initial[None, :]
+        self._segments = torque_segments(scene)
+        self.times = np.linspace(0.0, scene.duration, scene.samples)
+        self.states = self._initial[None, :]
 
     def run(self) -> Integration:
-        integrator = self._integrator
-        integrator.time = self._initial.dtype.type(0)
-        integrator.state[:] = self._initial
-        rows = [self._initial[None, :]]
-        steps, message = 0, ""
+        self._integrator.time = self._initial.dtype.type(0)
+        self._integrator.state[:] = self._initial
+        self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
+        return integration
+
+    def _advance(self, segment: TorqueSegment, _state: Array, times: Array) -> Advance:
+        """From where the integrator is, the end of the segment before."""
+        integrator, kind = self._integrator, self._initial.dtype
+        if self._torque is not None:
+            integrator.pars[self._torque :] = array_of([segment.offset, segment.slope], quad=kind != np.float64)
+        end = [] if len(times) and times[-1] == segment.end else [segment.end]
+        grid = np.concatenate([[segment.start], times, end]).astype(kind)
         # Asked after every step, it costs a quarter of the run: only where there is a limit.
         callback = _within_time if deadline.is_set() else None
-        for segment in self._segments:
-            if self._torque is not None:
-                integrator.pars[self._torque :] = segment.torque
-            with deadline.polled():
-                outcome, _, _, taken, _, states = integrator.propagate_grid(segment.grid, callback=callback)
-            steps += taken
-            rows.append(states[1 : 1 + segment.samples])
-            message = deadline.message() if deadline.is_over() else failure(outcome)
-            if message:
-                break
-        states = np.concatenate(rows)
-        finite = np.isfinite(states.astype(float, copy=False))
-        self.states = states if finite.all() else states[: int(np.argmin(finite.all(axis=1)))]
-        reached = float(self._times[max(len(self.states) - 1, 0)])
-        return Integration(not message, message, reached, steps, out_of_time=message == deadline.message())
+        with deadline.polled():
+            outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=callback)
+        message = deadline.message() if deadline.is_over() else failure(outcome)
+        return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
 
 
 def _within_time(_integrator: Any) -> bool:
     return not deadline.is_over()
 
 
-class _SegmentGrid:
-    """The times at which a segment is stopped at: its start, the samples inside, and its end."""
+class TaylorSolver:
+    """See `rotor_mbs.methods.base.Solver`. Raises MethodRefusal where heyoka is not installed."""
 
-    def __init__(self, segment: TorqueSegment, times: Array, dtype: Any) -> None:
-        inside = times[(times > segment.start) & (times <= segment.end)]
-        self.samples = len(inside)
-        end = [] if len(inside) and inside[-1] == segment.end else [segment.end]
-        self.grid = np.array([segment.start, *inside, *end]).astype(dtype)
-        self.torque = array_of([segment.offset, segment.slope], quad=dtype != np.float64)
+    def __init__(self, scene: Scene, tolerance: float) -> None:
+        self._scene = scene
+        self._propagation = Propagation(
+            scene, build_system(scene), tol=tolerance, compact_mode=is_compact(scene), high_accuracy=True
+        )
+
+    def integrate(self) -> Integration:
+        return self._propagation.run()
+
+    def observe(self) -> Trajectory:
+        return samples.trajectory(self._scene, self._propagation.times, self._propagation.states)
+
+
+def items(scene: Scene) -> list[Item]:
+    """Raises MethodRefusal where heyoka is not installed, before anything is built."""
+    heyoka()
+    return samples.items(scene)
