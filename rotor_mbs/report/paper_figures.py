@@ -16,7 +16,6 @@ from rotor_mbs.store.read import StoredRun, StoredScene
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
 # The models that are compared, by key, in order from left to right.
 HEADINGS = {"printed": "As printed", "corrected": "Corrected model", "exudyn": "Exudyn"}
-_BINS = 130  # intervals of a curve: a largest and a smallest point each
 
 
 @dataclass(frozen=True)
@@ -107,13 +106,13 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
     for one, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
         if figure.kind == MOTION:
             run = next(iter(runs.values()))
-            histories.draw_coordinates(one, run.array("time"), run.array(name), label, _BINS)
+            histories.draw_coordinates(one, run.array("time"), run.array(name), label)
         else:
             series = [
                 histories.Series(run.array("time"), run.array(name)[:, 0], torque_look(place))
                 for place, run in enumerate(runs.values())
             ]
-            histories.draw_lines(one, series, label, _BINS)
+            histories.draw_lines(one, series, label)
             histories.set_range(one, np.concatenate([run.values for run in series])[:, None])
     axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)

@@ -89,7 +89,7 @@ def test_motion_draws_the_run_as_lines_and_the_others_as_marks_upon_them() -> No
         for column in range(4):
             np.testing.assert_array_equal(lines[column].get_xydata(), np.column_stack([TIME[::4], values[:, column]]))
             marks = lines[4 + column].get_xydata()
-            assert 20 < len(marks) < 40
+            assert 10 < len(marks) < 20
             np.testing.assert_allclose(np.interp(marks[:, 0], TIME[::4], values[:, column]), marks[:, 1])
         assert lines[-1].get_xdata() == [6.0, 6.0]
     assert "rad/s" in below.get_ylabel()
@@ -161,10 +161,9 @@ def test_embedding_moves_no_point_and_changes_no_label() -> None:
     assert ">0.625<" in text
     assert "title &lt;b&gt;" in text
     assert "described &amp; so" in text
-    assert all(name.startswith("n-") for name in re.findall(r'\b(?:id="|href="#|url\(#)([^")]*)', text))
     found, wanted = (max(re.findall(r' d="(M[^"]*)"', one), key=len) for one in (text, plain))
     numbers_found, numbers_wanted = (np.array(re.findall(r"-?[\d.]+", one), float) for one in (found, wanted))
-    np.testing.assert_allclose(numbers_found, numbers_wanted, atol=0.0051)
+    np.testing.assert_allclose(numbers_found, numbers_wanted, atol=0.051)
 
 
 # What a page has
@@ -178,6 +177,7 @@ def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> No
     assert found.tags.count("figcaption") == found.tags.count("figure") == 3 + 1 + 3 + 2
     images = [value for name, value in found.attributes if name == "role" and value == "img"]
     assert len(images) == found.tags.count("figure") + found.tags.count("canvas")
+    assert (report / "paper-fig11.html").stat().st_size < 250_000
 
 
 def test_the_index_states_the_finding(report: Path) -> None:
@@ -310,6 +310,7 @@ def test_pages_need_nothing_from_outside(report: Path) -> None:
         targets = {value.split("#")[0] for value in links} - {""}
         assert all((report / target).is_file() for target in targets)
         ids = [value for name, value in found.attributes if name == "id"]
+        assert len(set(ids)) == len(ids), path.name
         assert {value[1:] for value in links if value.startswith("#")} <= set(ids)
 
 

@@ -35,7 +35,11 @@ _STYLE: Any = {
     "axes.titlesize": 9.5,
     "xtick.labelsize": 9.5,
     "ytick.labelsize": 9.5,
+    "xtick.major.size": 0.0,
+    "ytick.major.size": 0.0,
     "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.formatter.limits": (-3, 4),
@@ -44,10 +48,10 @@ _STYLE: Any = {
     "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.2,
+    "lines.solid_capstyle": "butt",
     "path.simplify": True,
-    "path.simplify_threshold": 0.25,
+    "path.simplify_threshold": 0.5,
     "svg.fonttype": "none",
-    "svg.hashsalt": "rotor_mbs",
 }
 
 
@@ -66,7 +70,7 @@ def panels(heights: tuple[float, ...], x_label: str, *, share_x: bool = True) ->
         axes: list[Axes] = []
         for row in range(len(heights)):
             axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes and share_x else None))
-            axes[-1].tick_params(labelbottom=row == len(heights) - 1, length=3)
+            axes[-1].tick_params(labelbottom=row == len(heights) - 1)
         axes[-1].set_xlabel(x_label)
         # Fixed margins: the layout does not depend on the fonts.
         height = float(figure.get_figheight())
@@ -140,9 +144,9 @@ def log_axis(axes: Any, lowest: float, highest: float) -> None:
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power(round(math.log10(value)))))
 
 
-def svg_text(figure: Figure) -> str:
-    """The figure as matplotlib writes it, without a date."""
-    with style():
+def svg_text(figure: Figure, name: str = "rotor_mbs") -> str:
+    """The figure as matplotlib writes it, without a date; names inside it depend on `name`."""
+    with style(), matplotlib.rc_context({"svg.hashsalt": name}):
         stream = io.StringIO()
         FigureCanvasSVG(figure).print_svg(  # type: ignore[no-untyped-call]
             stream, metadata={"Date": None, "Creator": None}

@@ -39,7 +39,7 @@ def draw_paths(axes: Any, tip: Array) -> None:
     reach = 1.04 * float(np.linalg.norm(tip, axis=2).max())
     axes.set(xlim=(-0.95 * reach, 0.95 * reach), ylim=(-1.02 * reach, 1.02 * reach), aspect="equal")
     axes.set_axis_off()
-    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    angle = np.linspace(0.0, 2.0 * np.pi, 37)
     ring = reach * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
     axes.plot(*projected(ring).T, color="#dddddd", linewidth=0.7)
     axes.plot(*projected(np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])).T, color=GREY, linewidth=3.0)
@@ -47,7 +47,7 @@ def draw_paths(axes: Any, tip: Array) -> None:
     for blade in range(tip.shape[1]):
         colour = coordinate_look(blade + 1).colour
         path = projected(tip[:, blade])
-        axes.plot(*_spaced(path, 0.004 * reach).T, color=colour, linewidth=0.8)
+        axes.plot(*path.T, color=colour, linewidth=0.8)
         for end, dashes, fill in ((path[0], (0, (3, 2)), "white"), (path[-1], "-", colour)):
             axes.plot((0.0, end[0]), (0.0, end[1]), color=colour, linestyle=dashes, linewidth=1.6)
             axes.plot(*end[:, None], marker="o", markersize=4, markeredgecolor=colour, markerfacecolor=fill)
@@ -71,12 +71,3 @@ def projected(points: Array) -> Array:
     up = np.array([0.0, 0.0, np.cos(_ELEVATION)]) - np.sin(_ELEVATION) * level
     found: Array = points @ np.stack([right, up], axis=1)
     return found
-
-
-def _spaced(path: Array, step: float) -> Array:
-    """Points at least `step` m apart, and the last one."""
-    kept = [0]
-    for i in range(1, len(path)):
-        if np.hypot(*(path[i] - path[kept[-1]])) >= step:
-            kept.append(i)
-    return path[[*kept, len(path) - 1]]

@@ -22,7 +22,8 @@ _HIGHEST = 1e4
 _RUNAWAY = 8.0
 # A range (rad, rad/s; of energies, of their scale) that is rounding error.
 _ROUNDING = 1e-9
-_MARKS = 26  # per curve
+_BINS = 130  # intervals of a curve that is drawn: one in some four pixels of a page
+_MARKS = 12  # per curve
 ENERGY_LOOKS = (
     ("kinetic", Look("#d55e00", "-", ""), 1.2),
     ("potential", Look("#0072b2", "--", ""), 1.2),
@@ -61,16 +62,16 @@ def motion(run: Motion, marked: Sequence[tuple[Motion, Look]] = (), horizon: flo
     return panels
 
 
-def draw_coordinates(axes: Any, time: Array, values: Array, label: str, bins: int = 400) -> None:
+def draw_coordinates(axes: Any, time: Array, values: Array, label: str) -> None:
     """A line per coordinate of `values` (n, coordinates)."""
-    draw_lines(axes, [Series(time, x, coordinate_look(i)) for i, x in enumerate(values.T)], label, bins)
+    draw_lines(axes, [Series(time, x, coordinate_look(i)) for i, x in enumerate(values.T)], label)
     set_range(axes, values)
 
 
-def draw_lines(axes: Any, series: Sequence[Series], label: str, bins: int = 400) -> None:
+def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
     """The curves over one vertical axis."""
     for one in series:
-        axes.plot(*thin(one.time, one.values, bins), color=one.look.colour, linestyle=one.look.line)
+        axes.plot(*thin(one.time, one.values), color=one.look.colour, linestyle=one.look.line)
     axes.set_ylabel(label)
 
 
@@ -111,7 +112,8 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, l
     for time, values, look in drawn:
         axes.plot(
             time, values, color=look.colour, linestyle=look.line, linewidth=1.0 if look.marker else 1.8,
-            marker=look.marker or None, markersize=4.2, markerfacecolor="white", markevery=(0.03, 0.12),
+            marker=look.marker or None, markersize=4.2, markerfacecolor="white",
+            markevery=(len(time) // 30, max(1, len(time) // 8)),
         )  # fmt: skip
     known = np.concatenate([values for _, values, _ in drawn] or [np.empty(0)])
     known = known[np.isfinite(known)]
@@ -162,14 +164,14 @@ def error_over_step(series: Sequence[tuple[Array, Array, Look]], target: float) 
     return panels
 
 
-def thin(time: Array, values: Array, bins: int = 400) -> tuple[Array, Array]:
-    """The smallest and the largest sample of each of about `bins` intervals, in order: no peak is lost."""
-    if len(time) <= 2 * bins:
+def thin(time: Array, values: Array) -> tuple[Array, Array]:
+    """The ends, and the smallest and the largest sample of each of some equal intervals: no peak is lost."""
+    if len(time) <= 2 * _BINS:
         return time, values
-    table = _intervals(values, bins)
-    starts = np.arange(len(table)) * table.shape[1]
-    found = np.concatenate([[0, len(time) - 1], starts + table.argmin(axis=1), starts + table.argmax(axis=1)])
-    index = np.unique(np.minimum(found, len(time) - 1))
+    found = [0, len(time) - 1]
+    for interval in np.array_split(np.arange(len(time)), _BINS):
+        found += [interval[values[interval].argmin()], interval[values[interval].argmax()]]
+    index = np.unique(found)
     return time[index], values[index]
 
 
@@ -179,20 +181,12 @@ def is_cut(values: Array) -> bool:
     return bool(largest.max() > _RUNAWAY * float(np.quantile(largest, 0.9)) > 0.0)
 
 
-def _peaks(time: Array, values: Array, bins: int = 250) -> tuple[Array, Array]:
+def _peaks(time: Array, values: Array) -> tuple[Array, Array]:
     """The largest sample of each interval; NaN, a gap in the curve, where a logarithmic axis cannot show it."""
-    if len(time) > 2 * bins:
-        table = _intervals(values, bins)
-        index = np.minimum(np.arange(len(table)) * table.shape[1] + table.argmax(axis=1), len(time) - 1)
+    if len(time) > 2 * _BINS:
+        index = [one[values[one].argmax()] for one in np.array_split(np.arange(len(time)), _BINS)]
         time, values = time[index], values[index]
     return time, np.where(values > LOWEST, np.minimum(values, _HIGHEST), np.nan)
-
-
-def _intervals(values: Array, bins: int) -> Array:
-    """(about bins, samples each); the last one is filled up with the last value."""
-    size = -(-len(values) // bins)
-    filled = np.pad(values, (0, -len(values) % size), mode="edge")
-    return filled.reshape(-1, size)
 
 
 def _draw_horizon(axes: Any, time: Array, horizon: float | None) -> None:

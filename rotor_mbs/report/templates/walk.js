@@ -7,7 +7,7 @@
     const copy = figure.querySelector("svg").cloneNode(true), box = copy.viewBox.baseVal;
     copy.setAttribute("width", `${WIDTH_MM}mm`);
     copy.setAttribute("height", `${(WIDTH_MM * box.height) / box.width}mm`);
-    copy.setAttribute("style", "font-family:'DejaVu Sans',Verdana,Arial,sans-serif;stroke-linejoin:round;background:#fff");
+    copy.setAttribute("style", "font-size:9.5px;font-family:'DejaVu Sans',Verdana,Arial,sans-serif;stroke-linejoin:round;background:#fff");
     return { text: new XMLSerializer().serializeToString(copy), ratio: box.height / box.width };
   };
 
