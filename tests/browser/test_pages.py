@@ -22,6 +22,8 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.pages.modes import write_modes_pages
+from rotor_mbs.studies.modes import compute_modes
 
 pytestmark = [pytest.mark.browser, pytest.mark.skipif(not PROGRAM, reason="no Chromium here")]
 SIZES = (390, 1440)
@@ -42,7 +44,9 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         runs += [Made(scene, "reference", curve), Made(scene, "exudyn_tree/rk67", curve)]
         runs.append(Made(scene, "printed/ode45", lambda t, c=curve: 1.1 * c(t), until=0.7, gain=1e6))
     results = store(folder / "r.h5", runs)
-    return write_report(results, folder / "out").parent
+    out = write_report(results, folder / "out").parent
+    modes = write_modes_pages([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])], folder / "modes")
+    return shutil.copy(modes, out / "modes.html").parent
 
 
 @pytest.fixture(scope="session")

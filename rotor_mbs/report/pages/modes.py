@@ -62,8 +62,8 @@ def scene_part(modes: SceneModes, name: str) -> SceneModesPart:
         modes.scene,
         modes.title,
         _lead(modes),
-        Section(tables=[] if rest is None else [_mode_table("", rest, 0), _shape_table(rest, 0)]),
-        *_rotation(rotation, name),
+        Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
+        *_rotation(rotation, modes.scene, name),
         _turning(modes, name),
     )
 
@@ -82,13 +82,12 @@ def _lead(modes: SceneModes) -> list[str]:
     return [*sentences, *modes.notes]
 
 
-def _rotation(rotation: LinearModes | None, name: str) -> tuple[Section, Section]:
+def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Section, Section]:
     """The pictures over speed; the tables of the highest speed."""
     if rotation is None or np.isnan(rotation.over_speed("growth_rates")).all():
         return Section(), Section()
     last = len(rotation.speeds) - 1
-    heading = f"At {number(float(rotation.speeds[last]), 4)} rad/s"
-    fastest = Section(tables=[_mode_table(heading, rotation, last), _shape_table(rotation, last)])
+    fastest = Section(tables=_tables(rotation, last, f"{scene}, {number(float(rotation.speeds[last]), 4)} rad/s"))
     if last == 0:
         return Section(), fastest
     caption = (
@@ -101,6 +100,11 @@ def _rotation(rotation: LinearModes | None, name: str) -> tuple[Section, Section
         drawn.append(picture(plots.damping(rotation), f"{name}-damping", caption, caption))
     legend = [LegendEntry(label, plots.mode_look(k)) for k, label in enumerate(rotation.names)]
     return Section(drawn, legend), fastest
+
+
+def _tables(one: LinearModes, i: int, state: str) -> list[PageTable]:
+    """Of the i-th speed; state: the beginning of their captions, which differ on the whole page."""
+    return [_mode_table(f"{state}: modes", one, i), _shape_table(f"{state}: shapes, the largest amplitude 1", one, i)]
 
 
 def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:
@@ -125,7 +129,7 @@ def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:
     return PageTable(caption, head, rows, tuple(range(1, len(head)))).without_empty_columns()
 
 
-def _shape_table(one: LinearModes, i: int) -> PageTable:
+def _shape_table(caption: str, one: LinearModes, i: int) -> PageTable:
     """Moduli of the amplitudes in multiblade coordinates."""
     amplitudes = np.abs(one.multiblade_shapes[i])
     rows = []
@@ -133,7 +137,7 @@ def _shape_table(one: LinearModes, i: int) -> PageTable:
         largest = max(float(shape.max()), 1e-300)
         rows.append([TableCell(name), *(TableCell(_shown(float(value) / largest, 3)) for value in shape)])
     head = ("Shape", "rotor", *multiblade(one.blades)[0])
-    return PageTable("Amplitudes in multiblade coordinates, the largest 1", head, rows, tuple(range(1, len(head))))
+    return PageTable(caption, head, rows, tuple(range(1, len(head))))
 
 
 def _shown(value: float, digits: int) -> str:
@@ -166,4 +170,4 @@ def _turning(modes: SceneModes, name: str) -> Section:
         for i in range(len(table.speeds))
     ]
     head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
-    return Section(drawn, (), [PageTable("Multipliers", head, rows, (0, 1, 2, 3, 4))])
+    return Section(drawn, (), [PageTable(f"{modes.scene}: multipliers", head, rows, (0, 1, 2, 3, 4))])
