@@ -51,7 +51,7 @@ ONE_BLADE = make_scene(
 )  # fmt: skip
 TWO_BLADES = make_scene(
     [-1.0, 0.2, 0.9], [3.0, 0.0, -2.0], (STOUT, SLIM), gravity=0.0, duration=1.0, samples=51, hub_inertia=0.0,
-    bearing_stiffness=(900.0, 4000.0), rotor_torque=((0.0, -2500.0),),
+    bearing_stiffness=(900.0, 4000.0), shaft_damping=60.0, rotor_torque=((0.0, -2500.0),),
 )  # fmt: skip
 FOUR_BLADES = make_scene(
     [0.5, -0.4, 0.3, 1.3, 2.9], [-0.8, 0.6, 0.0, 1.0, -0.5], (SLIM, STOUT, STOUT, SLIM), duration=1.0, samples=51,
@@ -143,7 +143,7 @@ def test_torque_ramp_on_a_balanced_rotor() -> None:
     """J q'' = a + b t, with a jump: cubic pieces, which the fourth order integrates without error."""
     jump, inertia = 0.3137, 3 * (PAPER_BLADE.mass * (PAPER_BLADE.centre_of_mass[0] ** 2 + 15.42**2)) + 2e6
     scene = make_scene(
-        [0.1, 0, 0, 0], [0.2, 0, 0, 0], gravity=0.0, hub_inertia=2e6,
+        [0.1, 0.3, 0, 0], [0.2, 0, 0, 0], gravity=0.0, hub_inertia=2e6,
         bearing_stiffness=(1e12,) * 3, rotor_torque=((0.0, 1e5), (jump, 4e5), (jump, -2e5)),
     )  # fmt: skip
     # Blades on the axis cannot pitch: the rotor is one rigid body.
@@ -158,6 +158,7 @@ def test_torque_ramp_on_a_balanced_rotor() -> None:
     before = 0.1 + 0.2 * t + (1e5 * t**2 / 2 + slope * t**3 / 6) / inertia
     after = at_jump + rate_at_jump * (t - jump) - 1e5 * (t - jump) ** 2 / inertia
     assert np.abs(found.angles[:, 0] - np.where(t < jump, before, after)).max() < 1e-13
+    assert not found.potential_energy.any()  # the spring of a blade that cannot pitch has none
     work = 0.5 * inertia * (found.rates[:, 0] ** 2 - 0.2**2)
     assert np.abs(found.work - work).max() < 1e-11 * np.abs(work).max()
 
@@ -219,6 +220,13 @@ def test_kinks_are_stops_of_the_engine_and_samples_are_met() -> None:
     first, second = loads.segments(on_sample)
     assert first.at(first.end) == pytest.approx([5.0])
     assert second.at(second.end) == [2.0]
+
+
+def test_steps_and_evaluations_are_counted() -> None:
+    scene = make_scene([0.1, 0, 0, 0], [0.2, 0, 0, 0], duration=0.5, samples=51)
+    for integrator, stages in (("rk4", 4), ("implicitfast", 1)):
+        report = MujocoSolver(scene, integrator, 1.1e-3).integrate()
+        assert (report.steps, report.rhs_evaluations, report.time_reached) == (500, 500 * stages, 0.5)
 
 
 def test_repeats_are_bit_identical() -> None:

@@ -36,10 +36,9 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 _CPU_LIMIT_S, _RUN_LIMIT_S = 15, 5.0  # of a mutant, whatever else the machine does, and of each run in it
-# What is imported anew: what a mutant may be in, and what may have bound names of it.
-_UPPER = ("rotor_mbs.studies", "rotor_mbs.cli", "support.checking")
-_ANEW = {"rules": ("rotor_mbs.solution", "rotor_mbs.analysis", *_UPPER)}
-_ANEW_ELSE = ("rotor_mbs.models", "rotor_mbs.methods", *_UPPER)
+# What is not imported anew for a mutant: what knows neither its module nor anything that does.
+_KEPT = {"rules": ("rotor_mbs.errors", "rotor_mbs.scenario")}
+_KEPT_ELSE = ("rotor_mbs.errors", "rotor_mbs.scenario", "rotor_mbs.solution")
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,8 @@ class Mutant:
 
 
 _M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
-TARGETS = (
+_J = "rotor_mbs.models.mujoco"
+_TARGETS = (
     Target("lagrange", f"{_L}.closed_form", ("accelerations", "power", "energies", "_kinetic", "point_path")),
     Target(
         "lagrange",
@@ -118,6 +118,25 @@ TARGETS = (
         1e-2,
     ),
     Target("chain", f"{_M}.readings", ("_joint_motion", "_dot", "unwrap"), 1e-2),
+    # A thousandth: of fourth order, this model is bound to 1e-8.
+    Target(
+        "mujoco", f"{_J}.mjcf", ("moving", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
+    ),
+    Target("mujoco", f"{_J}.loads", ("at", "loaded", "segments", "_line", "intervals", "steps_and_rows"), 1e-3),
+    Target(
+        "mujoco",
+        f"{_J}.solver",
+        (
+            "_advance",
+            "_kinetic_energy",
+            "_potential_energy",
+            "_work",
+            "_work_needs_rows",
+            "_dampings",
+            "_spring_energy",
+        ),
+        1e-3,
+    ),
     Target(
         "rules",
         "rotor_mbs.solution.judgement",
@@ -157,14 +176,27 @@ TARGETS = (
     ),
 )
 
+# An engine that is not installed has no mutants.
+TARGETS = tuple(one for one in _TARGETS if one.group != "mujoco" or importlib.util.find_spec("mujoco"))
+
 
 # What sees the mutants of a module that no verdict can see.
 _PARTS = "models/test_exudyn_parts.py::test_"
+_MUJOCO = "models/test_mujoco.py::test_"
 _TESTS = {
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
     f"{_M}.readings": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
     f"{_M}.timetable": (f"{_PARTS}integration_intervals_meet_samples_and_kinks",),
     f"{_M}.tree": ("solution/test_judgement_messages.py",),
+    f"{_J}.mjcf": (
+        f"{_MUJOCO}point_masses_have_no_inertia_that_the_scene_does_not_give",
+        f"{_MUJOCO}an_inertia_at_the_limit_of_the_triangle_inequality",
+    ),
+    f"{_J}.loads": (
+        f"{_MUJOCO}kinks_are_stops_of_the_engine_and_samples_are_met",
+        f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
+    ),
+    f"{_J}.solver": (f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form",),
     "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py",),
     f"{_M}.energy": (f"{_PARTS}cumulative_integral_is_exact_for_quintics_on_uneven_rows", "models/test_exudyn_work.py"),
 }
@@ -175,11 +207,7 @@ _TESTS = {
 
 def mutants(target: Target) -> list[Mutant]:
     """In the order of the source."""
-    spec = importlib.util.find_spec(target.module)
-    assert spec is not None
-    assert spec.origin is not None
-    text = Path(spec.origin).read_text()
-    tree = ast.parse(text)
+    tree = ast.parse(_source(target.module))
     found = []
     for name, scope in _scopes(tree):
         if name in target.names or target.names == ("*",):
@@ -189,6 +217,10 @@ def mutants(target: Target) -> list[Mutant]:
                     source = functools.partial(_changed, tree, scope, number, change)
                     found.append(Mutant(target.group, target.module, name, where, source))
     return found
+
+
+def _source(module: str) -> str:
+    return (ROOT / (module.replace(".", "/") + ".py")).read_text()
 
 
 Scope = ast.FunctionDef | ast.Assign
@@ -388,6 +420,7 @@ def _verdicts_of(group: str) -> Iterator[list[Any]]:
                       (("check/held",), "exudyn_chain/generalized_alpha")],
         "chain": [(("check/held",), "exudyn_chain/generalized_alpha"),
                   (("check/general",), "exudyn_chain/generalized_alpha")],
+        "mujoco": [(("check/held",), "mujoco/rk4"), (("check/general",), "mujoco/rk4")],
         "rules": [],
     }  # fmt: skip
     from support.checking import judged, results_file
@@ -420,23 +453,29 @@ class _Finder:
 
 
 def _forget(group: str) -> None:
-    for name in [name for name in sys.modules if name.startswith(_ANEW.get(group, _ANEW_ELSE))]:
-        del sys.modules[name]
+    kept = _KEPT.get(group, _KEPT_ELSE)
+    for name in [name for name in sys.modules if name.startswith(("rotor_mbs.", "support."))]:
+        if not name.startswith(kept):
+            del sys.modules[name]
 
 
 def _outcome(mutant: Mutant) -> str:
     """Which verdict failed first, or which test; "" where none did."""
-    _forget(mutant.group)
-    sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            for verdicts in _verdicts_of(mutant.group):
-                for verdict in verdicts:
-                    if not verdict.passed:
-                        return f"{verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}"
-            return _test_that_fails(mutant.module)
+            return _verdict_that_fails(mutant) or _test_that_fails(mutant.module)
     except BaseException as exc:
         return f"raised {type(exc).__name__}: {str(exc)[:60]}"
+
+
+def _verdict_that_fails(mutant: Mutant) -> str:
+    _forget(mutant.group)
+    sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
+    for verdicts in _verdicts_of(mutant.group):
+        for verdict in verdicts:
+            if not verdict.passed:
+                return f"{verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}"
+    return ""
 
 
 def _test_that_fails(module: str) -> str:
@@ -457,6 +496,17 @@ def _in_a_child(mutant: Mutant) -> tuple[int, int]:
     with os.fdopen(write, "w") as pipe:
         pipe.write(_outcome(mutant) or "survived")
     os._exit(0)
+
+
+def prove_control(target: Target) -> None:
+    """Raises SystemExit where a module with its own text, imported anew like a mutant, does not pass every verdict."""
+    unchanged = Mutant(target.group, target.module, "*", "unchanged", lambda: _source(target.module))
+    process = os.fork()
+    if not process:
+        noticed = _verdict_that_fails(unchanged)
+        os._exit(bool(noticed))
+    if os.waitpid(process, 0)[1]:
+        raise SystemExit(f"{target.module}, imported anew and unchanged, does not pass")
 
 
 def run(chosen: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
@@ -482,6 +532,8 @@ def warm_up() -> None:
     """Loads the engines, and proves that without a change every verdict passes."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
     importlib.import_module("rotor_mbs.models.exudyn.adapter")
+    if importlib.util.find_spec("mujoco"):
+        importlib.import_module("mujoco")
     for name in (
         "scipy.integrate",
         "scipy.special",
@@ -499,11 +551,13 @@ def warm_up() -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Mutants of the models and rules, and which verdict notices each.")
-    parser.add_argument("groups", nargs="*", metavar="GROUP", help="lagrange, printed, multibody, chain, rules")
+    parser.add_argument("groups", nargs="*", metavar="GROUP", help="lagrange, printed, multibody, chain, mujoco, rules")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th mutant alone")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="at a time (default: %(default)s)")
     arguments = parser.parse_args()
     warm_up()
+    for target in {target.group: target for target in TARGETS}.values():
+        prove_control(target)
     start = time.monotonic()
     rows = []
     for mutant, noticed in run(all_mutants(arguments.groups, arguments.every), arguments.jobs):
