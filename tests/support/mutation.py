@@ -196,7 +196,11 @@ _TESTS = {
         f"{_MUJOCO}kinks_are_stops_of_the_engine_and_samples_are_met",
         f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
     ),
-    f"{_J}.solver": (f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form",),
+    f"{_J}.solver": (
+        f"{_MUJOCO}steps_and_evaluations_are_counted",
+        f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
+        f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form",
+    ),
     "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py",),
     f"{_M}.energy": (f"{_PARTS}cumulative_integral_is_exact_for_quintics_on_uneven_rows", "models/test_exudyn_work.py"),
 }
