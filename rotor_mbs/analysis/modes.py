@@ -67,6 +67,8 @@ def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
     Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential (-1)^i], with the
     blade's mounting angle ψ_i = 2π(i-1)/blades.
 
+    Source: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958.
+
     Examples
     --------
     >>> multiblade(3)[0]

@@ -1,4 +1,4 @@
-"""Linearized models: exact derivatives, exact cases, and closed form, tree and chain beside each other."""
+"""Linearized models: exact derivatives, exact cases, and closed form, tree, chain and MuJoCo beside each other."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from support.scenes import general
 
 from rotor_mbs.analysis.modes import modes_of
 from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.exudyn import linearization as engine
 from rotor_mbs.models.lagrange import linearization as closed
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -115,11 +116,14 @@ SOURCES = [
 
 
 @pytest.mark.parametrize(("scene", "speed"), SOURCES, ids=lambda value: getattr(value, "name", value))
-def test_closed_form_tree_and_chain_have_the_same_frequencies(scene, speed):
+def test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies(scene, speed):
     ours, angles, at = linear(scene, speed), state(scene, speed), without_gravity(scene, speed)
     others = [engine.linearize_tree(at, angles, speed, closed.holding_torque(scene, speed))]
     if not speed:
         others.append(engine.linearize_chain(at, angles))
+    third = find_method("mujoco/rk4")
+    if third.is_installed:
+        others.append(third.linearize(at, angles, speed, closed.holding_torque(scene, speed)))
     expected = frequencies(ours, scene, speed)
     significant = expected > 1e-6 * np.nanmax(expected)
     size = max(np.abs(ours.stiffness).max(), 1e-3)
