@@ -268,7 +268,7 @@ def test_integration_intervals_meet_samples_and_kinks() -> None:
     scene = replace(BARE, duration=1.0, samples=11, rotor_torque=((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0)))
     pieces = timetable.torque_segments(scene)
     assert [(p.start, p.torque_start) for p in pieces] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
-    assert pieces[1].torque_end == pytest.approx(2.0)
+    assert pieces[1].at(0.47) == pytest.approx(2.0)
     parts = timetable.integration_intervals(scene, pieces, every_sample=False)
     ends = [interval.end for interval in parts]
     assert np.allclose(ends, [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])

@@ -17,8 +17,8 @@ from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
 from rotor_mbs.models.exudyn import adapter, chain, readings
+from rotor_mbs.models.exudyn.methods import MultibodySolver
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.models.exudyn.solver import MultibodySolver
 from rotor_mbs.models.exudyn.timetable import RotorTorque
 from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene

@@ -77,7 +77,7 @@ class System:
             return _engine.HT(rotation=value.rotation, translation=value.position)
         if isinstance(value, tuple) and value and isinstance(value[0], Ref):
             return [self._numbers[ref] for ref in value]
-        return _TRANSLATIONS.get(key, _as_is)(value)
+        return _TRANSLATIONS[key](value) if key in _TRANSLATIONS else value
 
     def counts(self) -> dict[str, int]:
         """How many nodes, objects, markers, loads and sensors the engine holds."""
@@ -239,10 +239,6 @@ def _caused_by(exc: BaseException | None, kind: type[BaseException]) -> bool:
 def _one_line(text: str) -> str:
     lines = [line.strip(" =*+\t") for line in text.splitlines()]
     return "; ".join(line for line in lines if line)[:300]
-
-
-def _as_is(value: object) -> object:
-    return value
 
 
 _KINDS = ("node", "object", "marker", "load", "sensor")

@@ -1,4 +1,4 @@
-"""Energies of rigid bodies from their own masses, positions and velocities, and the work done on the rotor.
+"""Energy of the bearing springs, and the work done on the rotor.
 
 Knows no engine and no equations of motion.
 """
@@ -9,30 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotor_mbs.models.exudyn.geometry import Body, pitching
+from rotor_mbs.models.exudyn.geometry import pitching
 from rotor_mbs.models.exudyn.timetable import TorqueSegment
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
 
 # Points of the local polynomial that stands in for the power between rows.
 _POINTS = 6
-
-
-def translation_energy(body: Body, velocity: Array) -> Array:
-    """(n,) J from (n, 3) m/s of the centre of mass."""
-    energy: Array = 0.5 * body.mass * np.sum(velocity * velocity, axis=1)
-    return energy
-
-
-def rotation_energy(body: Body, spin: Array) -> Array:
-    """(n,) J from (n, 3) rad/s in the body's frame."""
-    energy: Array = 0.5 * np.sum(spin @ body.inertia * spin, axis=1)
-    return energy
-
-
-def gravity_energy(scene: Scene, body: Body, position: Array) -> Array:
-    """(n,) J from (n, 3) m of the centre of mass; zero at the height of the shaft."""
-    return body.mass * scene.gravity * position[:, 2]
 
 
 def spring_energy(scene: Scene, angles: Array) -> Array:

@@ -5,28 +5,30 @@ Listing what a method builds needs no engine; the engine is loaded when a system
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import Look, Method, Solver, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
-from rotor_mbs.methods.settings import Settings, choice
+from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.exudyn import blueprint, chain, readings, schemes, tree
 from rotor_mbs.models.exudyn.energy import work_needs_rows
-from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.models.exudyn.timetable import RotorTorque, TorqueSegment, integration_intervals
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.record import Item
+from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8
 _MOST_STEPS = 1e9
 
-MakeScheme = Callable[[Any], schemes.Scheme]
+Reading = Callable[[Scene, Sequence[TorqueSegment], Callable[[str], Array]], Trajectory]
 
 
 @dataclass(frozen=True)
@@ -40,42 +42,49 @@ class ChainNewmarkSettings(schemes.NewtonSettings):
     node: str = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
 
 
-def _tree_items(scene: Scene) -> list[Item]:
-    return blueprint.items(tree.parts(scene, RotorTorque(scene)))
+class MultibodySolver:
+    """See `rotor_mbs.methods.base.Solver`. rows_between: the reading needs rows between samples too.
+
+    Raises MethodRefusal, with the engine's reason, where the engine does not take the parts.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        parts: Sequence[blueprint.Part],
+        torque: RotorTorque,
+        scheme: schemes.Scheme,
+        reading: Reading,
+        rows_between: bool,
+    ) -> None:
+        from rotor_mbs.models.exudyn.adapter import System
+
+        self._scene, self._torque, self._scheme, self._reading = scene, torque, scheme, reading
+        self._rows_between = rows_between
+        self._intervals = integration_intervals(scene, torque.segments, every_sample=scheme.step is None)
+        self.system = System(parts)
+
+    def integrate(self) -> Integration:
+        """From the initial state, every time; bit for bit the same."""
+        return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._torque.enter)
+
+    def observe(self) -> Trajectory:
+        # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._reading(self._scene, self._torque.segments, self.system.rows)
 
 
-def _chain_items(scene: Scene) -> list[Item]:
-    return blueprint.items(chain.parts(scene, RotorTorque(scene), chain.NODES[0]))
+def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
+    scheme, torque = _scheme(scene, settings), RotorTorque(scene)
+    between = scene.wants("energy") and work_needs_rows(scene)
+    return MultibodySolver(scene, tree.parts(scene, torque), torque, scheme, readings.tree_trajectory, between)
 
 
-def _tree(make: MakeScheme) -> Callable[[Scene, Settings], Solver]:
-    """Builds the kinematic tree with one integrator."""
-
-    def build(scene: Scene, settings: Settings) -> Solver:
-        from rotor_mbs.models.exudyn.solver import MultibodySolver
-
-        scheme = _scheme(make, scene, settings)
-        torque = RotorTorque(scene)
-        between = scene.wants("energy") and work_needs_rows(scene)
-        parts = tree.parts(scene, torque)
-        return MultibodySolver(scene, parts, torque, scheme, readings.tree_trajectory, between)
-
-    return build
-
-
-def _chain(make: MakeScheme) -> Callable[[Scene, Any], Solver]:
-    """Builds the chain of rigid bodies with one integrator."""
-
-    def build(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
-        from rotor_mbs.models.exudyn.solver import MultibodySolver
-
-        scheme = _scheme(make, scene, settings)
-        torque = RotorTorque(scene)
-        parts = chain.parts(scene, torque, settings.node)
-        # Its angles are unwrapped from row to row, so rows are kept between samples.
-        return MultibodySolver(scene, parts, torque, scheme, readings.chain_trajectory, rows_between=True)
-
-    return build
+def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
+    scheme, torque = _scheme(scene, settings), RotorTorque(scene)
+    parts = chain.parts(scene, torque, settings.node)
+    # Its angles are unwrapped from row to row, so rows are kept between samples.
+    return MultibodySolver(scene, parts, torque, scheme, readings.chain_trajectory, rows_between=True)
 
 
 def _linearize_tree(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
@@ -92,23 +101,31 @@ def _linearize_chain(scene: Scene, angles: Any, speed: float, torque: float) -> 
     return linearize_chain(scene, angles)
 
 
-def _scheme(make: MakeScheme, scene: Scene, settings: Settings) -> schemes.Scheme:
+def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
     """Raises InputError for too short a step, MethodRefusal for a scene the engine cannot sample."""
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
         raise MethodRefusal(f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart")
-    scheme = make(settings)
+    scheme = settings.scheme()
     if scheme.step is not None and scene.duration / scheme.step > _MOST_STEPS:
         raise InputError(f"setting step: {scheme.step:g} s makes more than {_MOST_STEPS:g} steps")
     return scheme
 
 
-def _method(model: str, integrator: str, label: str, build: Callable[[Scene, Any], Solver], **facts: Any) -> Method:
+def _tree_items(scene: Scene) -> list[Item]:
+    return blueprint.items(tree.parts(scene, RotorTorque(scene)))
+
+
+def _chain_items(scene: Scene) -> list[Item]:
+    return blueprint.items(chain.parts(scene, RotorTorque(scene), chain.NODES[0]))
+
+
+def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
     """What all six have in common."""
     in_tree = model == "exudyn_tree"
     return Method(
         name=f"{model}/{integrator}",
         label=f"Exudyn {'tree' if in_tree else 'chain'}, {label}",
-        build=build,
+        build=_build_tree if in_tree else _build_chain,
         items=_tree_items if in_tree else _chain_items,
         distributions=("exudyn",),
         hint="pip install exudyn",
@@ -146,13 +163,13 @@ _NEWMARK_LADDERS = (
 
 METHODS = (
     _method(
-        "exudyn_tree", "rk44", "RK44", _tree(schemes.rk44),
+        "exudyn_tree", "rk44", "RK44",
         look=Look(_YELLOW, "-.", "P"), settings=schemes.Rk44Settings, order=4, fixed_step=True,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
         ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
     ),
     _method(
-        "exudyn_tree", "rk67", "RK67", _tree(schemes.rk67),
+        "exudyn_tree", "rk67", "RK67",
         look=Look(_ORANGE, "--", "s"), settings=schemes.Rk67Settings, order=6, fixed_step=True, is_default=True,
         # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
         # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
@@ -160,7 +177,7 @@ METHODS = (
         ladders=(step_ladder(8),), cost_scaling={"step": 1e-2}, linearize=_linearize_tree,
     ),
     _method(
-        "exudyn_tree", "dopri5", "DOPRI5", _tree(schemes.dopri5),
+        "exudyn_tree", "dopri5", "DOPRI5",
         look=Look(_ORANGE, "-", "<"), settings=schemes.Dopri5Settings,
         ladders=(
             tolerance_ladder(
@@ -171,18 +188,18 @@ METHODS = (
         cost_scaling={"relative_tolerance": 0.0, "absolute_tolerance": 1e-7},
     ),
     _method(
-        "exudyn_tree", "generalized_alpha", "generalized-α", _tree(schemes.generalized_alpha),
+        "exudyn_tree", "generalized_alpha", "generalized-α",
         look=Look(_YELLOW, "-", "^"), settings=schemes.AlphaSettings, order=2, fixed_step=True,
         ladders=_TREE_ALPHA_LADDERS, cost_scaling={"step": 1e-2},
     ),
     _method(
-        "exudyn_chain", "generalized_alpha", "generalized-α", _chain(schemes.generalized_alpha),
+        "exudyn_chain", "generalized_alpha", "generalized-α",
         look=Look(_GREEN, "-.", "^"), settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
         ladders=_CHAIN_ALPHA_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
         linearize=_linearize_chain,
     ),
     _method(
-        "exudyn_chain", "newmark_index2", "Newmark index 2", _chain(schemes.newmark_index2),
+        "exudyn_chain", "newmark_index2", "Newmark index 2",
         look=Look(_PURPLE, "-", "D"), settings=ChainNewmarkSettings, order=2, fixed_step=True,
         ladders=_NEWMARK_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
     ),

@@ -134,11 +134,14 @@ def _fields(
 
 
 def _add_energies(scene: Scene, fields: dict[str, Array], read: _Reader, name: str, body: Body) -> None:
+    """Of a body: ½ m v² and m g z of its centre of mass, ½ ω·J ω in its own frame."""
     if body.mass:
-        fields["kinetic_energy"] += energy.translation_energy(body, read.sampled(f"{name} velocity"))
-        fields["potential_energy"] += energy.gravity_energy(scene, body, read.sampled(f"{name} position"))
+        velocity, position = read.sampled(f"{name} velocity"), read.sampled(f"{name} position")
+        fields["kinetic_energy"] += 0.5 * body.mass * np.sum(velocity * velocity, axis=1)
+        fields["potential_energy"] += body.mass * scene.gravity * position[:, 2]
     if np.any(body.inertia):
-        fields["kinetic_energy"] += energy.rotation_energy(body, read.sampled(f"{name} spin"))
+        spin = read.sampled(f"{name} spin")
+        fields["kinetic_energy"] += 0.5 * np.sum(spin @ body.inertia * spin, axis=1)
 
 
 # From recorded rows to samples: which rows are samples, angles over many turns, where a run stopped being finite.

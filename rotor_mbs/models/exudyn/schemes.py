@@ -32,89 +32,88 @@ def step(default: float) -> Any:
     return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
 
 
-@dataclass(frozen=True)
-class Rk44Settings(Settings):
-    step: float = step(2.5e-4)
+class SchemeSettings(Settings):
+    """Settings of a method of this package, which make its scheme."""
 
-
-@dataclass(frozen=True)
-class Rk67Settings(Settings):
-    step: float = step(6.7e-4)
-
-
-@dataclass(frozen=True)
-class Dopri5Settings(Settings):
-    relative_tolerance: float = number(0.0, at_least=0.0, doc="of the local error")
-    absolute_tolerance: float = number(1e-11, above=0.0, doc="of the local error, rad and rad/s")
-    trial_steps: int = number(10_000, at_least=1, doc="trial steps between two samples after which a run is given up")
-
-
-@dataclass(frozen=True)
-class NewtonSettings(Settings):
-    """Of an implicit scheme."""
-
-    step: float = step(2.5e-4)
-    newton_relative_tolerance: float = number(1e-8, above=0.0, doc="of Newton's residual")
-    newton_absolute_tolerance: float = number(1e-10, above=0.0, doc="of Newton's residual")
-
-
-@dataclass(frozen=True)
-class AlphaSettings(NewtonSettings):
-    spectral_radius: float = number(0.9, at_least=0.0, at_most=1.0, doc="damping of high frequencies: 1 is none")
+    def scheme(self) -> Scheme:
+        raise NotImplementedError
 
 
 # Stage evaluations are all that is needed: one more at the end of a step would only serve to print accelerations.
 _EXPLICIT = {"explicit.computeEndOfStepAccelerations": False, "explicit.useLieGroupIntegration": False}
 
 
-def rk44(settings: Rk44Settings) -> Scheme:
+@dataclass(frozen=True)
+class Rk44Settings(SchemeSettings):
     """Classical Runge-Kutta, order 4."""
-    return Scheme("RK44", 4, _EXPLICIT, settings.step)
+
+    step: float = step(2.5e-4)
+
+    def scheme(self) -> Scheme:
+        return Scheme("RK44", 4, _EXPLICIT, self.step)
 
 
-def rk67(settings: Rk67Settings) -> Scheme:
+@dataclass(frozen=True)
+class Rk67Settings(SchemeSettings):
     """Butcher's seven stages, order 6."""
-    return Scheme("RK67", 7, _EXPLICIT, settings.step)
+
+    step: float = step(6.7e-4)
+
+    def scheme(self) -> Scheme:
+        return Scheme("RK67", 7, _EXPLICIT, self.step)
 
 
-def dopri5(settings: Dopri5Settings) -> Scheme:
+@dataclass(frozen=True)
+class Dopri5Settings(SchemeSettings):
     """Dormand-Prince 5(4) with the engine's step control.
 
     The engine scales the error by absolute + relative · max(x, x_new) and takes no magnitude of x: the scale vanishes
     at x = -absolute/relative, where a step may be refused for ever, or, where it is exactly zero, accepted whatever
     its error. With a relative tolerance of 0 both signs of x are treated alike, which is why that is the default.
     """
-    options = {
-        **_EXPLICIT,
-        "automaticStepSize": True,
-        "relativeTolerance": settings.relative_tolerance,
-        "absoluteTolerance": settings.absolute_tolerance,
-        "minimumStepSize": 1e-14,
-        "stepSizeMaxIncrease": 5.0,
-    }
-    return Scheme("DOPRI5", 7, options, None, settings.trial_steps)
+
+    relative_tolerance: float = number(0.0, at_least=0.0, doc="of the local error")
+    absolute_tolerance: float = number(1e-11, above=0.0, doc="of the local error, rad and rad/s")
+    trial_steps: int = number(10_000, at_least=1, doc="trial steps between two samples after which a run is given up")
+
+    def scheme(self) -> Scheme:
+        options = {
+            **_EXPLICIT,
+            "automaticStepSize": True,
+            "relativeTolerance": self.relative_tolerance,
+            "absoluteTolerance": self.absolute_tolerance,
+            "minimumStepSize": 1e-14,
+            "stepSizeMaxIncrease": 5.0,
+        }
+        return Scheme("DOPRI5", 7, options, None, self.trial_steps)
 
 
-def generalized_alpha(settings: AlphaSettings) -> Scheme:
+@dataclass(frozen=True)
+class NewtonSettings(SchemeSettings):
+    """The trapezoidal rule (Newmark), constraints at velocity level (index 2), order 2."""
+
+    step: float = step(2.5e-4)
+    newton_relative_tolerance: float = number(1e-8, above=0.0, doc="of Newton's residual")
+    newton_absolute_tolerance: float = number(1e-10, above=0.0, doc="of Newton's residual")
+
+    def scheme(self) -> Scheme:
+        return self._implicit({"generalizedAlpha.useNewmark": True, "generalizedAlpha.useIndex2Constraints": True})
+
+    def _implicit(self, options: Mapping[str, object]) -> Scheme:
+        """One Jacobian in each step costs less than the iterations that an old one takes."""
+        newton = {
+            "newton.relativeTolerance": self.newton_relative_tolerance,
+            "newton.absoluteTolerance": self.newton_absolute_tolerance,
+            "newton.modifiedNewtonJacUpdatePerStep": True,
+        }
+        return Scheme("GeneralizedAlpha", 0, {**newton, **options}, self.step)
+
+
+@dataclass(frozen=True)
+class AlphaSettings(NewtonSettings):
     """Generalized-alpha, constraints at position level (index 3), order 2."""
-    options = {**_newton(settings), "generalizedAlpha.spectralRadius": settings.spectral_radius}
-    return Scheme("GeneralizedAlpha", 0, options, settings.step)
 
+    spectral_radius: float = number(0.9, at_least=0.0, at_most=1.0, doc="damping of high frequencies: 1 is none")
 
-def newmark_index2(settings: NewtonSettings) -> Scheme:
-    """The trapezoidal rule, constraints at velocity level (index 2), order 2."""
-    options = {
-        **_newton(settings),
-        "generalizedAlpha.useNewmark": True,
-        "generalizedAlpha.useIndex2Constraints": True,
-    }
-    return Scheme("GeneralizedAlpha", 0, options, settings.step)
-
-
-def _newton(settings: NewtonSettings) -> dict[str, object]:
-    """Newton's tolerances; one Jacobian in each step costs less than the iterations that an old one takes."""
-    return {
-        "newton.relativeTolerance": settings.newton_relative_tolerance,
-        "newton.absoluteTolerance": settings.newton_absolute_tolerance,
-        "newton.modifiedNewtonJacUpdatePerStep": True,
-    }
+    def scheme(self) -> Scheme:
+        return self._implicit({"generalizedAlpha.spectralRadius": self.spectral_radius})

@@ -9,11 +9,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
+
+Time = TypeVar("Time", float, Array)
 
 # A kink closer to a sample than this share of the sample interval is taken to be on it.
 _ALIGNED = 1e-6
@@ -23,24 +26,16 @@ _ROWS = 10
 
 @dataclass(frozen=True)
 class TorqueSegment:
-    """Rotor torque in N m on [start, end] s, linear between its two ends."""
+    """Rotor torque on [start, end] s: torque_start (N m) at its start, and a slope (N m/s)."""
 
     start: float
     end: float
     torque_start: float
-    torque_end: float
+    slope: float
 
-    def at(self, time: Array) -> Array:
-        """(n,) N m at (n,) s."""
-        return self.torque_start + self._slope * (time - self.start)
-
-    def torque_at(self, time: float) -> float:
-        """N m at one time in s."""
-        return self.torque_start + self._slope * (time - self.start)
-
-    @property
-    def _slope(self) -> float:
-        return (self.torque_end - self.torque_start) / (self.end - self.start)
+    def at(self, time: Time) -> Time:
+        """N m at one time in s, or at (n,) times."""
+        return self.torque_start + self.slope * (time - self.start)
 
 
 @dataclass(frozen=True)
@@ -63,11 +58,15 @@ class RotorTorque:
         self.segments = torque_segments(scene)
         self.segment = self.segments[0]
 
+    def enter(self, interval: IntegrationInterval) -> None:
+        """From now on the torque of that interval acts."""
+        self.segment = interval.segment
+
     def scalar(self, _system: object, time: float, _load: float) -> float:
-        return self.segment.torque_at(time)
+        return self.segment.at(time)
 
     def vector(self, _system: object, time: float, _load: object) -> list[float]:
-        return [0.0, self.segment.torque_at(time), 0.0]
+        return [0.0, self.segment.at(time), 0.0]
 
 
 def torque_segments(scene: Scene) -> tuple[TorqueSegment, ...]:
@@ -77,7 +76,8 @@ def torque_segments(scene: Scene) -> tuple[TorqueSegment, ...]:
     segments = []
     for start, end in itertools.pairwise(knots):
         first, middle = scene.torque_at(start), scene.torque_at(0.5 * (start + end))
-        segments.append(TorqueSegment(start, end, first, 2.0 * middle - first))
+        last = 2.0 * middle - first
+        segments.append(TorqueSegment(start, end, first, (last - first) / (end - start)))
     return tuple(segments)
 
 
