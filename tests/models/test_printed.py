@@ -29,6 +29,13 @@ def constants(rng):
     return rng.uniform(0.5, 2.0, 4).tolist()
 
 
+def mass_matrix(rotor, angles):
+    blades = rotor.blades(angles)
+    matrix = np.diag([sum(terms.d_22 for terms in blades), *(terms.d_33 for terms in blades)])
+    matrix[0, 1:] = matrix[1:, 0] = [terms.d_23 for terms in blades]
+    return matrix
+
+
 @pytest.mark.parametrize("blades", [1, 3])
 def test_literal_text_is_the_derivation_with_nothing_mended(blades):
     rng = np.random.default_rng(1)
@@ -40,7 +47,7 @@ def test_literal_text_is_the_derivation_with_nothing_mended(blades):
         rotor = DerivedRotor(m, c, d, g, phases(blades), AS_PRINTED)
         derived = np.array(rotor.accelerations(torque, angles, rates))
         # Rounding, some 1e-15, times the condition of the mass matrix, which is singular at a pitch of ±π/2.
-        bound = 1e-14 * np.linalg.cond(rotor.mass_matrix(angles)) * max(1.0, np.abs(derived).max())
+        bound = 1e-14 * np.linalg.cond(mass_matrix(rotor, angles)) * max(1.0, np.abs(derived).max())
         assert bound < 1e-2 * max(1.0, np.abs(derived).max())
         np.testing.assert_allclose(text(m, c, d, g, torque, angles + rates), derived, rtol=0.0, atol=bound)
 
@@ -137,8 +144,8 @@ def test_one_blade_has_the_square_and_three_have_not():
 
 def test_mass_matrix_is_singular_where_the_pitch_is_a_right_angle():
     one = DerivedRotor(M, C, D, G, (0.0,))
-    assert np.linalg.det(one.mass_matrix([0.3, 0.5])) > 1.0
-    assert np.linalg.cond(one.mass_matrix([0.3, math.pi / 2.0])) > 1e15
+    assert np.linalg.det(mass_matrix(one, [0.3, 0.5])) > 1.0
+    assert np.linalg.cond(mass_matrix(one, [0.3, math.pi / 2.0])) > 1e15
 
 
 @pytest.mark.parametrize("name", GRAVITY_ROWS)

@@ -14,14 +14,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotor_mbs.models.printed import matrices
 from rotor_mbs.models.printed.matrices import AS_PRINTED, Errata, Matrix
-
-Array = NDArray[np.float64]
-PseudoInertia = tuple[tuple[int, int, float], ...]
 
 
 class BladeTerms(NamedTuple):
@@ -45,18 +39,11 @@ class BladeTerms(NamedTuple):
     gravity_3: float
 
 
-def pseudo_inertia(m: float) -> PseudoInertia:
-    """J3 of (20) for a point mass m (kg) in the origin of frame 3: what is not zero, as (row, column, value)."""
-    return ((3, 3, m),)
-
-
-def trace(u: Matrix, inertia: PseudoInertia, v: Matrix) -> float:
-    """Trace of U J Vᵀ, as in (24) and (26)."""
+def trace(u: Matrix, m: float, v: Matrix) -> float:
+    """Trace of U J3 Vᵀ, as in (24) and (26); J3 of (20) is that of a point mass m (kg) in the origin of frame 3."""
     u0, u1, u2, _ = u  # the last row of a derivative is zero
     v0, v1, v2, _ = v
-    total = 0.0
-    for a, b, value in inertia:
-        total += value * (u0[a] * v0[b] + u1[a] * v1[b] + u2[a] * v2[b])
+    total: float = m * (u0[3] * v0[3] + u1[3] * v1[3] + u2[3] * v2[3])
     return total
 
 
@@ -65,7 +52,6 @@ def blade_terms(
 ) -> BladeTerms:
     """(24), (26), (27), (31) for one blade whose own rotor angle is q2."""
     s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
-    j3 = pseudo_inertia(m)
     u2 = matrices.u32(s2, c2, s3, c3, c, d, errata)
     u3 = matrices.u33(s2, c2, s3, c3, c)
     u22 = matrices.u32_2(s2, c2, s3, c3, c, d)
@@ -73,15 +59,15 @@ def blade_terms(
     u32 = matrices.u33_2(s2, c2, s3, c3, c)
     u33 = matrices.u33_3(s2, c2, s3, c3, c, errata)
     return BladeTerms(
-        d_22=trace(u2, j3, u2),
-        d_23=trace(u3, j3, u2),
-        d_33=trace(u3, j3, u3),
-        h_2_22=trace(u22, j3, u2),
-        h_2_23=trace(u23, j3, u2) + trace(u32, j3, u2),
-        h_2_33=trace(u33, j3, u2),
-        h_3_22=trace(u22, j3, u3),
-        h_3_23=trace(u23, j3, u3) + trace(u32, j3, u3),
-        h_3_33=trace(u33, j3, u3),
+        d_22=trace(u2, m, u2),
+        d_23=trace(u3, m, u2),
+        d_33=trace(u3, m, u3),
+        h_2_22=trace(u22, m, u2),
+        h_2_23=trace(u23, m, u2) + trace(u32, m, u2),
+        h_2_33=trace(u33, m, u2),
+        h_3_22=trace(u22, m, u3),
+        h_3_23=trace(u23, m, u3) + trace(u32, m, u3),
+        h_3_33=trace(u33, m, u3),
         gravity_2=m * g * u2[2][3],  # (31): gravity (0, 0, -g, 0), the mass in the origin of frame 3
         gravity_3=m * g * u3[2][3],
     )
@@ -114,13 +100,6 @@ class DerivedRotor:
             last = v3 if self._first_power else v3 * v3
             pitches.append(terms.h_3_22 * v2 * v2 + terms.h_3_23 * v2 * v3 + terms.h_3_33 * last + terms.gravity_3)
         return rotor, pitches
-
-    def mass_matrix(self, angles: Sequence[float]) -> Array:
-        """D, (1 + blades, 1 + blades), kg m²."""
-        blades = self.blades(angles)
-        matrix = np.diag([sum(terms.d_22 for terms in blades), *(terms.d_33 for terms in blades)])
-        matrix[0, 1:] = matrix[1:, 0] = [terms.d_23 for terms in blades]
-        return matrix
 
     def accelerations(self, torque: float, angles: Sequence[float], rates: Sequence[float]) -> list[float]:
         """τ = D q̈ + H + C solved for q̈ (rad/s²), the pitches eliminated one by one; torque on the rotor in N m."""

@@ -8,14 +8,15 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Look, Method
 from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.ode45 import Ode45Result, Ode45Settings, RightHandSide, ode45
-from rotor_mbs.models.printed import literal, observables
-from rotor_mbs.models.printed.blades import PointMassRotor, point_mass_rotor
+from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import Errata
+from rotor_mbs.models.printed.observables import PointMassRotor, torque_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
 
@@ -65,19 +66,14 @@ class PrintedSolver:
         fine = {"refined_time": refined_time, "refined_angles": fine_angles, "refined_rates": fine_rates}
         trajectory = Trajectory(time, angles, rates, **fine)
         if scene.wants("tip"):
-            trajectory.tip = observables.tip_path(rotor, angles)
+            trajectory.tip = rotor.tip_path(angles)
         if scene.wants("energy"):
-            trajectory.kinetic_energy = observables.kinetic_energy(rotor, angles, rates)
-            trajectory.potential_energy = observables.potential_energy(rotor, angles)
-            trajectory.work = self._work(result, time)
+            trajectory.kinetic_energy = rotor.kinetic_energy(angles, rates)
+            trajectory.potential_energy = rotor.potential_energy(angles)
+            trajectory.work = np.zeros(len(time))
+            if scene.has_torque:
+                trajectory.work = torque_work(scene.rotor_torque, lambda t: result.at(t)[:, 0], result.time, time)
         return trajectory
-
-    def _work(self, result: Ode45Result, time: Array) -> Array:
-        if not self._scene.has_torque:
-            return np.zeros(len(time))
-        return observables.torque_work(
-            self._scene.rotor_torque, lambda times: result.at(times)[:, 0], result.time, time
-        )
 
     def _coordinates(self, states: Array) -> tuple[Array, Array]:
         """Angles and rates, (n, 1 + blades) each, of states of what moves; a fixed pitch stays where it started."""
@@ -127,7 +123,25 @@ class PrintedModel:
         return PrintedSolver(scene, rotor, self._accelerations(rotor, row), *tolerances)
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
-        return point_mass_rotor(self._name, scene, blade_counts=() if self._errata else (1, 3))
+        """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
+        blade, name, count = scene.blades[0], self._name, len(scene.blades)
+        x, y, z = blade.centre_of_mass
+        refusals = {
+            f"{name} is printed for 1 or 3 blades, the scene has {count}": not self._errata and count not in (1, 3),
+            f"{name} needs blades that are all alike": any(other != blade for other in scene.blades),
+            f"{name} needs point-mass blades: no inertia about the centre of mass": not blade.is_point_mass,
+            f"{name} needs the centre of mass in the blade's x-z plane: y = 0, not {y:g}": y != 0.0,
+            f"{name} has no hub inertia: it must be 0, not {scene.hub_inertia:g}": scene.hub_inertia != 0.0,
+            f"{name} has no bearing stiffness or damping: they must be 0": (
+                any(scene.bearing_stiffness) or any(scene.bearing_damping)
+            ),
+            f"{name} has no shaft damping: it must be 0, not {scene.shaft_damping:g}": scene.shaft_damping != 0.0,
+        }
+        for sentence, refused in refusals.items():
+            if refused:
+                raise MethodRefusal(sentence)
+        tip = (blade.tip[0] - x, blade.tip[1] - y, blade.tip[2] - z)
+        return PointMassRotor(blade.mass, x, z, scene.gravity, scene.phases, tip)
 
     def _accelerations(self, rotor: PointMassRotor, row: str) -> Accelerations:
         m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g

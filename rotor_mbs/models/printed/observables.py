@@ -7,12 +7,12 @@ sum less the work of the torque tells how much energy those equations make.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.models.printed import matrices
-from rotor_mbs.models.printed.blades import PointMassRotor
 from rotor_mbs.models.printed.matrices import CORRECTED
 
 Array = NDArray[np.float64]
@@ -22,33 +22,56 @@ _GAUSS_POINTS = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
 _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 
-def tip_path(rotor: PointMassRotor, angles: Array) -> Array:
-    """(n, blades, 3) m, base frame, of angles (n, 1 + blades) rad: (3) applied to the tip as frame 3 sees it."""
-    x, y, z = rotor.tip
-    paths = []
-    for sines in _sines(rotor, angles):
-        rows = matrices.a3(*sines, rotor.c, rotor.d)[:3]
-        paths.append(np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in rows], axis=-1))
-    return np.stack(paths, axis=1)
+@dataclass(frozen=True, slots=True)
+class PointMassRotor:
+    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²).
 
+    phases   (blades,) rad
+    tip      (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame
+    """
 
-def kinetic_energy(rotor: PointMassRotor, angles: Array, rates: Array) -> Array:
-    """(n,) J: ½ m v² with v from the last columns of (8), E1 corrected, and (9)."""
-    total = np.zeros(len(angles))
-    for pitch, sines in enumerate(_sines(rotor, angles), start=1):
-        u32 = matrices.u32(*sines, rotor.c, rotor.d, CORRECTED)
-        u33 = matrices.u33(*sines, rotor.c)
-        for by_q2, by_q3 in zip(u32[:3], u33[:3], strict=True):
-            total += 0.5 * rotor.m * (by_q2[3] * rates[:, 0] + by_q3[3] * rates[:, pitch]) ** 2
-    return total
+    m: float
+    c: float
+    d: float
+    g: float
+    phases: tuple[float, ...]
+    tip: tuple[float, float, float]
 
+    @property
+    def pitches_move(self) -> bool:
+        """c = 0 takes the inertia out of (47): the pitch is then fixed (Fig. 4b)."""
+        return self.c != 0.0
 
-def potential_energy(rotor: PointMassRotor, angles: Array) -> Array:
-    """(n,) J, zero at the height of the shaft."""
-    total = np.zeros(len(angles))
-    for sines in _sines(rotor, angles):
-        total += rotor.m * rotor.g * matrices.a3(*sines, rotor.c, rotor.d)[2][3]
-    return total
+    def tip_path(self, angles: Array) -> Array:
+        """(n, blades, 3) m, base frame, of angles (n, 1 + blades) rad: (3) applied to the tip as frame 3 sees it."""
+        x, y, z = self.tip
+        paths = []
+        for sines in self._sines(angles):
+            rows = matrices.a3(*sines, self.c, self.d)[:3]
+            paths.append(np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in rows], axis=-1))
+        return np.stack(paths, axis=1)
+
+    def kinetic_energy(self, angles: Array, rates: Array) -> Array:
+        """(n,) J: ½ m v² with v from the last columns of (8), E1 corrected, and (9)."""
+        total = np.zeros(len(angles))
+        for pitch, sines in enumerate(self._sines(angles), start=1):
+            u32 = matrices.u32(*sines, self.c, self.d, CORRECTED)
+            u33 = matrices.u33(*sines, self.c)
+            for by_q2, by_q3 in zip(u32[:3], u33[:3], strict=True):
+                total += 0.5 * self.m * (by_q2[3] * rates[:, 0] + by_q3[3] * rates[:, pitch]) ** 2
+        return total
+
+    def potential_energy(self, angles: Array) -> Array:
+        """(n,) J, zero at the height of the shaft."""
+        total = np.zeros(len(angles))
+        for sines in self._sines(angles):
+            total += self.m * self.g * matrices.a3(*sines, self.c, self.d)[2][3]
+        return total
+
+    def _sines(self, angles: Array) -> list[tuple[Array, Array, Array, Array]]:
+        """s2, c2, s3, c3 of every blade, each (n,)."""
+        turns = [(angles[:, 0] + phase, angles[:, 1 + i]) for i, phase in enumerate(self.phases)]
+        return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]
 
 
 def torque_work(
@@ -82,9 +105,3 @@ def _torque_between(breaks: Array, values: Array, start: Array, end: Array) -> t
     span = breaks[after] - breaks[before]
     slope = np.divide(values[after] - values[before], span, out=np.zeros_like(span), where=span > 0.0)
     return values[before] + slope * (start - breaks[before]), values[before] + slope * (end - breaks[before])
-
-
-def _sines(rotor: PointMassRotor, angles: Array) -> list[tuple[Array, Array, Array, Array]]:
-    """s2, c2, s3, c3 of every blade, each (n,)."""
-    turns = [(angles[:, 0] + phase, angles[:, 1 + i]) for i, phase in enumerate(rotor.phases)]
-    return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]
