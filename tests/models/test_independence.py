@@ -31,12 +31,13 @@ def python(code: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("method", "blocked"),
     [
-        ("lagrange/dop853", ["exudyn", "heyoka"]),
-        ("lagrange/taylor", ["exudyn", "scipy"]),
-        ("reference", ["exudyn", "heyoka"]),
-        ("exudyn_tree/rk67", ["heyoka", "scipy"]),
-        ("exudyn_chain/generalized_alpha", ["heyoka", "scipy"]),
-        ("printed/ode45", ["heyoka", "scipy", "exudyn"]),
+        ("lagrange/dop853", ["exudyn", "heyoka", "mujoco"]),
+        ("lagrange/taylor", ["exudyn", "scipy", "mujoco"]),
+        ("reference", ["exudyn", "heyoka", "mujoco"]),
+        ("exudyn_tree/rk67", ["heyoka", "scipy", "mujoco"]),
+        ("exudyn_chain/generalized_alpha", ["heyoka", "scipy", "mujoco"]),
+        ("printed/ode45", ["heyoka", "scipy", "exudyn", "mujoco"]),
+        ("mujoco/rk4", ["heyoka", "scipy", "exudyn"]),
     ],
 )
 def test_a_model_runs_without_the_other_engines(
@@ -44,7 +45,9 @@ def test_a_model_runs_without_the_other_engines(
 ) -> None:
     if method == "lagrange/taylor":
         pytest.importorskip("heyoka")
-    others = [m for m in ("printed", "lagrange", "exudyn") if m != _package(method)]
+    if method.startswith("mujoco"):
+        pytest.importorskip("mujoco")
+    others = [m for m in ("printed", "lagrange", "exudyn", "mujoco") if m != _package(method)]
     more = "\n".join(f"assert 'rotor_mbs.models.{other}' not in sys.modules" for other in others)
     tests = str(request.path.parents[1])
     done = python(PREAMBLE.format(blocked=blocked, tests=tests, method=method, more=more))
@@ -53,7 +56,7 @@ def test_a_model_runs_without_the_other_engines(
 
 def _package(method: str) -> str:
     model = method.split("/")[0]
-    return {"printed": "printed", "lagrange": "lagrange", "reference": "lagrange"}.get(model, "exudyn")
+    return {"exudyn_tree": "exudyn", "exudyn_chain": "exudyn", "reference": "lagrange"}.get(model, model)
 
 
 def test_taylor_without_heyoka_says_how_to_get_it(tmp_path: Path) -> None:

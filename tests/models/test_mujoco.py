@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -270,23 +268,6 @@ def test_only_what_the_scene_asks_for_is_built() -> None:
     found = run(less)
     assert found.tip is None
     assert found.work is None
-
-
-def test_it_runs_without_any_other_engine_or_model(request: pytest.FixtureRequest) -> None:
-    code = f"""
-import sys
-blocked = ["exudyn", "heyoka", "scipy"]
-for name in blocked:
-    sys.modules[name] = None
-sys.path.insert(0, {str(request.path.parents[1])!r})
-from support.scenes import paper
-from rotor_mbs.models.mujoco.solver import MujocoSolver
-solver = MujocoSolver(paper("fig08", duration=0.5, samples=11), "rk4", 1e-3)
-assert solver.integrate().success and len(solver.observe().time) == 11
-assert not any(name.startswith("rotor_mbs.models.") and "mujoco" not in name for name in sys.modules)
-"""
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
 
 
 def test_a_turned_rotor_with_renamed_blades_moves_the_same() -> None:

@@ -43,7 +43,7 @@ def test_an_impossible_step_is_refused(method: str) -> None:
         find_method(method).build(paper("fig03"), find_method(method).settings(step=1e-12))
 
 
-def test_a_run_from_the_command_line_is_stored_and_judged(tmp_path: Path) -> None:
+def test_a_run_from_the_command_line_is_stored_judged_and_drawn(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     from rotor_mbs.cli import main
 
@@ -55,6 +55,9 @@ def test_a_run_from_the_command_line_is_stored_and_judged(tmp_path: Path) -> Non
         assert np.isfinite(run.array("kinetic_energy")).all()
         assert run.array("tip").shape == (references.scene("check/held").samples, 4, 3)
     assert main(["check", str(path), "--require", "mujoco/rk4"]) == 0
+    assert main(["report", str(path), "-o", str(tmp_path / "report")]) == 0
+    (page,) = (tmp_path / "report").rglob("*held*.html")
+    assert "MuJoCo, RK4" in page.read_text(encoding="utf-8")
 
 
 def test_without_mujoco_it_says_how_to_get_it(tmp_path: Path) -> None:
