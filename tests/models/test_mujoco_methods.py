@@ -36,6 +36,7 @@ def test_its_runs_are_within_their_bounds(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_impossible_step_is_refused(method: str) -> None:
+    pytest.importorskip("mujoco")
     for step in (0.0, -1e-3, float("nan"), "fast"):
         with pytest.raises(InputError, match="step"):
             solve(method, paper("fig03"), {"step": step})
