@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,15 +13,15 @@ from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.report import paper_figures
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, write_pages
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
-from rotor_mbs.report.pages.walk import WalkFigure, WalkPage
+from rotor_mbs.report.paper_figures import PaperFigure, available
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import Results, StoredScene, open_results
 
+Part = str | PaperFigure  # a scene by its name, or a figure of the paper
 _BATCHES = 2  # per worker
 _TIMEOUT_S = 600.0
 
@@ -40,22 +40,6 @@ class Context:
     has_errata: bool
 
 
-@dataclass(frozen=True)
-class PageBatch:
-    """Some scenes and some figures of the paper, to be rendered by one task."""
-
-    scenes: tuple[str, ...]
-    figures: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Rendered:
-    """pages: HTML by scene."""
-
-    pages: dict[str, str]
-    figures: list[WalkFigure]
-
-
 def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
     """Write the pages about the results file into the folder `output`, with `jobs` processes.
 
@@ -64,17 +48,17 @@ def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
     """
     with open_results(results) as opened:
         context, pages, figures = _prepared(opened)
-    found = _render(context, figures, jobs)
-    if found.figures:
-        in_order = sorted(found.figures, key=lambda figure: int(figure.number))
-        pages[WALK] = render("walk", WalkPage(in_order, context.has_errata))
-    pages |= {context.files[scene]: text for scene, text in found.pages.items()}
+    parts = _parts(context, figures, jobs)
+    if figures:
+        walk = [parts[figure] for figure in figures]
+        pages[WALK] = render("walk", {"figures": walk, "has_errata": context.has_errata})
+    pages |= {file: str(parts[scene]) for scene, file in context.files.items()}
     write_pages(output, pages)
     return output / INDEX
 
 
-def _prepared(opened: Results) -> tuple[Context, dict[str, str], tuple[str, ...]]:
-    """The context, the pages that need the whole file, and the numbers of the figures that it has."""
+def _prepared(opened: Results) -> tuple[Context, dict[str, str], tuple[PaperFigure, ...]]:
+    """The context, the pages that need the whole file, and the figures that it has."""
     scenes = {name: opened.scenes[name] for name in natural_order(opened.scenes)}
     if not scenes:
         raise StoreError(f"{opened.path}: no scene in it, nothing to report")
@@ -83,7 +67,7 @@ def _prepared(opened: Results) -> tuple[Context, dict[str, str], tuple[str, ...]
     conditions = published.conditions() if decided else {}
     entries = errata_analysis.entries(opened)
     errata = published.errata() if entries or _has_printed_model(scenes) else ()
-    figures = tuple(one.number for one in paper_figures.available(scenes))
+    figures = available(scenes)
     index = index_page(opened, scenes, files, decided, conditions, errata, has_walk=bool(figures))
     pages = {INDEX: render("index", index)}
     if errata:
@@ -96,43 +80,41 @@ def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
     return any(name in scene.methods for scene in scenes.values() for name in printed)
 
 
-def _render(context: Context, figures: tuple[str, ...], jobs: int) -> Rendered:
+def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int) -> dict[Part, object]:
     """All scenes and figures, in `jobs` processes (in this one where it is 1)."""
-    workers = min(jobs, len(context.files) + len(figures))
-    work = partial(render_batch, context)
-    scenes = tuple(context.files)
+    parts: list[Part] = [*context.files, *figures]
+    workers = min(jobs, len(parts))
+    work = partial(make_parts, context)
     if workers <= 1:
-        return work(PageBatch(scenes, figures))
+        return work(parts)
     # More batches than workers, so that none waits long for the last one; each batch opens the file.
     count = _BATCHES * workers
-    batches = [PageBatch(scenes[start::count], figures[start::count]) for start in range(count)]
-    found = Rendered({}, [])
-    for finished in run_tasks(work, batches, workers, _TIMEOUT_S):
+    found: dict[Part, object] = {}
+    for finished in run_tasks(work, [parts[start::count] for start in range(count)], workers, _TIMEOUT_S):
         if finished.value is None:
             raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")
-        found.pages.update(finished.value.pages)
-        found.figures.extend(finished.value.figures)
+        found |= finished.value
     return found
 
 
-def render_batch(context: Context, batch: PageBatch) -> Rendered:
-    """The task of a worker. Raises StoreError."""
+def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, object]:
+    """The task of a worker: the page of each scene, and the content of each figure. Raises StoreError."""
     from rotor_mbs.report.pages.scene import scene_page  # late: matplotlib, in the workers alone
     from rotor_mbs.report.pages.walk import walk_figure
 
     names = list(context.files)
     neighbours = dict(zip(names, zip(["", *names], [*names[1:], ""], strict=False), strict=True))
-    found = Rendered({}, [])
+    found: dict[Part, object] = {}
     with open_results(context.results) as opened:
-        for name in batch.scenes:
-            previous, following = (context.files.get(other, "") for other in neighbours[name])
-            own = [claim for claim in context.claims if name in claim.published.scenes]
+        for part in parts:
+            if isinstance(part, PaperFigure):
+                found[part] = walk_figure(part, opened.scenes, context.claims, context.files)
+                continue
+            previous, following = (context.files.get(other, "") for other in neighbours[part])
+            own = [claim for claim in context.claims if part in claim.published.scenes]
             page = scene_page(
-                opened.scenes[name], own, context.conditions,
+                opened.scenes[part], own, context.conditions,
                 has_errata=context.has_errata, previous=previous, following=following,
             )  # fmt: skip
-            found.pages[name] = render("scene", page)
-        for figure in paper_figures.available(opened.scenes):
-            if figure.number in batch.figures:
-                found.figures.append(walk_figure(figure, opened.scenes, context.claims, context.files))
+            found[part] = render("scene", page)
     return found

@@ -75,12 +75,6 @@ class Modes(SceneModes):
         return f"<p>{escape(self.scene)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
 
 
-def _text(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.7g}" if isinstance(value, float) else str(value)
-
-
 class ModePlots:
     """Figures of the modes of one scene."""
 

@@ -29,7 +29,7 @@ _MARKS = {
 
 @dataclass(frozen=True)
 class TableCell:
-    """A cell of a table.
+    """A cell of a table that is more than a text.
 
     tone      "good", "bad" or "": the colour of a verdict
     href      a page of the report, or ""
@@ -43,18 +43,23 @@ class TableCell:
     note_language: str = ""
 
 
+Row = Sequence[TableCell | str]
+
+
 @dataclass(frozen=True)
 class PageTable:
     """A table; numeric: indices of the columns aligned to the right. The first cell of a row is its heading."""
 
     caption: str
     head: Sequence[str]
-    rows: Sequence[Sequence[TableCell]]
+    rows: Sequence[Row]
     numeric: Sequence[int] = ()
 
     def without_empty_columns(self) -> PageTable:
         """The columns that have a value in any row, and the first one."""
-        kept = [i for i in range(len(self.head)) if i == 0 or any(row[i].text not in ("", "–") for row in self.rows)]
+        columns = range(len(self.head))
+        empty = ("", "–", TableCell(""), TableCell("–"))
+        kept = [i for i in columns if i == 0 or any(row[i] not in empty for row in self.rows)]
         return PageTable(
             self.caption,
             [self.head[i] for i in kept],

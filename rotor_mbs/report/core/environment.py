@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -16,8 +17,8 @@ from rotor_mbs.report.core.files import GENERATOR
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 
 
-def render(template: str, page: object) -> str:
-    """The HTML of `page` by templates/`template`.html.j2, which knows the fields of that kind of page."""
+def render(template: str, page: Mapping[str, object]) -> str:
+    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have."""
     return _environment().get_template(f"{template}.html.j2").render(page=page)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from markupsafe import Markup
@@ -14,11 +14,11 @@ from rotor_mbs.methods.catalogue import model_label
 from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry, mark_entry
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import INDEX, page_names, write_pages
-from rotor_mbs.report.core.looks import look_of
+from rotor_mbs.report.core.looks import label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import bench_tables as tables
-from rotor_mbs.report.pages.bench_tables import curve_label, target_text
+from rotor_mbs.report.pages.bench_tables import target_text
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
 from rotor_mbs.scenario.catalogue import natural_order
@@ -26,33 +26,6 @@ from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import COST_SCALING, Record, read_records
 
 Curves = Sequence[Record]
-
-
-@dataclass(frozen=True)
-class BenchScenePage:
-    """A scene. facts: the attributes of its curves, such as the horizon and the number of samples; csv: a file name."""
-
-    scene: str
-    summary: Sequence[str]
-    facts: Mapping[str, float]
-    diagram: Section
-    reach: Section
-    order: Section
-    failures: Section
-    points: Section
-    csv: str
-
-
-@dataclass(frozen=True)
-class BenchIndexPage:
-    """All scenes. scaling: (what the cost was measured over, its section)."""
-
-    summary: Sequence[str]
-    fastest: Section
-    scenes: Section
-    scaling: Sequence[tuple[str, Section]]
-    csv: str
-    versions: Sequence[tuple[str, str]]
 
 
 def write_bench_report(results: Path, output: Path) -> Path:
@@ -78,7 +51,7 @@ def write_bench_report(results: Path, output: Path) -> Path:
     return output / INDEX
 
 
-def _scene(name: str, curves: Curves, csv: str) -> BenchScenePage:
+def _scene(name: str, curves: Curves, csv: str) -> dict[str, object]:
     captions = {
         False: "Integration alone: its run time over the whole scene; marks on the left failed.",
         True: "The cost of one run: also building the model, compiling everything anew, and reading out samples.",
@@ -87,23 +60,23 @@ def _scene(name: str, curves: Curves, csv: str) -> BenchScenePage:
         picture(diagram(curves, with_setup=setup), f"bench-{int(setup)}", caption, f"{name}: {caption}")
         for setup, caption in captions.items()
     ]
-    return BenchScenePage(
-        name,
-        summary(name, curves),
-        curves[0].attributes,
-        Section(pictures, _legend(curves)),
-        Section(tables=[tables.reach_table(curves)]),
-        Section(tables=[tables.order_table(curves)]),
-        Section(tables=[tables.failure_table(curves)]),
-        Section(tables=[tables.point_table(curves)]),
-        csv,
-    )
+    return {
+        "scene": name,
+        "summary": summary(name, curves),
+        "facts": curves[0].attributes,
+        "diagram": Section(pictures, _legend(curves)),
+        "reach": Section(tables=[tables.reach_table(curves)]),
+        "order": Section(tables=[tables.order_table(curves)]),
+        "failures": Section(tables=[tables.failure_table(curves)]),
+        "points": Section(tables=[tables.point_table(curves)]),
+        "csv": csv,
+    }
 
 
 def _index(
     scenes: Mapping[str, Curves], scaling: Mapping[str, Curves], files: Mapping[str, str],
     made_with: Sequence[tuple[str, str]],
-) -> BenchIndexPage:  # fmt: skip
+) -> dict[str, object]:  # fmt: skip
     pictures = []
     for i, (name, curves) in enumerate(scenes.items()):
         link = Markup('<a href="{}">{}</a>').format(files[name], name)
@@ -111,18 +84,21 @@ def _index(
         shown = picture(panels, f"bench-s{i}", name, f"Error against run time, {name}")
         pictures.append(replace(shown, caption=link))
     one_of_each = {curve.name: curve for curves in scenes.values() for curve in curves}
-    return BenchIndexPage(
-        overview(scenes),
-        Section(tables=[tables.overview_table(scenes, files)]) if scenes else Section(),
-        Section(pictures, _legend(list(one_of_each.values()))),
-        [(name.rpartition("/")[2], Section(tables=[tables.scaling_table(curves)])) for name, curves in scaling.items()],
-        "bench.csv",
-        made_with,
-    )
+    return {
+        "summary": overview(scenes),
+        "fastest": Section(tables=[tables.overview_table(scenes, files)]),
+        "scenes": Section(pictures, _legend(list(one_of_each.values()))),
+        "scaling": [
+            (name.rpartition("/")[2], Section(tables=[tables.scaling_table(curves)]))
+            for name, curves in scaling.items()
+        ],
+        "csv": "bench.csv",
+        "versions": made_with,
+    }
 
 
 def _legend(curves: Curves) -> list[LegendEntry]:
-    entries = [LegendEntry(curve_label(curve), look_of(curve.name)) for curve in curves]
+    entries = [LegendEntry(label_of(curve.name), look_of(curve.name)) for curve in curves]
     entries.append(line_entry("best of all (Pareto front)", FRONT_COLOUR, width=6.0))
     entries.append(mark_entry("failed: drawn at its time", "x"))
     if has_visible_uncertainty(curves):
@@ -137,7 +113,7 @@ def summary(scene: str, curves: Curves) -> list[str]:
     for target in TARGETS_RAD:
         best: dict[str, tuple[str, float]] = {}
         for curve, reach in fastest(curves, target):
-            best.setdefault(curve.name.partition("/")[0], (curve_label(curve), reach.seconds))
+            best.setdefault(curve.name.partition("/")[0], (label_of(curve.name), reach.seconds))
         ranked = sorted(best.values(), key=lambda item: item[1])
         parts = [
             f"{label} {prefixed(time, 's', 2)}"
@@ -162,7 +138,7 @@ def _overview(scenes: Sequence[Curves], target: float) -> str:
         best: dict[str, float] = {}
         for place, (curve, reach) in enumerate(fastest(curves, target)):
             if not place:
-                wins.setdefault(curve_label(curve), []).append(reach.seconds)
+                wins.setdefault(label_of(curve.name), []).append(reach.seconds)
             best.setdefault(curve.name.partition("/")[0], reach.ratio)
         for model, ratio in best.items():
             if ratio > 1.0:

@@ -6,6 +6,7 @@ import csv
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from rotor_mbs.analysis.work_precision import (
     reaches,
     succeeded,
 )
-from rotor_mbs.report.core.elements import PageTable, TableCell
+from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, quantity
 from rotor_mbs.report.pages.scene_tables import status_text
@@ -33,11 +34,6 @@ _CSV_COLUMNS = (
     "run_time_min_s", "run_time_q1_s", "run_time_q3_s", "setup_time_s", "setup_again_time_s", "output_time_s",
     "repeats", "steps", "false_success",
 )  # fmt: skip
-
-
-def curve_label(curve: Record) -> str:
-    """The method's label, and its fixed settings where they are not the default ones."""
-    return label_of(curve.name)
 
 
 def target_text(target: float) -> str:
@@ -60,14 +56,11 @@ def csv_text(curves: Sequence[Record]) -> str:
 def reach_table(curves: Sequence[Record]) -> PageTable:
     """A row per curve: time and ratio for each target."""
     found = reaches(curves)
-    head = ["method", *(target_text(target) for target in TARGETS_RAD)]
-    rows = []
-    for curve in curves:
-        cells = [TableCell(curve_label(curve))]
-        for target in TARGETS_RAD:
-            reach = found[curve.name][target]
-            cells.append(_unreached(curve) if reach is None else _reached(reach))
-        rows.append(cells)
+    head = ["method", *map(target_text, TARGETS_RAD)]
+    rows: list[Row] = [
+        [label_of(curve.name), *(_reach_cell(curve, found[curve.name][target]) for target in TARGETS_RAD)]
+        for curve in curves
+    ]
     caption = (
         "Run time to an angle error, interpolated linearly in the logarithms between the points of a method's own "
         "front, and its ratio to the fastest method's. A dash: no setting of the ladder was as accurate. Not measured: "
@@ -76,12 +69,10 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
     return PageTable(caption, head, rows, numeric=range(1, len(head)))
 
 
-def _reached(reach: Reach) -> TableCell:
-    return TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
-
-
-def _unreached(curve: Record) -> TableCell:
-    """Whether the method cannot, or was not asked to."""
+def _reach_cell(curve: Record, reach: Reach | None) -> TableCell:
+    """Time and ratio, or whether the method cannot, or was not asked to."""
+    if reach is not None:
+        return TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
     count = left_out(curve)
     if count:
         return TableCell("not measured", note=f"{count} finer {'setting' if count == 1 else 'settings'} left out")
@@ -92,8 +83,8 @@ def _unreached(curve: Record) -> TableCell:
 
 def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, str]) -> PageTable:
     """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
-    head = ["scene", *(target_text(target) for target in TARGETS_RAD)]
-    rows = [
+    head = ["scene", *map(target_text, TARGETS_RAD)]
+    rows: list[Row] = [
         [TableCell(scene, href=files[scene]), *(_fastest_cell(curves, target) for target in TARGETS_RAD)]
         for scene, curves in scenes.items()
     ]
@@ -108,22 +99,18 @@ def _fastest_cell(curves: Sequence[Record], target: float) -> TableCell:
         return TableCell("not measured" if is_cut else NOTHING)
     (first, reach), *others = found
     if others:
-        next_one = f"then {curve_label(others[0][0])}, {number(others[0][1].ratio)} times as long"
+        next_one = f"then {label_of(others[0][0].name)}, {number(others[0][1].ratio)} times as long"
     else:
         next_one = "no other was measured to there" if is_cut else "no other gets there"
-    return TableCell(f"{curve_label(first)}: {prefixed(reach.seconds, 's', 2)}", note=next_one)
+    return TableCell(f"{label_of(first.name)}: {prefixed(reach.seconds, 's', 2)}", note=next_one)
 
 
 def order_table(curves: Sequence[Record]) -> PageTable:
     """A row per fixed-step curve."""
     rows = [
-        [
-            TableCell(curve_label(curve)),
-            TableCell(number(curve.attributes.get("order"), 3)),
-            TableCell(f"{a['order_expected']:g}"),
-        ]
+        [label_of(curve.name), number(facts.get("order"), 3), f"{facts['order_expected']:g}"]
         for curve in curves
-        if "order_expected" in (a := curve.attributes)
+        if "order_expected" in (facts := curve.attributes)
     ]
     return PageTable(
         "Fitted on the finest points above the round-off floor.", ["method", "order", "expected"], rows, numeric=(1, 2)
@@ -132,11 +119,11 @@ def order_table(curves: Sequence[Record]) -> PageTable:
 
 def point_table(curves: Sequence[Record]) -> PageTable:
     """A row per point that was run."""
-    rows = [row for curve in curves for row in _point_rows(curve)]
+    rows = list(chain.from_iterable(map(_point_rows, curves)))
     return PageTable("Every setting measured.", _POINT_COLUMNS, rows, numeric=range(1, 14))
 
 
-def _point_rows(curve: Record) -> Iterator[list[TableCell]]:
+def _point_rows(curve: Record) -> Iterator[Row]:
     a = curve.arrays
     for i, status in enumerate(curve.statuses):
         if status == "left_out":
@@ -145,14 +132,14 @@ def _point_rows(curve: Record) -> Iterator[list[TableCell]]:
         errors = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
         seconds = ("run_time_min_s", "setup_time_s", "setup_again_time_s", "output_time_s")
         yield [
-            TableCell(curve_label(curve)),
-            TableCell(_setting(curve, i)),
-            *(TableCell(number(_known(a[error][i]))) for error in errors),
-            TableCell(prefixed(_known(a["run_time_s"][i]), "s", 3)),
-            TableCell(f"{low} to {high}"),
-            *(TableCell(prefixed(_known(a[second][i]), "s", 3)) for second in seconds),
-            TableCell(str(a["repeats"][i])),
-            TableCell(str(a["steps"][i])),
+            label_of(curve.name),
+            _setting(curve, i),
+            *(number(_known(a[error][i])) for error in errors),
+            prefixed(_known(a["run_time_s"][i]), "s", 3),
+            f"{low} to {high}",
+            *(prefixed(_known(a[second][i]), "s", 3) for second in seconds),
+            str(a["repeats"][i]),
+            str(a["steps"][i]),
             TableCell(status_text(status), tone="" if status == "ok" else "bad"),
         ]
 
@@ -161,12 +148,12 @@ def failure_table(curves: Sequence[Record]) -> PageTable:
     """Every point that is not on a curve, with the reason."""
     rows = [
         [
-            TableCell(curve_label(curve)),
-            TableCell(_setting(curve, i)),
-            TableCell(prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3)),
-            TableCell("left out" if status == "left_out" else status_text(status)),
-            TableCell("yes" if curve.arrays["false_success"][i] else ""),
-            TableCell(message),
+            label_of(curve.name),
+            _setting(curve, i),
+            prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3),
+            "left out" if status == "left_out" else status_text(status),
+            "yes" if curve.arrays["false_success"][i] else "",
+            message,
         ]
         for curve in curves
         for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True))
@@ -189,14 +176,9 @@ def scaling_table(curves: Sequence[Record]) -> PageTable:
         rate = curve.arrays["run_time_s"] / np.array(curve.arrays["simulated_s"])
         at = dict(zip(curve.arrays["setting"][ok].tolist(), rate[ok].tolist(), strict=True))
         exponent = cost_exponent(curve.arrays["setting"][ok], rate[ok])
-        cells = [TableCell(prefixed(at.get(size), "s", 3)) for size in sizes]
-        rows.append([TableCell(curve_label(curve)), *cells, TableCell(number(exponent))])
-    return PageTable(
-        "Run time of one simulated second, and the exponent fitted on the larger half of the sizes.",
-        head,
-        rows,
-        numeric=range(1, len(head)),
-    )
+        rows.append([label_of(curve.name), *(prefixed(at.get(size), "s", 3) for size in sizes), number(exponent)])
+    caption = "Run time of one simulated second, and the exponent fitted on the larger half of the sizes."
+    return PageTable(caption, head, rows, numeric=range(1, len(head)))
 
 
 def _setting(curve: Record, i: int) -> str:

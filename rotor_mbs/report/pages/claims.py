@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
 from rotor_mbs.analysis.published import TrajectoryNumber
-from rotor_mbs.report.core.elements import PageTable, TableCell
+from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import fixed, number, quantity
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
@@ -50,27 +50,27 @@ def unit_of(asked: TrajectoryNumber) -> str:
     return "" if asked.statistic in _WITHOUT_UNIT else _UNITS[asked.quantity]
 
 
-def _number_row(claim: Claim) -> list[TableCell]:
+def _number_row(claim: Claim) -> Row:
     item, printed, corrected = claim.published, claim.printed, claim.corrected
     assert item.of is not None  # every number has it
     verdict = _verdict(printed.holds, "reproduced", "not reproduced")
     if item.rounding and printed.holds:
         verdict = replace(verdict, note=ROUNDING)
     return [
-        TableCell(item.figure),
+        item.figure,
         TableCell(f"{description_of(item.of)} ({unit_of(item.of)})", note=f"«{item.quote}»", note_language="es"),
-        TableCell(fixed(item.value, item.decimals)),
-        TableCell(fixed(printed.value, item.decimals + 2)),
+        fixed(item.value, item.decimals),
+        fixed(printed.value, item.decimals + 2),
         verdict,
-        TableCell(fixed(corrected.value, item.decimals + 2)),
+        fixed(corrected.value, item.decimals + 2),
         _verdict(corrected.holds, "yes", "no"),
     ]
 
 
-def _claim_row(claim: Claim) -> list[TableCell]:
+def _claim_row(claim: Claim) -> Row:
     item = claim.published
     return [
-        TableCell(item.figure),
+        item.figure,
         TableCell(item.statement, note=f"«{item.quote}»", note_language="es"),
         *(
             replace(_verdict(one.holds, "holds", "does not hold"), note=_evidence(one) if one.holds is not None else "")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally, finding
-from rotor_mbs.report.core.elements import PageTable, Section, TableCell
+from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, quantity
 from rotor_mbs.report.pages import claims as claim_tables
@@ -20,36 +19,22 @@ from rotor_mbs.store.read import Results, StoredRun, StoredScene
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
 
 
-@dataclass(frozen=True)
-class IndexPage:
-    """All scenes. versions: (what, version); is_paper: whether scenes of the paper are among them."""
-
-    finding: Sequence[str]
-    scenes: Section
-    numbers: Section
-    claims: Section
-    errata: Section
-    versions: Sequence[tuple[str, str]]
-    is_paper: bool
-    has_walk: bool
-
-
 def index_page(
     results: Results, scenes: Mapping[str, StoredScene], files: Mapping[str, str], claims: Sequence[Claim],
     conditions: Mapping[str, str], errata: Sequence[Erratum], *, has_walk: bool,
-) -> IndexPage:  # fmt: skip
+) -> dict[str, object]:  # fmt: skip
     """scenes: in order; files: the file name of each scene's page; errata: empty where there is no such page."""
     general = [text for key, text in conditions.items() if not key.startswith("fig")]
-    return IndexPage(
-        finding_sentences(finding(scenes, claims)),
-        Section(tables=[scene_table(scenes, files)]),
-        Section(tables=[claim_tables.number_table(claims)], notes=general),
-        Section(tables=[claim_tables.claim_table(claims)]),
-        Section(tables=[_errata_table(errata)]),
-        versions(results),
-        is_paper=bool(claims),
-        has_walk=has_walk,
-    )
+    return {
+        "finding": finding_sentences(finding(scenes, claims)),
+        "scenes": Section(tables=[scene_table(scenes, files)]),
+        "numbers": Section(tables=[claim_tables.number_table(claims)], notes=general),
+        "claims": Section(tables=[claim_tables.claim_table(claims)]),
+        "errata": Section(tables=[_errata_table(errata)]),
+        "versions": versions(results),
+        "is_paper": bool(claims),
+        "has_walk": has_walk,
+    }
 
 
 def versions(results: Results) -> list[tuple[str, str]]:
@@ -69,8 +54,8 @@ def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> 
     for name, scene in scenes.items():
         cells = [
             TableCell(name, href=files[name], note=scene.title),
-            TableCell(str(scene.attributes.get("figures", ""))),
-            TableCell(quantity(horizon(scene), "s", 3)),
+            str(scene.attributes.get("figures", "")),
+            quantity(horizon(scene), "s", 3),
             *_printed_cells(scene.methods.get(methods.PRINTED)),
         ]
         rows.append([*cells, *(cell for method in corrected for cell in _corrected_cells(scene.methods.get(method)))])
@@ -78,31 +63,28 @@ def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> 
     return PageTable(caption, head, rows, numeric=[2, *range(4, len(head))]).without_empty_columns()
 
 
-def _printed_cells(run: StoredRun | None) -> list[TableCell]:
+def _printed_cells(run: StoredRun | None) -> Row:
     if run is None:
-        return [TableCell(""), TableCell(""), TableCell("")]
+        return ["", "", ""]
     gain = prefixed(metric(run, "energy_gain_J"), "J")
-    return [status_cell(run), TableCell(number(metric(run, "angle_error_whole"))), TableCell(gain)]
+    return [status_cell(run), number(metric(run, "angle_error_whole")), gain]
 
 
-def _corrected_cells(run: StoredRun | None) -> list[TableCell]:
+def _corrected_cells(run: StoredRun | None) -> Row:
     """Error and drift; the status in place of the error, and the error below it, where the run is not ok."""
     if run is None:
-        return [TableCell(""), TableCell("")]
-    error, drift = number(metric(run, "angle_error_max")), TableCell(number(metric(run, "energy_drift_max")))
+        return ["", ""]
+    error, drift = number(metric(run, "angle_error_max")), number(metric(run, "energy_drift_max"))
     if run.status == "ok":
-        return [TableCell(error), drift]
+        return [error, drift]
     return [TableCell(status_text(run.status), tone="bad", note=error), drift]
 
 
 def _errata_table(errata: Sequence[Erratum]) -> PageTable:
     rows = [
-        [
-            TableCell(one.id, href=f"errata.html#{one.id}"), TableCell(", ".join(one.stands_in)),
-            TableCell(one.printed), TableCell(one.right), TableCell(one.reason),
-        ]
-        for one in errata
-    ]  # fmt: skip
+        (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
+        for e in errata
+    ]
     caption = "The errors in the printed equations; all else follows from them"
     return PageTable(caption, ("Erratum", "Equation", "Printed", "Correct", "Reason"), rows)
 

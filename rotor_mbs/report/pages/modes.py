@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,34 +11,13 @@ import numpy as np
 from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence
 from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.modes import multiblade
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, TableCell
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import INDEX, write_pages
 from rotor_mbs.report.core.looks import with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import modes as plots
-
-
-@dataclass(frozen=True)
-class SceneModesPart:
-    """What the page has of a scene; id: unique on the page."""
-
-    id: str
-    name: str
-    title: str
-    lead: Sequence[str]
-    rest: Section
-    campbell: Section
-    fastest: Section
-    turning: Section
-
-
-@dataclass(frozen=True)
-class ModesPage:
-    """The page."""
-
-    scenes: Sequence[SceneModesPart]
 
 
 def write_modes_report(results: Path, output: Path) -> Path:
@@ -50,22 +28,25 @@ def write_modes_report(results: Path, output: Path) -> Path:
 def write_modes_pages(modes: Sequence[SceneModes], output: Path) -> Path:
     """The page of modes that are in memory; its path. Raises StoreError where it cannot be written."""
     parts = [scene_part(one, f"scene{i}") for i, one in enumerate(modes)]
-    write_pages(output, {INDEX: render("modes", ModesPage(parts))})
+    write_pages(output, {INDEX: render("modes", {"scenes": parts})})
     return output / INDEX
 
 
-def scene_part(modes: SceneModes, name: str) -> SceneModesPart:
+def scene_part(modes: SceneModes, name: str) -> dict[str, object]:
+    """What the page has of a scene; `name` is unique on the page."""
     rest = next(iter(modes.rest.values()), None)
     rotation = next(iter(modes.rotation.values()), None)
-    return SceneModesPart(
-        name,
-        modes.scene,
-        modes.title,
-        _lead(modes),
-        Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
-        *_rotation(rotation, modes.scene, name),
-        _turning(modes, name),
-    )
+    campbell, fastest = _rotation(rotation, modes.scene, name)
+    return {
+        "id": name,
+        "name": modes.scene,
+        "title": modes.title,
+        "lead": _lead(modes),
+        "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
+        "campbell": campbell,
+        "fastest": fastest,
+        "turning": _turning(modes, name),
+    }
 
 
 def _lead(modes: SceneModes) -> list[str]:
@@ -121,7 +102,7 @@ def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:
             float(each.damping_ratios[k]),
         ]
         numbers += [float(each.growth_rates[k]), float(backward[k]), float(forward[k])]
-        rows.append([TableCell(name), *(TableCell(_shown(value, 7)) for value in numbers)])
+        rows.append([name, *(_shown(value, 7) for value in numbers)])
     head = (
         "Mode", "undamped (Hz)", "undamped (rad/s)", "damped (rad/s)", "damping ratio", "growth rate (1/s)",
         "backward whirl (rad/s)", "forward whirl (rad/s)",
@@ -135,7 +116,7 @@ def _shape_table(caption: str, one: LinearModes, i: int) -> PageTable:
     rows = []
     for name, shape in zip(one.names, amplitudes, strict=True):
         largest = max(float(shape.max()), 1e-300)
-        rows.append([TableCell(name), *(TableCell(_shown(float(value) / largest, 3)) for value in shape)])
+        rows.append([name, *(_shown(float(value) / largest, 3) for value in shape)])
     head = ("Shape", "rotor", *multiblade(one.blades)[0])
     return PageTable(caption, head, rows, tuple(range(1, len(head))))
 
@@ -157,15 +138,15 @@ def _turning(modes: SceneModes, name: str) -> Section:
     if modes.chart is not None:
         caption = "Stability chart: growth over a turn under gravity, over rotor speed and bearing stiffness"
         drawn.append(picture(plots.chart(modes.chart), f"{name}-chart", caption, caption))
-    rows = [
+    rows: list[Row] = [
         [
-            TableCell(number(float(table.speeds[i]), 4)),
+            number(float(table.speeds[i]), 4),
             TableCell(
                 _shown(float(table.largest[i]), 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i]
             ),
-            TableCell(_shown(float(table.growth_rates[i]), 4)),
-            TableCell(_shown(float(table.product_error[i]), 2)),
-            TableCell(_shown(float(table.torque[i]), 4)),
+            _shown(float(table.growth_rates[i]), 4),
+            _shown(float(table.product_error[i]), 2),
+            _shown(float(table.torque[i]), 4),
         ]
         for i in range(len(table.speeds))
     ]

@@ -19,7 +19,7 @@ from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages import error_pictures, scene_tables
 from rotor_mbs.report.pages.quantities import quantity_sections
 from rotor_mbs.report.pages.scene_tables import metric
-from rotor_mbs.report.pages.viewer import Viewer, viewer
+from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.paper_figures import HEADINGS
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.paths import paths
@@ -28,36 +28,6 @@ from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[np.float64]
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")
-
-
-@dataclass(frozen=True)
-class ScenePage:
-    """A scene.
-
-    source          the comment at the start of the scene's file
-    quantities      (id, heading, section) of the further quantities that are drawn
-    previous, next  file names of the neighbouring pages, or ""
-    """
-
-    name: str
-    title: str
-    figures: str
-    toml: str
-    source: str
-    lead: Sequence[str]
-    failures: Sequence[str]
-    claims: Section
-    viewer: Viewer | None
-    paths: Section
-    motion: Section
-    difference: Section
-    energy: Section
-    quantities: Sequence[tuple[str, str, Section]]
-    metrics: Section
-    has_horizon: bool
-    has_errata: bool
-    previous: str
-    next: str
 
 
 @dataclass(frozen=True)
@@ -101,34 +71,35 @@ class DrawnRuns:
 def scene_page(
     scene: StoredScene, claims: Sequence[Claim], conditions: Mapping[str, str], *,
     has_errata: bool, previous: str, following: str,
-) -> ScenePage:  # fmt: skip
-    """claims: those of the paper about this scene; conditions: what the paper does not print, by key."""
+) -> dict[str, object]:  # fmt: skip
+    """claims: those of the paper about this scene; conditions: what the paper does not print, by key; previous and
+    following: file names of the neighbouring pages, or ""."""
     drawn = DrawnRuns.of(scene)
     own = conditions.get(scene.name.rpartition("/")[2])
     tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims)]
     figures = str(scene.attributes.get("figures", ""))
     sides = {label_of(run.method): run for run in drawn.sides.values()}
-    return ScenePage(
-        name=scene.name,
-        title=scene.title,
-        figures=figures and f"{'Figures' if ',' in figures else 'Figure'} {figures} of the paper",
-        toml=str(scene.attributes.get("scene_toml", "")),
-        source=opening_comment(scene),
-        lead=_lead(drawn),
-        failures=scene_tables.failures(scene),
-        claims=Section(tables=[table for table in tables if table.rows], notes=[own] if own else []),
-        viewer=viewer(scene, sides) if drawn.sides_with("tip") else None,
-        paths=paths_section(drawn),
-        motion=motion_section(drawn),
-        difference=difference_section(drawn),
-        energy=energy_section(drawn),
-        quantities=quantity_sections(scene, drawn.all, drawn.horizon),
-        metrics=Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
-        has_horizon=drawn.horizon is not None,
-        has_errata=has_errata,
-        previous=previous,
-        next=following,
-    )
+    return {
+        "name": scene.name,
+        "title": scene.title,
+        "figures": figures and f"{'Figures' if ',' in figures else 'Figure'} {figures} of the paper",
+        "toml": str(scene.attributes.get("scene_toml", "")),
+        "source": opening_comment(scene),
+        "lead": _lead(drawn),
+        "failures": scene_tables.failures(scene),
+        "claims": Section(tables=[table for table in tables if table.rows], notes=[own] if own else []),
+        "viewer": viewer(scene, sides) if drawn.sides_with("tip") else None,
+        "paths": paths_section(drawn),
+        "motion": motion_section(drawn),
+        "difference": difference_section(drawn),
+        "energy": energy_section(drawn),
+        "quantities": quantity_sections(scene, drawn.all, drawn.horizon),
+        "metrics": Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
+        "has_horizon": drawn.horizon is not None,
+        "has_errata": has_errata,
+        "previous": previous,
+        "next": following,
+    }
 
 
 def _lead(drawn: DrawnRuns) -> list[str]:

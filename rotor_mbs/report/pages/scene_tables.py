@@ -10,7 +10,7 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
-from rotor_mbs.report.core.elements import PageTable, TableCell
+from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, quantity
 from rotor_mbs.store.read import StoredRun, StoredScene
@@ -21,10 +21,10 @@ def status_text(status: str) -> str:
     return status.replace("_", " ")
 
 
-def status_cell(run: StoredRun) -> TableCell:
+def status_cell(run: StoredRun) -> TableCell | str:
     """The status; "runs to the end" of an "ok" run of equations that are not claimed to be correct."""
     if run.status == "ok":
-        return TableCell("ok", tone="good") if is_corrected(run.method) else TableCell("runs to the end")
+        return TableCell("ok", tone="good") if is_corrected(run.method) else "runs to the end"
     return TableCell(status_text(run.status), tone="bad")
 
 
@@ -51,7 +51,7 @@ def metrics_table(scene: StoredScene) -> PageTable:
     return PageTable("", head, rows, numeric=(2, 3, 4, 5, 6, 8, 9, 10, 11)).without_empty_columns()
 
 
-def _metrics_row(run: StoredRun) -> list[TableCell]:
+def _metrics_row(run: StoredRun) -> Row:
     errors = ("angle_error_max", "angle_error_whole", "tip_error_max")
     texts = ["" if run.method == REFERENCE else number(metric(run, name)) for name in errors]
     texts += [number(metric(run, name)) for name in ("energy_drift_max", "constraint_error_max")]
@@ -59,7 +59,7 @@ def _metrics_row(run: StoredRun) -> list[TableCell]:
     counts = [metric(run, name) for name in ("steps", "rhs_evaluations")]
     texts += ["" if count is None else f"{count:.0f}" for count in counts]
     texts += [prefixed(metric(run, name), "s") for name in ("setup_time_s", "run_time_s")]
-    return [TableCell(label_of(run.method)), status_cell(run), *map(TableCell, texts)]
+    return [label_of(run.method), status_cell(run), *texts]
 
 
 def _zero_pitch(run: StoredRun) -> str:
@@ -118,7 +118,7 @@ def range_table(runs: Mapping[str, StoredRun]) -> PageTable:
             head.append("largest rate (rad/s)")
             columns.append([number(x, 3) for x in np.abs(run.array("rates")).max(axis=0)])
     labels = next(iter(runs.values())).labels
-    rows = [[TableCell(label), *(TableCell(column[i]) for column in columns)] for i, label in enumerate(labels)]
+    rows = [[label, *(column[i] for column in columns)] for i, label in enumerate(labels)]
     return PageTable("Extremes", head, rows, numeric=range(1, len(head)))
 
 
@@ -126,9 +126,7 @@ def difference_table(runs: Mapping[str, StoredRun]) -> PageTable:
     """Errors of each run against the reference."""
     head = ("Method", "Up to the horizon (rad)", "Whole run (rad)", "At the end (rad)")
     names = ("angle_error_max", "angle_error_whole", "angle_error_end")
-    rows = [
-        [TableCell(label_of(name)), *(TableCell(number(metric(run, n))) for n in names)] for name, run in runs.items()
-    ]
+    rows = [[label_of(name), *(number(metric(run, n)) for n in names)] for name, run in runs.items()]
     caption = "Largest difference from the reference, over all angles"
     return PageTable(caption, head, rows, numeric=(1, 2, 3)).without_empty_columns()
 
@@ -141,7 +139,7 @@ def energy_table(runs: Mapping[str, StoredRun]) -> PageTable:
         kinetic = float(run.array("kinetic_energy").max()) if "kinetic_energy" in run else None
         work = float(run.array("work")[-1]) if "work" in run and run.array("work").any() else None
         joules = [prefixed(x, "J") for x in (kinetic, work, metric(run, "energy_gain_J"))]
-        rows.append([*map(TableCell, (label_of(name), *joules, number(metric(run, "energy_drift_max"))))])
+        rows.append([label_of(name), *joules, number(metric(run, "energy_drift_max"))])
     return PageTable("", head, rows, numeric=(1, 2, 3, 4)).without_empty_columns()
 
 
@@ -155,5 +153,5 @@ def path_table(runs: Mapping[str, StoredRun]) -> PageTable:
         head += [f"{heading}: length of path", "off the plane"]
         columns += [[prefixed(x, "m") for x in lengths], [prefixed(x, "m") for x in np.abs(tip[:, :, 1]).max(axis=0)]]
     blades = range(len(columns[0]))
-    rows = [[TableCell(str(blade + 1)), *(TableCell(column[blade]) for column in columns)] for blade in blades]
+    rows = [[str(blade + 1), *(column[blade] for column in columns)] for blade in blades]
     return PageTable("Paths of the tips", head, rows, numeric=range(1, len(head)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from rotor_mbs.analysis.stability import (
     reached_by,
     suite_runs,
 )
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, TableCell
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.environment import render
 from rotor_mbs.report.core.files import INDEX, page_names, write_pages
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
@@ -45,60 +45,6 @@ _CONSERVED = {
 _NOT_BAD = ("holds", "energy_alone", "smaller_step", "refuses")
 
 
-@dataclass(frozen=True)
-class MapMark:
-    """A scene under a method: outcome names the colour, text is read out, href leads to the scene's page."""
-
-    outcome: str
-    symbol: str
-    text: str
-    href: str
-
-
-@dataclass(frozen=True)
-class MapRow:
-    """A scene on the map; fastest: the method that reaches the target accuracy in the least time."""
-
-    scene: str
-    href: str
-    title: str
-    marks: Sequence[MapMark | None]
-    fastest: str
-
-
-@dataclass(frozen=True)
-class StabilityPage:
-    """The map. families: (heading, rows); key: (outcome, symbol, meaning)."""
-
-    methods: Sequence[str]
-    families: Sequence[tuple[str, Sequence[MapRow]]]
-    key: Sequence[tuple[str, str, str]]
-    summary: Sequence[str]
-    false_successes: int
-    limits: Section
-    conservation: Section
-
-
-@dataclass(frozen=True)
-class StabilityScenePage:
-    """A scene of the suite; fields as in the page of any scene."""
-
-    name: str
-    title: str
-    lead: Sequence[str]
-    source: str
-    toml: str
-    outcomes: Section
-    motion: Section
-    errors: Section
-    steps: Section
-    previous: str
-    next: str
-    figures: str = ""
-    failures: Sequence[str] = ()
-    has_errata: bool = False
-
-
 def write_stability_report(results: Path, output: Path) -> Path:
     """Write the map and a page per scene into the folder `output`; returns the path of the map.
 
@@ -113,33 +59,37 @@ def write_stability_report(results: Path, output: Path) -> Path:
         for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
             own = [cell for cell in found if cell.scene == name]
             ladders = [record for record in records if record.kind == "steps" and record.scene == name]
-            page = _scene_page(opened.scenes[name], own, ladders)
-            page = replace(page, previous=files.get(previous, ""), next=files.get(following, ""))
-            pages[files[name]] = render("stability_scene", page)
+            around = {"previous": files.get(previous, ""), "next": files.get(following, "")}
+            pages[files[name]] = render("stability_scene", _scene_page(opened.scenes[name], own, ladders) | around)
     write_pages(output, pages)
     return output / INDEX
 
 
 def _map(
     found: Sequence[SuiteRun], records: Sequence[Record], files: dict[str, str], titles: dict[str, str]
-) -> StabilityPage:
+) -> dict[str, object]:
     names = list(dict.fromkeys(cell.method for cell in found))
-    families: dict[str, list[MapRow]] = {}
+    families: dict[str, list[dict[str, object]]] = {}
     for scene, file in files.items():
         own = {cell.method: cell for cell in found if cell.scene == scene}
-        marks = [_mark(own[name], file) if name in own else None for name in names]
-        row = MapRow(scene, file, titles[scene], marks, _fastest(list(own.values())))
+        row: dict[str, object] = {
+            "scene": scene,
+            "href": file,
+            "title": titles[scene],
+            "marks": [_mark(own[name]) if name in own else None for name in names],
+            "fastest": _fastest(list(own.values())),
+        }
         families.setdefault(_family(next(iter(own.values())).family), []).append(row)
     used = {cell.outcome for cell in found}
-    return StabilityPage(
-        [label_of(name) for name in names],
-        list(families.items()),
-        [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        [advice_line(_labelled(one)) for one in advice(found)],
-        sum(cell.false_success for cell in found),
-        _limits(records),
-        _conservation(records),
-    )
+    return {
+        "methods": [label_of(name) for name in names],
+        "families": list(families.items()),
+        "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
+        "summary": [advice_line(_labelled(one)) for one in advice(found)],
+        "false_successes": sum(cell.false_success for cell in found),
+        "limits": _limits(records),
+        "conservation": _conservation(records),
+    }
 
 
 def _family(name: str) -> str:
@@ -154,10 +104,11 @@ def _labelled(one: Advice) -> Advice:
     return replace(one, method=label_of(one.method), use=use, in_part=in_part, avoid=avoid)
 
 
-def _mark(cell: SuiteRun, file: str) -> MapMark:
+def _mark(cell: SuiteRun) -> tuple[str, str, str]:
+    """The outcome, which names the colour; its symbol; a text that is read out."""
     symbol, text = OUTCOMES[cell.outcome]
     claimed = "!" if cell.false_success and cell.outcome != "false_success" else ""
-    return MapMark(cell.outcome, symbol + claimed, f"{label_of(cell.method)}: {text}. {cell.message}".strip(), file)
+    return cell.outcome, symbol + claimed, f"{label_of(cell.method)}: {text}. {cell.message}".strip()
 
 
 def _fastest(own: Sequence[SuiteRun]) -> str:
@@ -177,7 +128,7 @@ def _limits(records: Sequence[Record]) -> Section:
             step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
             numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
             numbers.append(f"{facts['mode_damping_ratio']:.3g}")
-            rows.append([*map(TableCell, (record.scene, label_of(record.method), *numbers))])
+            rows.append([record.scene, label_of(record.method), *numbers])
     head = (
         "Scene", "Method", "found by bisection (s)", "theory (s)", "found / theory", "step × |λ|", "damping ratio of λ",
     )  # fmt: skip
@@ -186,7 +137,7 @@ def _limits(records: Sequence[Record]) -> Section:
 
 def _conservation(records: Sequence[Record]) -> Section:
     rows = [
-        [*map(TableCell, (r.scene, label_of(r.method), *(_shown(r.attributes.get(name)) for name in _CONSERVED)))]
+        [r.scene, label_of(r.method), *(_shown(r.attributes.get(name)) for name in _CONSERVED)]
         for r in records
         if r.kind == "conservation"
     ]
@@ -198,22 +149,23 @@ def _shown(value: float | None) -> str:
     return "–" if value is None else f"{value:.2g}"
 
 
-def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[Record]) -> StabilityScenePage:
+def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[Record]) -> dict[str, object]:
     corrected = methods.corrected_runs(scene)
     runs = {name: run for name, run in corrected.items() if methods.has_samples(run) and len(run.array("time")) > 1}
-    return StabilityScenePage(
-        scene.name,
-        scene.title,
-        _lead(scene, own),
-        opening_comment(scene),
-        str(scene.attributes["scene_toml"]),
-        Section(tables=[_outcome_table(own)]),
-        _motion(methods.corrected_run(scene)),
-        _errors(scene, runs),
-        _error_over_step(ladders),
-        previous="",
-        next="",
-    )
+    return {
+        "name": scene.name,
+        "title": scene.title,
+        "figures": "",
+        "lead": _lead(scene, own),
+        "failures": (),
+        "source": opening_comment(scene),
+        "toml": str(scene.attributes["scene_toml"]),
+        "outcomes": Section(tables=[_outcome_table(own)]),
+        "motion": _motion(methods.corrected_run(scene)),
+        "errors": _errors(scene, runs),
+        "steps": _error_over_step(ladders),
+        "has_errata": False,
+    }
 
 
 def _lead(scene: StoredScene, own: Sequence[SuiteRun]) -> list[str]:
@@ -234,7 +186,7 @@ def _lead(scene: StoredScene, own: Sequence[SuiteRun]) -> list[str]:
 
 
 def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
-    rows = []
+    rows: list[Row] = []
     for cell in own:
         symbol, text = OUTCOMES[cell.outcome]
         if cell.outcome in _NOT_BAD:
@@ -242,9 +194,7 @@ def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
         else:  # the tone brings its own symbol
             outcome = TableCell(text, "bad", note=cell.message)
         numbers = [_shown(x) for x in (cell.angle_error, cell.energy_drift, cell.run_time_s or None, cell.step)]
-        rows.append(
-            [TableCell(label_of(cell.method)), outcome, *map(TableCell, [*numbers, f"{cell.time_reached:.4g}"])]
-        )
+        rows.append([label_of(cell.method), outcome, *numbers, f"{cell.time_reached:.4g}"])
     head = (
         "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 1e-6 rad (s)",
         "reached (s)",

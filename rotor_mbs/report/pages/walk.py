@@ -27,39 +27,6 @@ _ROUNDING = 1e-9  # rad
 
 
 @dataclass(frozen=True)
-class WalkPanel:
-    """A panel of a figure: its letter, its scene's page and initial conditions, a picture per model, what they show."""
-
-    letter: str
-    scene: str
-    href: str
-    conditions: str
-    pictures: Sequence[Picture]
-    same: str
-    different: str
-
-
-@dataclass(frozen=True)
-class WalkFigure:
-    """A figure of the paper. numbers: those that the paper prints about it, a sentence each."""
-
-    number: str
-    kind: str
-    legend: Sequence[LegendEntry]
-    panels: Sequence[WalkPanel]
-    numbers: Sequence[str]
-    has_rounding_number: bool
-
-
-@dataclass(frozen=True)
-class WalkPage:
-    """All figures in order."""
-
-    figures: Sequence[WalkFigure]
-    has_errata: bool
-
-
-@dataclass(frozen=True)
 class ModelComparison:
     """How the models of a scene differ; None where the file does not have the runs.
 
@@ -84,48 +51,48 @@ class ModelComparison:
 
 def walk_figure(
     figure: PaperFigure, scenes: Mapping[str, StoredScene], claims: Sequence[Claim], files: Mapping[str, str]
-) -> WalkFigure:
+) -> dict[str, object]:
     """claims: all of the paper; files: the file name of each scene's page."""
     numbers = [claim for claim in claims if claim.published.is_number and claim.published.figure == figure.number]
-    legend = [LegendEntry(label, look) for label, look in paper_figures.legend(figure, scenes)]
-    rows: dict[str, list[tuple[str, dict[str, StoredRun]]]] = {}
-    for letter, key, runs in paper_figures.panel_runs(figure, scenes):
-        rows.setdefault(letter, []).append((key, runs))
-    if figure.kind == TORQUES:
-        panels = [_torque_panel(figure, scenes, rows.get("", []), files)]
-    else:
-        panels = [_panel(figure, letter, scenes[name], rows.get(letter, []), files) for letter, name in figure.panels]
-    rounding = any(claim.published.rounding for claim in numbers)
-    return WalkFigure(figure.number, figure.kind, legend, panels, [_number(claim) for claim in numbers], rounding)
+    pictures = paper_figures.panel_runs(figure, scenes)
+    is_torques = figure.kind == TORQUES  # all in one picture per model
+    panels = []
+    for letter, name in [("", figure.scenes[0])] if is_torques else figure.panels:
+        row = {key: runs for place, key, runs in pictures if place == letter}
+        same, different = _torques(figure, scenes, row) if is_torques else _same_and_different(scenes[name])
+        panels.append({
+            "letter": letter,
+            "scene": name,
+            "href": files[name],
+            "conditions": _conditions(scenes[name], with_torque=not is_torques),
+            "pictures": [_picture(figure, letter, key, runs, f"{same} {different}") for key, runs in row.items()],
+            "same": same,
+            "different": different,
+        })  # fmt: skip
+    return {
+        "number": figure.number,
+        "kind": figure.kind,
+        "legend": [LegendEntry(label, look) for label, look in paper_figures.legend(figure, scenes)],
+        "panels": panels,
+        "numbers": [_number(claim) for claim in numbers],
+        "has_rounding_number": any(claim.published.rounding for claim in numbers),
+    }
 
 
-def _panel(
-    figure: PaperFigure, letter: str, scene: StoredScene, row: Sequence[tuple[str, dict[str, StoredRun]]],
-    files: Mapping[str, str],
-) -> WalkPanel:  # fmt: skip
-    found = comparison(scene)
-    same, different = _same(found), _different(found)
-    pictures = [_picture(figure, letter, key, runs, f"{same} {different}") for key, runs in row]
-    return WalkPanel(letter, scene.name, files[scene.name], _conditions(scene), pictures, same, different)
-
-
-def _torque_panel(
-    figure: PaperFigure, scenes: Mapping[str, StoredScene], row: Sequence[tuple[str, dict[str, StoredRun]]],
-    files: Mapping[str, str],
-) -> WalkPanel:  # fmt: skip
-    """All torques in one picture per model."""
+def _torques(
+    figure: PaperFigure, scenes: Mapping[str, StoredScene], row: Mapping[str, Mapping[str, StoredRun]]
+) -> tuple[str, str]:
+    """What is the same and what is not in a figure of torques."""
     gaps = [gap for name in figure.scenes if (gap := comparison(scenes[name]).exudyn) is not None]
     same = "The same: every torque accelerates the rotor from rest"
     same += f"; Exudyn and the corrected model differ by {quantity(max(gaps), 'rad')} at most." if gaps else "."
-    turned = [f"{HEADINGS[key]}: {', '.join(_turned(run, at) for at, run in runs.items())}" for key, runs in row]
-    different = (
+    turned = [
+        f"{HEADINGS[key]}: {', '.join(_turned(run, at) for at, run in runs.items())}" for key, runs in row.items()
+    ]
+    return same, (
         "Not the same: in the corrected model the blades stay at zero pitch and the rotor turns by "
         f"τt²/(2·3·m·(c²+d²)). Turned at the end: {'; '.join(turned)}."
     )
-    pictures = [_picture(figure, "", key, runs, f"{same} {different}") for key, runs in row]
-    first = figure.scenes[0]
-    conditions = _conditions(scenes[first], with_torque=False)
-    return WalkPanel("", first, files[first], conditions, pictures, same, different)
 
 
 def _turned(run: StoredRun, torque: str) -> str:
@@ -185,6 +152,11 @@ def _difference(one: StoredRun, other: StoredRun) -> NDArray[Any]:
     n = min(len(one.array("time")), len(other.array("time")))
     found: NDArray[Any] = np.abs(one.array("angles")[:n] - other.array("angles")[:n]).max(axis=1)
     return found
+
+
+def _same_and_different(scene: StoredScene) -> tuple[str, str]:
+    found = comparison(scene)
+    return _same(found), _different(found)
 
 
 def _same(found: ModelComparison) -> str:
