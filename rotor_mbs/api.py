@@ -317,7 +317,7 @@ class SweepData:
 
     def column(self, name: str) -> Any:
         """An array whole, such as "status", "pitch_max" or "angles": one row for each run. Raises StoreError."""
-        from rotor_mbs.store.sweep_read import StoredSweep
+        from rotor_mbs.store.sweep_dataset import StoredSweep
 
         return StoredSweep(self.path).column(name)
 

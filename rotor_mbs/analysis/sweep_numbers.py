@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.store.sweep_read import StoredSweep
+from rotor_mbs.store.sweep_dataset import StoredSweep
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from rotor_mbs.analysis.sweep_numbers import spread_of, stability_map
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.store.sweep_read import StoredSweep
+from rotor_mbs.store.sweep_dataset import StoredSweep
 
 
 def draw(sweep: Sweep, dataset: Path, path: Path) -> str:

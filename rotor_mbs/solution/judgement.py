@@ -16,12 +16,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.scenario.bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import Metrics, compare
 from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 
 
@@ -51,6 +52,10 @@ _RESEMBLES = 1e-2
 # Below this share the last bit of a pitch decides the rotor's inertia: (π/2 known to 1e-16)², a hundredfold. What comes
 # after such a sample follows from round-off alone, whatever an engine reports.
 _NO_INERTIA = 1e-30
+
+
+# Of the rotor's inertia at the start: above it, no start is singular.
+_CLEAR_SHARE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +100,18 @@ def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgemen
         status, message = _inaccurate(scene, run, metrics)
     false_success = run.integration.success and not _is_close(scene, status, metrics)
     return Judgement(status, message, false_success, metrics)
+
+
+def clearly_ok(
+    scenes: Sequence[Scene], method: str, integrations: Sequence[Integration], samples: Sequence[int], drifts: Array
+) -> NDArray[np.bool_]:
+    """(k,) whether `judge`, without a reference, is certain to call each run ok; drifts: of the energy scale."""
+    allowed = allowed_of(method)
+    complete = np.array([one.success and n == scenes[0].samples for one, n in zip(integrations, samples, strict=True)])
+    if allowed is None:
+        return complete
+    shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
+    return complete & (drifts <= allowed.energy) & (np.array(shares) > _CLEAR_SHARE)
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:

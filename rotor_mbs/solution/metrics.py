@@ -6,6 +6,8 @@ samples only; no engine, no file, no bound (those are in `judgement`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
@@ -127,3 +129,22 @@ def _invariant_set(run: Trajectory, reference: Trajectory) -> Metrics:
             slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
             metrics["zero_pitch_growth_per_s"] = float(slope)
     return metrics
+
+
+def largest(values: Array) -> Array:
+    """(k,) of (k, n): the largest size of each row; samples that are not finite do not count."""
+    found: Array = np.abs(np.maximum(values.max(axis=1), -values.min(axis=1)))  # of zeros: not -0
+    if not np.isfinite(found).all():
+        sizes = np.abs(values)
+        found = sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))
+    return found
+
+
+def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
+    """(k,) largest energy error of each run, of its scale (J where that is zero); NaN samples do not count."""
+    nothing = np.zeros((1, 1))
+    still = Trajectory(nothing[0], nothing, nothing)
+    at_rest = np.array([energy_scale(scene, still) for scene in scenes])
+    scales = at_rest + kinetic[:, 0] + largest(work)
+    drifts: Array = largest(errors) / np.where(scales == 0.0, 1.0, scales)
+    return drifts

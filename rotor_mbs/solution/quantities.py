@@ -129,14 +129,19 @@ SCALES = {
 }
 
 
+def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
+    """(..., n) J: total energy less work, less its value at the start, of one run or of many."""
+    total = kinetic + potential - work
+    error: Array = total - total[..., :1]  # of a run without a sample, too
+    return error
+
+
 def energy_error(samples: Samples) -> Array | None:
-    """(n,) J: total energy less work, less its value at the start; None where energies were not asked for."""
+    """(n,) J: the energy balance of a run; None where energies were not asked for."""
     kinetic, potential, work = (samples.get(name) for name in ("kinetic_energy", "potential_energy", "work"))
     if kinetic is None or potential is None or work is None:
         return None
-    total = kinetic + potential - work
-    error: Array = total - total[:1]  # of a run without a sample, too
-    return error
+    return energy_balance(kinetic, potential, work)
 
 
 def longest_arm(scene: Scene) -> float:
@@ -211,11 +216,6 @@ def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
     """
     asked = {"", *outputs}
     return tuple(quantity for quantity in known_quantities(asked) if quantity.output in asked)
-
-
-def find_quantity(name: str, outputs: Iterable[str] = ()) -> Quantity | None:
-    """The quantity of that name: a built-in one, or one that an output among `outputs` asks for; else None."""
-    return next((quantity for quantity in known_quantities(outputs) if quantity.name == name), None)
 
 
 @functools.cache
@@ -297,12 +297,6 @@ def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
     blades = len(scene.blades)
     lengths = {"coordinate": 1 + blades, "blade": blades, "axis": 3}
     return tuple(lengths[dimension] for dimension in quantity.dimensions[1:])
-
-
-def shapes(scene: Scene, outputs: Iterable[str]) -> dict[Quantity, tuple[int, ...]]:
-    """What every complete run of a scene has: each quantity that `outputs` ask for, and its shape, time first."""
-    asked = [one for one in quantities(outputs) if one.output and one.required and one.is_over_time]
-    return {quantity: (scene.samples, *row_shape(quantity, scene)) for quantity in asked}
 
 
 def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples | None) -> Array | None:

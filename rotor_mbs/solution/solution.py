@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.bounds import Bound
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.quantities import SCALES, Array, arrays, find_quantity, scale_values
+from rotor_mbs.solution.quantities import SCALES, Array, Quantity, arrays, quantities, scale_values
 from rotor_mbs.solution.record import Integration, Trajectory
 
 
@@ -101,14 +101,11 @@ class Solution:
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
         if (refined := self.trajectory.get("refined_time")) is not None:
             scales["refined_time"] = refined
-        variables = {}
-        for name, values in self.quantities.items():
-            quantity = find_quantity(name, self.scene.outputs)
-            assert quantity is not None  # it was found by its declaration
-            variables[name] = (quantity.dimensions, values, _described(quantity.units, quantity.long_name))
+        known, found = quantities(self.scene.outputs), self.quantities
+        variables = {one.name: (one.dimensions, found[one.name], _described(one)) for one in known if one.name in found}
         used = {"time"}.union(*(dimensions for dimensions, _, _ in variables.values()))
         coordinates = {
-            name: (name, labels.get(name, scales[name]), _described(scale.units, scale.long_name))
+            name: (name, labels.get(name, scales[name]), _described(scale))
             for name, scale in SCALES.items()
             if name in used
         }
@@ -140,5 +137,5 @@ def need_xarray() -> Any:
     return xarray
 
 
-def _described(units: str, long_name: str) -> dict[str, str]:
-    return {"units": units, "long_name": long_name}
+def _described(quantity: Quantity) -> dict[str, str]:
+    return {"units": quantity.units, "long_name": quantity.long_name}

@@ -31,19 +31,15 @@ def new_file(path: Path) -> Iterator[Any]:
     where the file cannot be written; what stood at `path` before then still stands.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
-    with _begun(path.name, **memory) as file:
+    with begin_file(path.name, **memory) as file:
         yield file
         file.flush()
         image = file.id.get_file_image()
     replace_file(path, image)
 
 
-def new_file_at(path: Path) -> Any:
-    """A new HDF5 file on the disk, where it must not fill up: for files too large to be made in memory."""
-    return _begun(str(path))
-
-
-def _begun(place: str, **driver: object) -> Any:
+def begin_file(place: Path | str, **driver: object) -> Any:
+    """A new HDF5 file with the attributes of the format; on the disk, where it must not fill up, without a `driver`."""
     file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
     file.attrs["Conventions"] = CONVENTIONS
     file.attrs["format"] = FORMAT
@@ -170,7 +166,7 @@ def is_group(item: Any) -> bool:
 def put_empty(
     group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity, fill: int | None = None
 ) -> Any:
-    """A contiguous dataset that has its place in the file now (see `offset_of`) and is written by others.
+    """A contiguous dataset that has its place in the file now and is written by others.
 
     fill   its first value; without one it is what the file system makes of a new file, zeros. Scales as in `put`.
     """
@@ -187,11 +183,6 @@ def put_flags(dataset: Any, meanings: Sequence[str]) -> None:
     """Marks integer codes from 0 up as the CF conventions do; no meaning may contain a blank."""
     dataset.attrs["flag_values"] = np.arange(len(meanings), dtype=dataset.dtype)
     dataset.attrs["flag_meanings"] = " ".join(meanings)
-
-
-def offset_of(dataset: Any) -> int:
-    """Bytes from the beginning of the file to a contiguous dataset."""
-    return int(dataset.id.get_offset())
 
 
 def sync_folder(folder: Path) -> None:

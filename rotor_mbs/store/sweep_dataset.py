@@ -8,7 +8,9 @@ sync: a run is stored where its status is not -1 and its checksum is right.
 from __future__ import annotations
 
 import errno
+import json
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -94,7 +96,7 @@ class SweepDataset:
                     "another output file, or remove that one"
                 )
             row = self._layout.row
-            offsets = {name: hdf5.offset_of(file[name]) for name in (*(row.names or ()), "crc32")}
+            offsets = {name: file[name].id.get_offset() for name in (*(row.names or ()), "crc32")}
             marked = file["status"][()] != MISSING
         inode = self.path.stat().st_ino
         self.columns = RunColumns(self.path, inode, self._layout.first, offsets, row)
@@ -117,7 +119,7 @@ def _lay_out(path: Path, layout: SweepLayout) -> None:
     expected = _HEAD_BYTES + count * (layout.row.itemsize + 8 * (4 + len(layout.keys)))
     try:
         _reserve(temporary, expected)
-        with hdf5.new_file_at(temporary) as file:
+        with hdf5.begin_file(temporary) as file:
             hdf5.put_attributes(file, {**layout.attributes, "sweep_identity": layout.identity, "runs": count})
             _put_run_columns(file, layout)
             _put_result_columns(file, layout)
@@ -180,3 +182,52 @@ def _put_result_columns(file: Any, layout: SweepLayout) -> None:
         hdf5.put_empty(file, name, shape, kind, column, fill=MISSING if name == "status" else None)
     hdf5.put_empty(file, "crc32", (count,), np.dtype("<u4"), CRC32)
     hdf5.put_flags(file["status"], STATUSES)
+
+
+class StoredSweep:
+    """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none.
+
+    keys, units   of the varied parameters
+    attributes    of the file
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with hdf5.open_file(path) as file:
+            self.attributes = hdf5.attributes_of(file)
+            if "sweep_identity" not in self.attributes:
+                raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
+            self.keys: list[str] = self.attributes["parameter_keys"]
+            self.units = [str(hdf5.attributes_of(file[sweep_layout.parameter_name(key)])["units"]) for key in self.keys]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values along every axis of its grid, slowest first."""
+        return tuple(json.loads(self.attributes["shape"]))
+
+    def parameter(self, key: str) -> NDArray[np.float64]:
+        """(runs,) the values of a varied parameter. Raises StoreError."""
+        return self.column(sweep_layout.parameter_name(key))
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A dataset whole, such as `status` or `time`. Raises StoreError where there is none of that name."""
+        with hdf5.open_file(self._path) as file:
+            values: NDArray[Any] = self._dataset(file, name)[()]
+            return values
+
+    def pieces(self, name: str, runs: int) -> Iterator[NDArray[Any]]:
+        """The same in pieces of at most `runs` runs: for trajectories."""
+        with hdf5.open_file(self._path) as file:
+            dataset = self._dataset(file, name)
+            for first in range(0, len(dataset), runs):
+                yield dataset[first : first + runs]
+
+    def message(self, run: int) -> str:
+        """Why the run (counted in this file) did not end well; "" where it did."""
+        with hdf5.open_file(self._path) as file:
+            return bytes(file["message"][run]).rstrip(b"\0").decode(errors="replace")
+
+    def _dataset(self, file: Any, name: str) -> Any:
+        if name not in file:
+            raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")
+        return file[name]

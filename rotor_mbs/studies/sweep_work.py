@@ -17,8 +17,9 @@ from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
-from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_errors, largest
-from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.judgement import clearly_ok, judge
+from rotor_mbs.solution.metrics import energy_drifts, largest
+from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.record import Array, Integration
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
@@ -145,7 +146,7 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     assert block.kinetic_energy is not None  # a sweep's scenes ask for the energy
     assert block.potential_energy is not None
     assert block.work is not None
-    errors = energy_errors(block.kinetic_energy, block.potential_energy, block.work)
+    errors = energy_balance(block.kinetic_energy, block.potential_energy, block.work)
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
     ok = clearly_ok(scenes, chunk.method, block.integrations, block.samples, drifts)
     rows = empty_rows(len(scenes), chunk.row, METRICS)

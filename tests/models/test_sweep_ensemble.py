@@ -12,8 +12,9 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.variants import Variants
-from rotor_mbs.solution.batch_metrics import clearly_ok, energy_drifts, energy_errors
-from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.judgement import clearly_ok, judge
+from rotor_mbs.solution.metrics import energy_drifts
+from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.sweep_layout import row_type
@@ -210,7 +211,7 @@ def test_every_row_has_the_status_that_the_run_alone_would_have() -> None:
     assert block.kinetic_energy is not None
     assert block.potential_energy is not None
     assert block.work is not None
-    errors = energy_errors(block.kinetic_energy, block.potential_energy, block.work)
+    errors = energy_balance(block.kinetic_energy, block.potential_energy, block.work)
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
     well = clearly_ok(scenes, "lagrange/taylor", block.integrations, block.samples, drifts)
     for i, scene in enumerate(scenes):

@@ -19,7 +19,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.judgement import judge, judged
-from rotor_mbs.solution.quantities import BUILT_IN, Quantity, shapes
+from rotor_mbs.solution.quantities import BUILT_IN, Quantity
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, recode
@@ -97,12 +97,6 @@ def test_a_producer_of_another_shape_is_refused() -> None:
     wrong = Quantity("wrong", ("time", "blade"), "1", "", producer=lambda _, samples: samples.time)
     with pytest.raises(InputError, match=r"gives shape \(11,\); allowed: \(11, 3\)"):
         quantities.array_of(wrong, SCENE, moved(SCENE, 0.0))
-
-
-def test_shapes_are_those_of_a_complete_run() -> None:
-    run = solve("lagrange/dop853", SCENE, {})
-    expected = {quantity.name: shape for quantity, shape in shapes(SCENE, SCENE.outputs).items()}
-    assert expected == {name: values.shape for name, values in run.quantities.items()}
 
 
 def test_every_name_is_declared_once_and_every_judged_number_has_one_name() -> None:

@@ -20,9 +20,8 @@ from support.scenes import paper
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.sweep_columns import MISSING, Rows
-from rotor_mbs.store.sweep_dataset import SweepDataset
+from rotor_mbs.store.sweep_dataset import StoredSweep, SweepDataset
 from rotor_mbs.store.sweep_layout import SweepLayout, empty_rows, lost_rows, parameter_name
-from rotor_mbs.store.sweep_read import StoredSweep
 
 _RUNS = 23
 _STARTS = list(range(0, _RUNS, 4))

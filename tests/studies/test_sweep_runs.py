@@ -23,7 +23,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep, sweep_of
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.sweep_columns import Rows
-from rotor_mbs.store.sweep_read import StoredSweep
+from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.sweep import run_sweep
 from rotor_mbs.studies.sweep_work import Chunk, perform
 
