@@ -6,7 +6,7 @@ Reads the store alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,20 +63,14 @@ class SuiteRun:
 
     @property
     def family(self) -> str:
-        return family_of(self.scene)
+        """What its scene stresses: stiff, or the first part of an extreme scene's name."""
+        folder, _, name = self.scene.rpartition("/")
+        first = name.split("-")[0]
+        return "stiff" if folder == "stiff" else _FAMILIES.get(first, first)
 
     @property
     def is_stiff_or_light(self) -> bool:
         return self.family in ("stiff", "light")
-
-
-def family_of(scene: str) -> str:
-    """What a shipped scene stresses: stiff, or the first part of an extreme scene's name."""
-    folder, _, name = scene.rpartition("/")
-    if folder == "stiff":
-        return "stiff"
-    first = name.split("-")[0]
-    return _FAMILIES.get(first, first)
 
 
 _FAMILIES = {
@@ -176,72 +170,45 @@ def reached_by(found: Iterable[SuiteRun], scene: str) -> str | None:
     return min(able, key=lambda cell: cell.run_time_s).method if able else None
 
 
-@dataclass(frozen=True)
-class Advice:
-    """holds: scenes on which the method holds, of all it ran; by_energy: of those.
+def advice_lines(
+    found: Sequence[SuiteRun], label: Callable[[str], str] = str, heading: Callable[[str], str] = str
+) -> list[str]:
+    """Where each method holds, what to use it for and what not, a line per method.
 
-    use, in_part, avoid: families of scenes; by_smaller_step: whether a smaller step is what holds in part.
+    By family of scenes: use where nine tenths hold, not where fewer than half do even with a smaller step.
+
+    label, heading   how a method and a family are called
     """
-
-    method: str
-    holds: int
-    by_energy: int
-    of: int
-    use: tuple[str, ...]
-    in_part: tuple[str, ...]
-    by_smaller_step: bool
-    avoid: tuple[str, ...]
-    false_successes: int
+    by_method: dict[str, list[SuiteRun]] = {}
+    for run in found:
+        by_method.setdefault(run.method, []).append(run)
+    return [f"{label(method)}: {'; '.join(_advice(own, heading))}" for method, own in by_method.items()]
 
 
-def advice(found: Sequence[SuiteRun]) -> list[Advice]:
-    """Per method, by family: use where nine tenths hold, avoid where fewer than half do even with a smaller step."""
-    return [
-        _advice(method, [c for c in found if c.method == method]) for method in dict.fromkeys(c.method for c in found)
-    ]
-
-
-def _advice(method: str, own: Sequence[SuiteRun]) -> Advice:
-    use, in_part, avoid = [], [], []
-    for family in dict.fromkeys(cell.family for cell in own):
-        inside = [cell for cell in own if cell.family == family and cell.outcome != "refuses"]
-        if not inside:
+def _advice(own: Sequence[SuiteRun], heading: Callable[[str], str]) -> list[str]:
+    use: list[str] = []
+    in_part: list[str] = []
+    avoid: list[str] = []
+    for family in dict.fromkeys(run.family for run in own):
+        outcomes = [run.outcome for run in own if run.family == family and run.outcome != "refuses"]
+        if not outcomes:
             continue
-        holds = sum(cell.outcome in _HOLDS for cell in inside) / len(inside)
-        with_step = sum(cell.outcome in (*_HOLDS, "smaller_step") for cell in inside) / len(inside)
-        if holds >= 0.9:
-            use.append(family)
-        elif with_step >= 0.5:
-            in_part.append(family)
-        else:
-            avoid.append(family)
-    holding = sum(cell.outcome in _HOLDS for cell in own)
-    by_energy = sum(cell.outcome == "energy_alone" for cell in own)
-    claimed = sum(cell.false_success for cell in own)
-    smaller = any(cell.outcome == "smaller_step" and cell.family in in_part for cell in own)
-    return Advice(method, holding, by_energy, len(own), tuple(use), tuple(in_part), smaller, tuple(avoid), claimed)
-
-
-def summary_lines(found: Sequence[SuiteRun]) -> list[str]:
-    """The advice, a line per method."""
-    return [advice_line(one) for one in advice(found)]
-
-
-def advice_line(one: Advice) -> str:
-    """One line: where the method holds, what to use it for and what not."""
-    alone = f" ({one.by_energy} by its energy alone)" if one.by_energy else ""
-    parts = [f"{one.method}: holds on {one.holds} of {one.of}{alone}"]
-    if one.use:
-        parts.append(f"use for {_listed(one.use)}")
-    if one.in_part:
-        how = "with a smaller step or not everywhere" if one.by_smaller_step else "not everywhere"
-        parts.append(f"{how} for {_listed(one.in_part)}")
-    if one.avoid:
-        parts.append(f"do not use for {_listed(one.avoid)}")
-    if one.false_successes:
-        times = "once" if one.false_successes == 1 else f"{one.false_successes} times"
+        holds = sum(outcome in _HOLDS for outcome in outcomes) / len(outcomes)
+        with_step = sum(outcome in (*_HOLDS, "smaller_step") for outcome in outcomes) / len(outcomes)
+        (use if holds >= 0.9 else in_part if with_step >= 0.5 else avoid).append(family)
+    by_energy = sum(run.outcome == "energy_alone" for run in own)
+    alone = f" ({by_energy} by its energy alone)" if by_energy else ""
+    parts = [f"holds on {sum(run.outcome in _HOLDS for run in own)} of {len(own)}{alone}"]
+    smaller = any(run.outcome == "smaller_step" and run.family in in_part for run in own)
+    partly = "with a smaller step or not everywhere" if smaller else "not everywhere"
+    for action, families in (("use", use), (partly, in_part), ("do not use", avoid)):
+        if families:
+            parts.append(f"{action} for {_listed([*map(heading, families)])}")
+    claimed = sum(run.false_success for run in own)
+    if claimed:
+        times = "once" if claimed == 1 else f"{claimed} times"
         parts.append(f"its engine claimed success {times} where the state says otherwise")
-    return "; ".join(parts)
+    return parts
 
 
 def _listed(names: Sequence[str]) -> str:

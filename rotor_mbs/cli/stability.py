@@ -6,7 +6,7 @@ import argparse
 import sys
 import time
 
-from rotor_mbs.analysis.stability import summary_lines, unreached
+from rotor_mbs.analysis.stability import advice_lines, unreached
 from rotor_mbs.cli.terminal import ProgressLine, print_not_computed
 from rotor_mbs.report.pages.stability import write_stability_report
 from rotor_mbs.studies.stability import run_suite
@@ -19,7 +19,7 @@ def stability(arguments: argparse.Namespace) -> int:
         report = run_suite(
             arguments.scenes, output, workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress
         )
-    print(*summary_lines(report.runs), sep="\n")
+    print(*advice_lines(report.runs), sep="\n")
     print(f"{output}: {report.scenes} scenes, {len(report.runs)} runs, {time.monotonic() - start:.0f} s in all")
     pages = arguments.report or output.with_name(f"{output.stem}-report")
     print(f"report: {write_stability_report(output, pages)}")

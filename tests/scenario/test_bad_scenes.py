@@ -267,18 +267,9 @@ def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
         problem.split(": ")[0] + " " + problem.split(": ")[1].split(" ")[0] for problem in _problems(tmp_path, text)
     ]
     assert keys == [
-        ":1 title",
-        ":2 blades",
-        ":3 gravity",
-        ":5 samples",
-        ":6 outputs",
-        ":9 blade.mass",
-        ":10 blade.centre_of_mass",
-        ":11 blade.inertia",
-        ":15 initial.angles",
-        ":19 bearing.stiffness",
-        ":23 torque.rotor",
-    ]
+        ":1 title", ":2 blades", ":3 gravity", ":5 samples", ":6 outputs", ":9 blade.mass", ":10 blade.centre_of_mass",
+        ":11 blade.inertia", ":15 initial.angles", ":19 bearing.stiffness", ":23 torque.rotor",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -378,27 +369,9 @@ def test_errors_of_all_arguments_and_files_at_once(tmp_path: Path) -> None:
 
 _LINES = SCENE.splitlines(keepends=True)
 _SNIPPETS = st.sampled_from(
-    [
-        "[",
-        "]",
-        "{",
-        "}",
-        "=",
-        '"',
-        "'''",
-        "nan",
-        "-1",
-        "1e999",
-        "true",
-        "[[blade]]\n",
-        "blade.",
-        "\n",
-        "[]",
-        "{}",
-        "#",
-        "0",
-    ]
-)
+    ["[", "]", "{", "}", "=", '"', "'''", "nan", "-1", "1e999", "true", "[[blade]]\n", "blade.", "\n", "[]",
+     "{}", "#", "0"]
+)  # fmt: skip
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200, deadline=None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +11,8 @@ from rotor_mbs.analysis import methods
 from rotor_mbs.analysis.stability import (
     OUTCOMES,
     TARGET,
-    Advice,
     SuiteRun,
-    advice,
-    advice_line,
+    advice_lines,
     is_number,
     reached_by,
     suite_runs,
@@ -85,7 +82,7 @@ def _map(
         "methods": [label_of(name) for name in names],
         "families": list(families.items()),
         "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        "summary": [advice_line(_labelled(one)) for one in advice(found)],
+        "summary": advice_lines(found, label_of, lambda family: f"“{_family(family)}”"),
         "false_successes": sum(cell.false_success for cell in found),
         "limits": _limits(records),
         "conservation": _conservation(records),
@@ -94,14 +91,6 @@ def _map(
 
 def _family(name: str) -> str:
     return _FAMILIES.get(name, name)
-
-
-def _labelled(one: Advice) -> Advice:
-    """The advice with labels of methods and headings of families."""
-    use, in_part, avoid = (
-        tuple(f"“{_family(family)}”" for family in kind) for kind in (one.use, one.in_part, one.avoid)
-    )
-    return replace(one, method=label_of(one.method), use=use, in_part=in_part, avoid=avoid)
 
 
 def _mark(cell: SuiteRun) -> tuple[str, str, str]:
