@@ -10,11 +10,6 @@ from rotor_mbs.store.read import StoredRun, StoredScene
 PRINTED = "printed/ode45"
 
 
-def model_of(method: str) -> str:
-    """ "lagrange" of "lagrange/taylor"."""
-    return method.partition("/")[0]
-
-
 def in_catalogue_order(names: Iterable[str]) -> list[str]:
     """The names as the catalogue has them; after them those that it does not know."""
     known = method_names()

@@ -76,9 +76,7 @@ def _make(check: str, run: StoredRun, channel: str, value: float, bounds: Bounds
 def _motion_ends(scene: StoredScene) -> bool:
     """Whether the reference itself stops early: the motion does not exist beyond."""
     reference = scene.reference
-    if reference is None or "time" not in reference:
-        return False
-    return reference.status == "singular"
+    return reference is not None and "time" in reference and reference.status == "singular"
 
 
 def _of_run(run: StoredRun, bounds: Bounds, found: Rehydrated, motion_ends: bool) -> Iterator[Verdict]:

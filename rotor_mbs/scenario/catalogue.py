@@ -129,7 +129,10 @@ def _files(argument: str) -> list[_File]:
     except (OSError, ValueError):  # a name too long for the file system, a NUL in it
         is_folder = is_there = False
     if is_folder:
-        return _files_in(path)
+        paths = sorted(path.glob("*.toml"), key=lambda path: natural_key(path.name))
+        if not paths:
+            raise InputError(f"{shown_path(path)}: no TOML file in this folder; allowed: a folder of scene files")
+        return [_file(path) for path in paths]
     if path.suffix == ".toml":
         return [_file(path)]
     raise InputError(f"{_quoted(argument)}: {_unknown_argument(argument, is_there, shipped)}")
@@ -143,13 +146,6 @@ def _unknown_argument(argument: str, is_there: bool, shipped: Iterable[str]) -> 
     names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
     near = difflib.get_close_matches(argument, sorted(names), n=3, cutoff=0.5)
     return "no such scene; " + (f"near: {', '.join(near)}" if near else "allowed: what `rotor-mbs list` names")
-
-
-def _files_in(folder: Path) -> list[_File]:
-    paths = sorted(folder.glob("*.toml"), key=lambda path: natural_key(path.name))
-    if not paths:
-        raise InputError(f"{shown_path(folder)}: no TOML file in this folder; allowed: a folder of scene files")
-    return [_file(path) for path in paths]
 
 
 def _file(path: Path) -> _File:

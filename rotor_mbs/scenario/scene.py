@@ -10,9 +10,10 @@ import functools
 import hashlib
 import json
 import math
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import Any, Literal
 
 OUTPUTS = ("angles", "rates", "tip", "energy")  # built in
@@ -156,17 +157,12 @@ class Scene:
 
     def torque_at(self, time: float) -> float:
         """Rotor torque in N m at `time` in s; at a jump, the value after it."""
-        if not self.rotor_torque:
-            return 0.0
-        before = None
-        for row in self.rotor_torque:
-            if row[0] > time:
-                if before is None:
-                    return row[1]
-                (t0, tau0), (t1, tau1) = before, row
-                return tau0 + (tau1 - tau0) * (time - t0) / (t1 - t0)
-            before = row
-        return self.rotor_torque[-1][1]
+        rows = self.rotor_torque
+        following = bisect_right(rows, time, key=itemgetter(0))
+        if following in (0, len(rows)):
+            return rows[max(following - 1, 0)][1] if rows else 0.0
+        (t0, tau0), (t1, tau1) = rows[following - 1 : following + 1]
+        return tau0 + (tau1 - tau0) * (time - t0) / (t1 - t0)
 
 
 def scene_fields(*parts: Part) -> Iterator[Field[Any]]:

@@ -91,6 +91,14 @@ def _context(info: ValidationInfo) -> dict[str, Any]:
     return info.context if info.context is not None else {}
 
 
+def _one_per_blade(value: object, info: ValidationInfo, others: int, link: str) -> object:
+    """Of a list with a number for each blade and for `others` besides."""
+    blades = _context(info).get("blades")
+    if isinstance(value, list) and blades is not None and len(value) != others + blades:
+        raise invalid(f"{counted(len(value), 'number')} {link} {counted(blades, 'blade')}")
+    return value
+
+
 def _blades_named(indices: Sequence[int]) -> str:
     if len(indices) > 5:
         return f"{len(indices)} blades (number {indices[0] + 1} first)"
@@ -155,10 +163,7 @@ class BearingTable(Table):
     @field_validator("stiffness", "damping", mode="before")
     @classmethod
     def _has_one_per_blade(cls, value: object, info: ValidationInfo) -> object:
-        blades = _context(info).get("blades")
-        if isinstance(value, list) and blades is not None and len(value) != blades:
-            raise invalid(f"{counted(len(value), 'number')} in a list for {counted(blades, 'blade')}")
-        return value
+        return _one_per_blade(value, info, 0, "in a list for")
 
     @field_validator("stiffness", "damping")
     @classmethod
@@ -201,10 +206,7 @@ class InitialTable(Table):
     @field_validator("angles", "rates", mode="before")
     @classmethod
     def _has_one_per_coordinate(cls, value: object, info: ValidationInfo) -> object:
-        blades = _context(info).get("blades")
-        if isinstance(value, list) and blades is not None and len(value) != 1 + blades:
-            raise invalid(f"{counted(len(value), 'number')} for a rotor and {counted(blades, 'blade')}")
-        return value
+        return _one_per_blade(value, info, 1, "for a rotor and")
 
     @field_validator("rates")
     @classmethod

@@ -146,7 +146,7 @@ def _agreement(found: Sequence[Agreement]) -> str:
     known = [agreement for agreement in found if agreement.angle_error is not None]
     if not known:
         return ""
-    models = len({methods.model_of(agreement.method) for agreement in known})
+    models = len({agreement.method.partition("/")[0] for agreement in known})
     counts = {1: "One corrected model agrees", 2: "Two corrected models agree", 3: "Three corrected models agree"}
     errors = [f"{quantity(a.angle_error, 'rad')} ({label_of(a.method)})" for a in known]
     listed = errors[0] if len(errors) == 1 else f"{', '.join(errors[:-1])} and {errors[-1]}"
