@@ -30,7 +30,7 @@ from support.scenes import PAPER, paper
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.time_limit import time_limit
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples
+from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples, running_growth
 from rotor_mbs.solution.record import Trajectory
 
 pytest.importorskip("mujoco")
@@ -88,6 +88,21 @@ def test_the_scenes_of_the_paper_up_to_the_horizon(name: str) -> None:
     metrics = compare(scene, run(scene, step=1e-3), exact)
     assert metrics["angle_error_per_growth"] <= 1e-10
     assert metrics["energy_drift_max"] <= 1e-8
+
+
+@pytest.mark.parametrize(
+    ("integrator", "order", "steps"), [("rk4", 4, (2.5e-3, 1.25e-3)), ("implicitfast", 1, (2e-4, 1e-4))]
+)
+@pytest.mark.parametrize("name", PAPER)
+def test_the_order_on_every_scene_of_the_paper(
+    name: str, integrator: str, order: int, steps: tuple[float, float]
+) -> None:
+    """While an error of the start has grown less than a hundredfold; unless both runs end in round-off, below 1e-11."""
+    exact = references.reference(f"paper/{name}")
+    rows = max(int((running_growth(exact) < 100.0).sum()), 2)
+    scene = paper(name, duration=float(exact.time[rows - 1]), samples=rows, outputs=("angles", "rates"))
+    coarse, fine = (angle_error(run(scene, integrator, step), exact).max() for step in steps)
+    assert coarse < 1e-11 or np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
 
 
 @pytest.mark.slow
