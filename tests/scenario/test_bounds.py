@@ -11,16 +11,10 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.bounds import Bound, load_bounds, read_bounds, shipped_bounds
 
 BAD = {
-    "an unknown key": (
-        'check = "tip"\nmethod = "*"\nvalue = 1\nreason = "x"\nunit = "m"',
-        6,
-        "bound.unit .* not a key",
-    ),
-    "a wrong type": (
-        'check = "tip"\nmethod = "*"\nvalue = [1]\nreason = "x"',
-        4,
-        r"bound.value \(bound 1\): a list is",
-    ),
+    "an unknown key": ('check = "tip"\nmethod = "*"\nvalue = 1\nreason = "x"\nunit = "m"', 6,
+     "bound.unit .* not a key"),
+    "a wrong type": ('check = "tip"\nmethod = "*"\nvalue = [1]\nreason = "x"', 4,
+     r"bound.value \(bound 1\): a list is"),
     "truth for a number": ('check = "tip"\nmethod = "*"\nvalue = true\nreason = "x"', 4, "true is not a number"),
     "not a number": ('check = "tip"\nmethod = "*"\nvalue = nan\nreason = "x"', 4, "nan is out of range"),
     "an infinity": ('check = "tip"\nmethod = "*"\nvalue = inf\nreason = "x"', 4, "inf is out of range"),
@@ -29,7 +23,7 @@ BAD = {
     "no value": ('check = "tip"\nmethod = "*"\nreason = "x"', 1, "bound.value .*is missing; allowed: a number from 0"),
     "no reason": ('check = "tip"\nmethod = "*"\nvalue = 1\nreason = " "', 5, "reason .*is empty; allowed: a sentence"),
     "an unknown check": ('check = "tipp"\nmethod = "*"\nvalue = 1\nreason = "x"', 2, "perhaps tip; allowed: one of"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "line", "message"), BAD.values(), ids=BAD)

@@ -19,12 +19,14 @@ from rotor_mbs.scenario.scene_file import load_scene, new_scene_text, parse_scen
 CHANGES: dict[str, tuple[Any, str]] = {
     "title": ("Another", "title"),
     "figures": (["1", "2"], "figures"),
-    "gravity": (9.81000001, "gravity"),
+    "gravity": (9.810000000000002, "gravity"),
     "duration": ("2*pi", "duration"),
     "samples": (12, "samples"),
     "outputs": (["rates"], "outputs"),
     "blade[1].mass": (1e4, "blades"),
     "blade[0].inertia[2]": (301.0, "blades"),
+    "blade[2].centre_of_mass[1]": (0.25, "blades"),
+    "blade[2].tip[0]": (0.25, "blades"),
     "hub.inertia": (0.125, "hub_inertia"),
     "initial.angles[1]": ("deg(20)", "initial_angles"),
     "initial.rates": ((1, 2, 3, 4), "initial_rates"),
@@ -60,6 +62,7 @@ def test_a_change_reaches_its_field_alone_and_the_text(general: Scene, key: str)
     changed = general.replace(**{key: value})
     differing = {one.name for one in fields(Scene) if getattr(changed, one.name) != getattr(general, one.name)}
     assert differing == {field, "text"}
+    assert (scene_hash(changed) != scene_hash(general)) == (field not in ("title", "figures"))
     assert parse_scene(changed.text, changed.name) == changed
 
 

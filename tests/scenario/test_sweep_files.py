@@ -145,31 +145,18 @@ def test_initial_states_put_in_alone_make_the_same_scene_as_the_whole_file_would
 
 
 _BAD = {
-    "an unknown key": (
-        '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1]',
-        4,
-        "angels: is not a key here, perhaps angles",
-    ),
-    "an unknown key of two values, reported once": (
-        '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]',
-        4,
-        r"^[^\n]*initial\.angels\[1\]: initial\.angels: is not a key here[^\n]*$",
-    ),
+    "an unknown key": ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1]', 4,
+     "angels: is not a key here, perhaps angles"),
+    "an unknown key of two values, reported once": ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]', 4,
+     r"^[^\n]*initial\.angels\[1\]: initial\.angels: is not a key here[^\n]*$"),
     "an index too high": ('[[axis]]\nkey = "initial.angles[4]"\nvalues = [1]', 4, r"initial.angles\[3\]"),
-    "an unknown table": (
-        '[[axis]]\nkey = "bering.stiffness"\nvalues = [1]',
-        4,
-        "bering: is not a key here, perhaps bear",
-    ),
+    "an unknown table": ('[[axis]]\nkey = "bering.stiffness"\nvalues = [1]', 4,
+     "bering: is not a key here, perhaps bear"),
     "no number there": ('[[axis]]\nkey = "title"\nvalues = [1]', 4, "is not text"),
     "a table there": ('[[axis]]\nkey = "initial"\nvalues = [1]', 4, "1.0 is not a table"),
     "no path": ('[[axis]]\nkey = "initial..x"\nvalues = [1]', 4, "is not the path of a key; allowed"),
     "another shape": ('[[axis]]\nkey = "blades"\nvalues = [1, 2]', 4, "share one blades; allowed"),
-    "values not in a list": (
-        '[[axis]]\nkey = "gravity"\nvalues = 3',
-        5,
-        "is not a list; allowed: a list of numbers",
-    ),
+    "values not in a list": ('[[axis]]\nkey = "gravity"\nvalues = 3', 5, "is not a list; allowed: a list of numbers"),
     "a value that is not a number": ('[[axis]]\nkey = "gravity"\nvalues = [1, true]', 5, "true is not a number"),
     "an empty list": ('[[axis]]\nkey = "gravity"\nvalues = []', 5, "0 entries; allowed: a list of numbers"),
     "no values": ('[[axis]]\nkey = "gravity"', 3, "has no values; allowed: exactly one of values"),
@@ -178,34 +165,19 @@ _BAD = {
     "draws without random": ('draws = 3\n[[axis]]\nkey = "gravity"\nvalues = [1]', 4, "no axis is random"),
     "a range upside down": ('draws = 3\n[[axis]]\nkey = "gravity"\nuniform = [2, 1]', 6, "not below the second"),
     "log to zero": ('[[axis]]\nkey = "gravity"\nlog = {start = 0, end = 1, count = 3}', 5, "reaches 0 or less"),
-    "a key twice": (
-        '[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]',
-        3,
-        "more than one",
-    ),
+    "a key twice": ('[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]', 3,
+     "more than one"),
     "a value out of range": ('[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}', 4, "above 0"),
     "numbers that do not fit": ('[[axis]]\nkey = "blade.inertia[0]"\nvalues = [0, 1]', 4, "no rigid body"),
-    "unequal lists zipped": (
-        'combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
-        3,
-        "gravity has 1, hub.inertia has 2; allowed with zip",
-    ),
-    "1e12 runs": (
-        '[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}',
-        3,
-        "1,000,000,000,000 runs; allowed: at most",
-    ),
-    "a change of no key": (
-        'change = {"gravty" = 1}\n[[axis]]\nkey = "hub.inertia"\nvalues = [1]',
-        3,
-        "perhaps gravity",
-    ),
-    "an unknown name": (
-        'axes = 1\n[[axis]]\nkey = "gravity"\nvalues = [1]',
-        3,
-        "axes: is not a key here, perhaps axis",
-    ),
-}
+    "unequal lists zipped": ('combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
+     3, "gravity has 1, hub.inertia has 2; allowed with zip"),
+    "1e12 runs": ('[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}', 3,
+     "1,000,000,000,000 runs; allowed: at most"),
+    "a change of no key": ('change = {"gravty" = 1}\n[[axis]]\nkey = "hub.inertia"\nvalues = [1]', 3,
+     "perhaps gravity"),
+    "an unknown name": ('axes = 1\n[[axis]]\nkey = "gravity"\nvalues = [1]', 3,
+     "axes: is not a key here, perhaps axis"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "line", "message"), _BAD.values(), ids=list(_BAD))
