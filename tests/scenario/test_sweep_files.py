@@ -169,7 +169,8 @@ _BAD = {
      "more than one"),
     "a value out of range": ('[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}', 4, "above 0"),
     "numbers that do not fit": ('[[axis]]\nkey = "blade.inertia[0]"\nvalues = [0, 1]', 4, "no rigid body"),
-    "unequal lists zipped": ('combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
+    "unequal lists zipped": (
+     'combine = "zip"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "hub.inertia"\nvalues = [1, 2]',
      3, "gravity has 1, hub.inertia has 2; allowed with zip"),
     "1e12 runs": ('[[axis]]\nkey = "gravity"\nlinear = {start = 0, end = 1, count = 1000000000000}', 3,
      "1,000,000,000,000 runs; allowed: at most"),
