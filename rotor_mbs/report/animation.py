@@ -22,7 +22,7 @@ from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots.paths import projected
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.read import StoredRun, StoredScene, open_results
+from rotor_mbs.store.read import StoredScene, open_results
 
 Array = NDArray[Any]
 SUFFIXES = (".webp", ".gif", ".mp4")
@@ -77,13 +77,11 @@ def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
     needed = magnification(scene)
     factor = 1.0 if needed is None else float(magnified or needed)
-    drawn = {name: wires(scene, run.array("time"), _finite(run), at, factor) for name, run in runs.items()}
+    drawn = {
+        name: wires(scene, run.array("time"), np.nan_to_num(run.array("angles"), posinf=0.0, neginf=0.0), at, factor)
+        for name, run in runs.items()
+    }
     return (_picture(drawn, i, float(at[i]), factor) for i in range(0, len(at), _PATH_POINTS)), 1.0 / RATE
-
-
-def _finite(run: StoredRun) -> Array:
-    found: Array = np.nan_to_num(run.array("angles"), posinf=0.0, neginf=0.0)
-    return found
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.report.core.environment import render
-from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, write_pages
+from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, render, write_pages
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.paper_figures import PaperFigure, available

@@ -43,26 +43,13 @@ def _property(text: str) -> str:
 
 def as_json(verdicts: Sequence[Verdict]) -> str:
     """A list of objects; numbers that JSON cannot hold (NaN, infinity) become null."""
-    rows = [
-        {
-            "check": v.check,
-            "scene": v.scene,
-            "method": v.method,
-            "channel": v.channel,
-            "value": _number(v.value),
-            "bound": _number(v.bound),
-            "unit": v.unit,
-            "margin": _number(v.margin),
-            "passed": v.passed,
-            "look_at": v.look_at,
-        }
-        for v in verdicts
-    ]
+    names = ("check", "scene", "method", "channel", "value", "bound", "unit", "margin", "passed", "look_at")
+    rows = [{name: _finite(getattr(verdict, name)) for name in names} for verdict in verdicts]
     return json.dumps(rows, indent=1)
 
 
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _finite(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def junit(verdicts: Sequence[Verdict]) -> bytes:

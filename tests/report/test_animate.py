@@ -61,27 +61,6 @@ def test_wires_stand_where_the_rotor_is() -> None:
     np.testing.assert_allclose(drawn.edge[1, 0, 0], np.cos(np.radians(62.0)) * x)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["paper/fig12", "-o", "a.webp"], "'paper/fig12': no such scene in it; allowed: paper/fig11"),
-        (["../fig11", "-o", "a.webp"], "no such scene"),
-        (["paper/fig11", "-o", "a.avi"], "unknown kind of file .avi; allowed: .webp, .gif, .mp4"),
-        (["paper/fig11", "-o", "a.webp", "--results", "none.h5"], "no such file"),
-    ],
-)
-def test_bad_input_is_one_line_and_status_2(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str], message: str,
-) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
-    assert main(["animate", "--results", str(results), *arguments]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
-    assert not list(tmp_path.iterdir())
-
-
 def test_without_ffmpeg_a_film_is_refused_with_what_to_do(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,4 +1,4 @@
-"""`figures`: files for a manuscript, from a results file alone."""
+"""`figures`: files for a manuscript, from a results file alone; what it and `animate` do with bad input."""
 
 from __future__ import annotations
 
@@ -69,19 +69,25 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(results: Path) -
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--figure", "2"], "figure 2: not in it; allowed: 8, 9"),
-        (["--figure", "../11"], "figure ../11: not in it"),
-        (["--results", "none.h5"], "none.h5: no such file"),
+        (["figures", "--figure", "2", "-o", "out"], "figure 2: not in it; allowed: 8, 9"),
+        (["figures", "--figure", "../11", "-o", "out"], "figure ../11: not in it"),
+        (["figures", "--results", "none.h5", "-o", "out"], "none.h5: no such file"),
+        (["animate", "paper/fig12", "-o", "a.webp"], "'paper/fig12': no such scene in it; allowed: paper/fig08"),
+        (["animate", "../fig11", "-o", "a.webp"], "no such scene"),
+        (["animate", "paper/fig11", "-o", "a.avi"], "unknown kind of file .avi; allowed: .webp, .gif, .mp4"),
+        (["animate", "paper/fig11", "-o", "a.webp", "--results", "none.h5"], "no such file"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
-) -> None:
-    assert main(["figures", "--results", str(results), "-o", str(tmp_path / "out"), *arguments]) == 2
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str], message: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert main([arguments[0], "--results", str(results), *arguments[1:]]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
-    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("command", [["figures"], ["animate", "paper/fig11"], ["report"]])

@@ -284,13 +284,12 @@ def test_texts_from_the_file_are_escaped(tmp_path: Path) -> None:
     evil = "<script>alert(1)</script>"
     scene = replace(FIG11, name="a b/<i>", title=evil, text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
     failed = {"status": evil, "message": evil}
-    folder = write_report(
-        store(tmp_path / "r.h5", [Made(scene, f"{evil[:8]}>/x", SWING, attributes=failed)]), tmp_path / "o"
-    )
+    runs = [Made(scene, REFERENCE, SWING), Made(scene, f"lagrange/{evil[:8]}>x", SWING, attributes=failed)]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "o")
     for path in folder.parent.glob("*.html"):
         text = path.read_text(encoding="utf-8")
         assert evil not in text
-        assert f"{evil[:8]}>/x" not in text
+        assert f"{evil[:8]}>x" not in text
         assert "<i>" not in text
         assert "&lt;script&gt;" in text
 

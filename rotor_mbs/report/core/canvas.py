@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -154,8 +155,14 @@ def svg_text(figure: Figure, name: str = "rotor_mbs") -> str:
     return stream.getvalue()
 
 
-def colour_bar(figure: Figure, axes: Any, drawn: Any, label: str) -> None:
-    """A scale of the colours of `drawn`, to the right of its axes."""
+def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str) -> Any:
+    """Growth over `x` and `y` as colour, with a scale on the right; its powers of ten, from 1 to `largest`."""
+    levels = np.log10(np.clip(growth, 1.0, largest))
+    axes = panels.axes[0]
+    mesh = axes.pcolormesh(
+        x, y, levels, cmap="cividis", shading="nearest", vmin=0.0, vmax=np.log10(largest), rasterized=True
+    )
+    axes.grid(visible=False)
     with style():
-        bar = figure.colorbar(drawn, ax=axes)
-        bar.set_label(label)
+        panels.figure.colorbar(mesh, ax=axes).set_label(label)
+    return levels

@@ -12,8 +12,7 @@ from rotor_mbs.analysis.work_precision import TARGETS_RAD, by_scene, fastest, le
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import model_label
 from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry, mark_entry
-from rotor_mbs.report.core.environment import render
-from rotor_mbs.report.core.files import INDEX, page_names, write_pages
+from rotor_mbs.report.core.files import INDEX, page_names, render, write_pages
 from rotor_mbs.report.core.looks import label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture

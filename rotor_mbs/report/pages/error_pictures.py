@@ -31,6 +31,18 @@ def error_picture(
     return picture(panels, name, caption, f"{caption}, logarithmic axis: {largest}", notes)
 
 
+def line_picture(
+    curves: Mapping[str, Series], axis: str, name: str, caption: str, horizon: float | None, unit: str
+) -> Picture:
+    """The curves, by label, over one axis; their ranges as alternative text."""
+    ranges = [
+        f"{label} from {number(float(one.values.min()), 3)} to {number(float(one.values.max()), 3)}"
+        for label, one in curves.items()
+    ]
+    described = f"{caption} over time, in {unit}: {'; '.join(ranges)}."
+    return picture(histories.lines(list(curves.values()), axis, horizon), name, caption, described)
+
+
 def visible(curves: Curves) -> Curves:
     """The curves that a logarithmic axis can show."""
     return {method: one for method, one in curves.items() if one.values.max() > LOWEST}
@@ -45,12 +57,14 @@ def differences(runs: Runs, reference: StoredRun | None) -> Curves:
     """Largest angle difference (rad) from the reference over the coordinates, at the samples that both have."""
     if reference is None or "angles" not in reference or not len(reference.array("time")):
         return {}
-    found = {}
-    for method, run in runs.items():
-        if "angles" in run:
-            n = min(len(run.array("time")), len(reference.array("time")))
-            gap = np.abs(run.array("angles")[:n] - reference.array("angles")[:n]).max(axis=1)
-            found[method] = Series(reference.array("time")[:n], gap, look_of(method))
+    gaps = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
+    return {method: Series(reference.array("time")[: len(gap)], gap, look_of(method)) for method, gap in gaps.items()}
+
+
+def angle_difference(one: StoredRun, other: StoredRun) -> histories.Array:
+    """(common samples,) rad: the largest over the coordinates."""
+    n = min(len(one.array("time")), len(other.array("time")))
+    found: histories.Array = np.abs(one.array("angles")[:n] - other.array("angles")[:n]).max(axis=1)
     return found
 
 

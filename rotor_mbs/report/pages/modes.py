@@ -12,8 +12,7 @@ from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentenc
 from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.modes import multiblade
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.environment import render
-from rotor_mbs.report.core.files import INDEX, write_pages
+from rotor_mbs.report.core.files import INDEX, render, write_pages
 from rotor_mbs.report.core.looks import with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture

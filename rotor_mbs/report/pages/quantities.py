@@ -8,11 +8,10 @@ from itertools import product
 import numpy as np
 
 from rotor_mbs.analysis.rehydrate import scene_of
-from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry
+from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of, with_capital
-from rotor_mbs.report.core.numbers import number
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.error_pictures import Curves, error_picture, run_legend, visible
+from rotor_mbs.report.pages.error_pictures import Curves, error_picture, line_picture, run_legend, visible
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.time_histories import Series
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities
@@ -44,7 +43,10 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
             )
         elif len(quantity.dimensions) == 1:
             legend = [line_entry(label_of(m), look_of(m).colour, look_of(m).line) for m in own]
-            section = Section([_lines(quantity, plot, own, name, horizon)], legend)
+            lines = {
+                label_of(m): Series(run.array("time"), run.array(quantity.name), look_of(m)) for m, run in own.items()
+            }
+            section = Section([line_picture(lines, plot.axis, name, plot.title, horizon, quantity.units)], legend)
         else:
             section = _components(quantity, plot, own, name, horizon)
         found.append((name, plot.title, section))
@@ -64,17 +66,6 @@ def _columns(run: StoredRun, quantity: Quantity) -> histories.Array:
     """(n, components)."""
     values = run.array(quantity.name)
     return values.reshape(len(values), -1)
-
-
-def _lines(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Picture:
-    """A line per run of a quantity without components."""
-    series = [Series(run.array("time"), run.array(quantity.name), look_of(method)) for method, run in runs.items()]
-    ranges = [
-        f"{label_of(method)} from {number(float(one.values.min()), 3)} to {number(float(one.values.max()), 3)}"
-        for method, one in zip(runs, series, strict=True)
-    ]
-    described = f"{plot.title} over time, in {quantity.units}: {'; '.join(ranges)}."
-    return picture(histories.lines(series, plot.axis, horizon), name, plot.title, described)
 
 
 def _components(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:

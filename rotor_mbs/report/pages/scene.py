@@ -177,9 +177,10 @@ def _motion_picture(name: str, run: StoredRun, marked: Mapping[str, StoredRun], 
     caption = with_capital(label)
     if marked:
         caption += f", as lines; marks: {'; '.join(map(label_of, marked))}"
-    ranges = {} if motion.angles is None else dict(zip(run.labels, motion.angles.T, strict=False))
+    angles = [] if motion.angles is None else zip(run.labels, motion.angles.T, strict=False)
+    ranges = [f"{n} from {number(float(x.min()), 3)} to {number(float(x.max()), 3)} rad" for n, x in angles]
     panels = histories.motion(motion, [(motion_of(other), look_of(n)) for n, other in marked.items()], horizon)
-    return picture(panels, name, caption, _described(label, ranges), notes)
+    return picture(panels, name, caption, f"{label} over time: {'; '.join(ranges)}.", notes)
 
 
 def motion_of(run: StoredRun) -> histories.Motion:
@@ -194,21 +195,13 @@ def _rotor_picture(drawn: DrawnRuns) -> list[Picture]:
     if len(runs) < 2:
         return []
     looks = (Look("#000000", "-", ""), Look("#0072b2", "--", ""))
-    series = [
-        Series(run.array("time"), run.array("angles")[:, 0], look)
+    curves = {
+        label_of(run.method): Series(run.array("time"), run.array("angles")[:, 0], look)
         for run, look in zip(runs.values(), looks, strict=True)
-    ]
-    labels = [label_of(run.method) for run in runs.values()]
-    caption = f"The rotor's angle alone: {labels[0]}, solid black; {labels[1]}, dashed blue"
-    ranges = {label: one.values for label, one in zip(labels, series, strict=True)}
-    described = _described("Rotor angle alone", ranges)
-    return [picture(histories.lines(series, "rotor angle (rad)", drawn.horizon), "rotor", caption, described)]
-
-
-def _described(what: str, curves: Mapping[str, Array]) -> str:
-    """Alternative text: the range of each curve (rad)."""
-    ranges = [f"{n} from {number(float(x.min()), 3)} to {number(float(x.max()), 3)} rad" for n, x in curves.items()]
-    return f"{what} over time: {'; '.join(ranges)}."
+    }
+    solid, dashed = curves
+    caption = f"The rotor's angle alone: {solid}, solid black; {dashed}, dashed blue"
+    return [error_pictures.line_picture(curves, "rotor angle (rad)", "rotor", caption, drawn.horizon, "rad")]
 
 
 def difference_section(drawn: DrawnRuns) -> Section:

@@ -18,8 +18,7 @@ from rotor_mbs.analysis.stability import (
     suite_runs,
 )
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.environment import render
-from rotor_mbs.report.core.files import INDEX, page_names, write_pages
+from rotor_mbs.report.core.files import INDEX, page_names, render, write_pages
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import error_pictures

@@ -6,18 +6,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report import paper_figures
+from rotor_mbs.report.core import canvas, svg
 from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, quantity
 from rotor_mbs.report.pages.claims import description_of, unit_of
+from rotor_mbs.report.pages.error_pictures import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.report.paper_figures import HEADINGS, PATHS, TORQUES, PaperFigure, compared_runs
 from rotor_mbs.store.read import StoredRun, StoredScene
@@ -100,8 +100,6 @@ def _turned(run: StoredRun, torque: str) -> str:
 
 
 def _picture(figure: PaperFigure, letter: str, key: str, runs: Mapping[str, StoredRun], message: str) -> Picture:
-    from rotor_mbs.report.core import canvas, svg  # late: matplotlib, in the workers alone
-
     panels = canvas.grid(1, 1, 3.6) if figure.kind == PATHS else canvas.grid(2, 1, 1.7)
     with canvas.style():
         paper_figures.draw(figure, panels.axes, runs)
@@ -135,23 +133,17 @@ def comparison(scene: StoredScene) -> ModelComparison:
         if printed.status not in ("ok", "inaccurate"):
             ended = float(printed.array("time")[-1])
     if printed is not None and corrected is not None:
-        gap = _difference(printed, corrected)
+        gap = angle_difference(printed, corrected)
         largest = float(gap.max())
         apart = np.flatnonzero(gap > VISIBLE)
         visible = float(printed.array("time")[apart[0]]) if len(apart) else math.inf
     if exudyn is not None and corrected is not None:
-        gap = _difference(exudyn, corrected)
+        gap = angle_difference(exudyn, corrected)
         time = exudyn.array("time")[: len(gap)]
         until = min(until, float(time[-1]))
         near = float(gap[time <= until].max(initial=0.0))
     still = corrected is not None and bool(np.abs(corrected.array("angles")[:, 1:]).max(initial=0.0) < _ROUNDING)
     return ModelComparison(visible, largest, ended, still, pitch, gain, near, until)
-
-
-def _difference(one: StoredRun, other: StoredRun) -> NDArray[Any]:
-    n = min(len(one.array("time")), len(other.array("time")))
-    found: NDArray[Any] = np.abs(one.array("angles")[:n] - other.array("angles")[:n]).max(axis=1)
-    return found
 
 
 def _same_and_different(scene: StoredScene) -> tuple[str, str]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from rotor_mbs.analysis.campbell import FloquetTable, LinearModes, StabilityChart
 from rotor_mbs.analysis.modes import GROWTH
-from rotor_mbs.report.core.canvas import Panels, colour_bar, panels
+from rotor_mbs.report.core.canvas import Panels, growth_map, panels
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 
 SPEED_AXIS = "rotor speed (rad/s)"
@@ -89,13 +89,10 @@ def chart(found: StabilityChart) -> Panels:
     """Growth over a turn as colour over speed and stiffness, with the boundary of stability."""
     panel = panels((3.6,), SPEED_AXIS)
     axes = panel.axes[0]
-    levels = np.log10(np.clip(found.largest, 1.0, _MOST_GROWTH))
-    mesh = axes.pcolormesh(found.speeds, found.stiffnesses, levels, cmap="cividis", shading="nearest", vmin=0.0,
-                           vmax=np.log10(_MOST_GROWTH), rasterized=True)  # fmt: skip
+    label = "growth over a turn (powers of ten)"
+    growth_map(panel, found.speeds, found.stiffnesses, found.largest, _MOST_GROWTH, label)
     boundary = np.where(np.isfinite(found.largest), found.largest, _MOST_GROWTH) - (1.0 + GROWTH)
     if min(found.largest.shape) > 1 and boundary.min() < 0.0 < boundary.max():
         axes.contour(found.speeds, found.stiffnesses, boundary, levels=[0.0], colors=[_ACCENT], linewidths=1.0)
-    axes.grid(visible=False)
     axes.set_ylabel("bearing stiffness (N m/rad)")
-    colour_bar(panel.figure, axes, mesh, "growth over a turn (powers of ten)")
     return panel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap
-from rotor_mbs.report.core.canvas import colour_bar, log_axis, panels, svg_text
+from rotor_mbs.report.core.canvas import growth_map, log_axis, panels, svg_text
 
 _INK, _ACCENT = "#0072b2", "#d55e00"  # Okabe-Ito blue and vermillion
 _MOST_GROWTH = 1e4  # the colours end there: the pitch has turned many times
@@ -37,17 +37,14 @@ def map_figure(found: StabilityMap, title: str) -> str:
     """Growth of the pitches as colour over both axes, with the line where they grew tenfold."""
     panel = panels((3.8,), f"{found.x_key} ({found.x_unit})")
     axes = panel.axes[0]
-    levels = np.log10(np.clip(found.growth, 1.0, _MOST_GROWTH))
-    mesh = axes.pcolormesh(found.x, found.y, levels, cmap="cividis", shading="nearest", vmin=0.0,
-                           vmax=np.log10(_MOST_GROWTH), rasterized=True)  # fmt: skip
+    label = "largest pitch, of its start (powers of ten)"
+    levels = growth_map(panel, found.x, found.y, found.growth, _MOST_GROWTH, label)
     if found.unstable.any() and not found.unstable.all():
         axes.contour(found.x, found.y, levels, levels=[np.log10(GROWN)], colors=[_ACCENT], linewidths=1.0)
         axes.plot([], [], color=_ACCENT, lw=1.0, label=f"{GROWN:g} times its start")
         axes.legend(loc="upper right")
-    axes.grid(visible=False)
     axes.ticklabel_format(style="plain")
     axes.set_ylabel(f"{found.y_key} ({found.y_unit})")
     axes.set_title(title, fontsize=9.5)
     panel.figure.subplots_adjust(left=0.18, top=0.92)
-    colour_bar(panel.figure, axes, mesh, "largest pitch, of its start (powers of ten)")
     return svg_text(panel.figure)
