@@ -7,8 +7,9 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
+from scipy.special import ellipk
 from support.exudyn_runs import CHAIN, EXPLICIT, METHODS, TREE, energy_error, run
-from support.rotors import AXIAL, PAPER, C, D, make_scene, pendulum
+from support.rotors import AXIAL, FIG11, PAPER, C, D, closed_form, energies, make_scene, pendulum
 
 # Explicit schemes resolve these slow motions to round-off; order 2 at 2.5e-4 to 5e-4 s leaves h² times the fourth
 # derivative, some 1e-8, and the constraints of the chain their Newton tolerance.
@@ -126,3 +127,27 @@ def test_a_thousand_radians_a_second_are_counted_turn_by_turn(name) -> None:
     got = run(name, scene, **({"node": "rotation_vector", "step": 5e-3} if name in CHAIN else {}))
     assert np.abs(got.angles[:, 1] - (-50.0 + 1000.0 * got.time)).max() < 1e-6
     assert np.abs(got.rates[:, 1] - 1000.0).max() < 1e-6
+
+
+# The oracle itself: elliptic pendulum, period, energy.
+
+
+def test_closed_form_swings_as_the_elliptic_pendulum() -> None:
+    scene = make_scene([11 * pi / 12, 0.0], [0.0, 0.0], duration=1.0)
+    t = np.linspace(0.0, 1.0, 101)
+    exact = pendulum(11 * pi / 12, hypot(C, D), np.arctan2(C, D), 9.8, t)
+    # steps at 1e-13; the solver's interpolation between them, of order 7, is worse by a figure or two
+    assert np.abs(closed_form(scene)[:, 0] - exact).max() < 1e-11
+
+
+def test_pendulum_comes_back_after_its_period() -> None:
+    k = np.sin(0.5 * (11 * pi / 12 - pi))
+    period = 4.0 * ellipk(k * k) / np.sqrt(9.8 / D)
+    assert pendulum(11 * pi / 12, D, 0.0, 9.8, period) == pytest.approx(11 * pi / 12, abs=1e-13)
+
+
+def test_closed_form_keeps_its_energy() -> None:
+    y = closed_form(FIG11, 2.0)
+    total = sum(energies(FIG11, y))
+    # weight times height is 7e6 J; the solver's tolerance is 1e-13 of the state
+    assert np.ptp(total) < 1e-11 * 3 * 15000 * 9.8 * D

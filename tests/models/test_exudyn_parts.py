@@ -235,12 +235,6 @@ def test_cumulative_integral_is_exact_for_quintics_on_uneven_rows() -> None:
     assert np.allclose(got, t**6 - t**2 - (t[0] ** 6 - t[0] ** 2), rtol=1e-11)
 
 
-@pytest.mark.parametrize("rows", [2, 3, 5])
-def test_cumulative_integral_of_few_rows(rows) -> None:
-    t = np.linspace(0.0, 1.0, rows)
-    assert energy.cumulative_integral(t, 2 * t)[-1] == pytest.approx(1.0, abs=1e-14)
-
-
 def test_mountings_balance_exactly() -> None:
     for count in (2, 3, 4, 6):
         assert not sum(geometry.mounting(i, count)[0, 0] for i in range(count))

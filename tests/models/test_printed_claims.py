@@ -1,28 +1,16 @@
-"""reference/published.toml: written in its own vocabulary, about scenes that exist, quoting what the paper says."""
+"""reference/published.toml: the four numbers of the paper; claims about scenes and statistics that exist."""
 
 from __future__ import annotations
 
-import tomllib
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).parents[2]
-with (ROOT / "reference" / "published.toml").open("rb") as file:
-    FILE = tomllib.load(file)
-PUBLISHED, CONDITIONS = FILE["published"], FILE["conditions"]
-
-STATISTICS = {"min", "max", "max_abs", "range", "max_abs_change", "net_change", "reversals", "growth", "swing_ratio"}
-
-
-def measures(entry):
-    yield from [entry["of"]] if "of" in entry else []
-    for test in entry.get("tests", []):
-        yield from [test[side] for side in ("of", "than") if side in test]
+from rotor_mbs.analysis.published import conditions, published
+from rotor_mbs.analysis.statistics import STATISTICS
+from rotor_mbs.scenario.catalogue import find_scenes
 
 
 def test_the_four_published_numbers():
-    numbers = {(e["of"][0], e["of"][3]): e["value"] for e in PUBLISHED if e["kind"] == "number"}
+    numbers = {(one.of.scene, one.of.statistic): one.value for one in published() if one.is_number}
     assert numbers == {
         ("paper/fig11", "max"): 2.7315,
         ("paper/fig05", "min"): 0.5127,
@@ -32,21 +20,15 @@ def test_the_four_published_numbers():
 
 
 def test_ids_are_unique():
-    assert len({entry["id"] for entry in PUBLISHED}) == len(PUBLISHED)
+    assert len({one.id for one in published()}) == len(published())
 
 
-@pytest.mark.parametrize("entry", PUBLISHED, ids=lambda entry: entry["id"])
-def test_vocabulary(entry):
-    expected = {"number": {"of", "value", "decimals"}, "claim": {"statement", "tests"}}[entry["kind"]]
-    assert entry.keys() - {"rounding"} == {"id", "figure", "kind", "quote"} | expected
+@pytest.mark.parametrize("one", published(), ids=lambda one: one.id)
+def test_what_is_measured_exists(one):
     # A number that is rounding error is said to be so in the conditions, by its figure.
-    assert not entry.get("rounding") or "likelier reading" in CONDITIONS[f"fig{int(entry['figure']):02d}"]
-    for scene, quantity, coordinate, statistic in measures(entry):
-        assert (ROOT / "scenarios" / f"{scene}.toml").is_file()
-        assert quantity in ("angle", "rate")
-        assert coordinate in range(4)
-        assert statistic in STATISTICS
-    for test in entry.get("tests", []):
-        other = {"<": {"bound", "than"}, ">": {"bound", "than"}, "opposite": {"than"}}
-        assert len(test.keys() & other[test["relation"]]) == 1
-        assert test.keys() <= {"of", "relation", "bound", "than"}
+    assert not one.rounding or "likelier reading" in conditions()[f"fig{int(one.figure):02d}"]
+    for asked in [one.of, *(side for test in one.tests for side in (test.of, test.than))]:
+        if asked is not None:
+            assert len(find_scenes([asked.scene])) == 1
+            assert asked.coordinate in range(4)
+            assert asked.statistic in STATISTICS

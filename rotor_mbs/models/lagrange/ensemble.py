@@ -8,16 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.observables import CompiledObservables, tip_numbers
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
-from rotor_mbs.models.lagrange.system import build_system, compiled, equation_numbers, is_compact, set_parameters
+from rotor_mbs.models.lagrange.system import (
+    build_system,
+    compiled,
+    equation_numbers,
+    is_compact,
+    set_parameters,
+    state_symbols,
+)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
@@ -26,6 +34,8 @@ _HUGE = 1e13
 
 # Samples of all runs side by side: what is worked on stays near the processor.
 _AT_ONCE = 4096
+# Samples of a run whose tips and energies are evaluated at once, with the rotor's numbers anew for each of them.
+_OBSERVED_AT_ONCE = 1024
 
 
 @dataclass
@@ -132,7 +142,7 @@ def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
 def _rotor_numbers(scene: Scene) -> _RotorNumbers:
     parameters = Parameters()
     equation_numbers(scene, parameters)
-    tip_numbers(scene, parameters)
+    _tip_numbers(scene, parameters)
     structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
     return _RotorNumbers(array_of(parameters.values, quad=False), structure)
 
@@ -146,6 +156,55 @@ def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) ->
         return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
 
     return compiled(("batch", tolerance, structure), make)
+
+
+def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
+    """(blades, 3) its tips in m, numbers that come after those of the equations; [] where none are asked for."""
+    if not scene.wants("tip"):
+        return []
+    return [[parameters(Fraction(x)) for x in blade.tip] for blade in scene.blades]
+
+
+def _observables(example: Scene) -> Any:
+    """Tips and energies as compiled code, for scenes of one structure; None where none are asked for.
+
+    It takes a tenth of the time that NumPy takes for the same formulas, a quarter of a run with 1,001 samples.
+    """
+    engine = heyoka()
+    parameters = Parameters()
+    form, _ = equation_numbers(example, parameters)
+    points = _tip_numbers(example, parameters)
+    angles, rates = state_symbols(form)
+    moving = dict(zip(example.moving_coordinates, angles, strict=True))
+    pitches = [moving[i] if i in moving else parameters.own(Fraction(0)) for i in range(1, 1 + len(example.blades))]
+    found: list[Any] = []
+    for i, point in enumerate(points):
+        azimuth = angles[0] + example.phases[i]
+        found += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos)
+    if example.wants("energy"):
+        found += closed_form.energies(angles, rates, form, engine.sin, engine.cos)
+    # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
+    rows = [engine.expression(0.0) + row for row in found]
+    return engine.cfunc(rows, [*angles, *rates], compact_mode=is_compact(example)) if rows else None
+
+
+def _observed(function: Any, states: Array, numbers: Array) -> Array:
+    """(rows, runs, samples): x y z in m of each blade's tip, then kinetic and potential energy in J, where asked for.
+
+    states    (variables, runs, samples): angles and rates that move, rad and rad/s
+    numbers   (parameters, runs): of equations and tips, then the pitches that are fixed
+    The runs must fill the processor's lanes, once or more: what is left over is rounded by other instructions.
+    """
+    _, runs, samples = states.shape
+    if function is None:
+        return np.empty((0, runs, samples))
+    parts = []
+    for i in range(0, samples, _OBSERVED_AT_ONCE):
+        part = states[: function.nvars, :, i : i + _OBSERVED_AT_ONCE]
+        spread = np.broadcast_to(numbers[: function.nparams, :, None], (function.nparams, runs, part.shape[2]))
+        inputs, pars = (np.ascontiguousarray(each).reshape(len(each), -1) for each in (part, spread))
+        parts.append(function(inputs, pars=pars, batch_parallel=False).reshape(-1, runs, part.shape[2]))
+    return np.concatenate(parts, axis=2)
 
 
 class _Group:
@@ -164,7 +223,7 @@ class _Group:
         self.places, self.scenes = places, scenes
         self.integrator = _integrator(structure, tolerance, example)
         outputs = example.wants("tip"), example.wants("energy")
-        self.observables = compiled(("observables", *outputs, structure), lambda: CompiledObservables(example))
+        self.observables = compiled(("observables", *outputs, structure), lambda: _observables(example))
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
@@ -194,7 +253,7 @@ class _Group:
 
     def put(self, block: Block, columns: Sequence[int], states: Array, integrations: Sequence[Integration]) -> None:
         """The runs of the first len(integrations) columns into the block, with their tips and energies."""
-        found = self.observables(states, self.numbers[:, columns])
+        found = _observed(self.observables, states, self.numbers[:, columns])
         runs, count = len(integrations), len(self.moving)
         states, found = states[:, :runs], found[:, :runs]
         places, scenes = [self.places[i] for i in columns[:runs]], [self.scenes[i] for i in columns[:runs]]

@@ -137,20 +137,8 @@ def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
     weight = Fraction(blade.mass) * gravity
     schur = [xx - xz * xz / zz, yy - yz * yz / zz, 2 * (xy - xz * yz / zz)]
     lever = [weight * (z + xz * x / zz), weight * (z + yz * y / zz), weight * (xz * y + yz * x) / zz]
-    return [
-        *schur,
-        xx - yy,
-        xy,
-        xz,
-        yz,
-        xz / zz,
-        yz / zz,
-        zz,
-        weight * x,
-        weight * y,
-        weight * z,
-        *lever,
-    ]
+    slope, coupling, weights = [xx - yy, xy], [xz, yz], [weight * x, weight * y, weight * z]
+    return [*schur, *slope, *coupling, xz / zz, yz / zz, zz, *weights, *lever]
 
 
 _ONE = 10**60  # of whole numbers that stand for fractions
