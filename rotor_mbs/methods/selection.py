@@ -63,8 +63,7 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
             continue
         x, y, z = blade.centre_of_mass
         inertia = blade.inertia[2] + blade.mass * (x * x + y * y)
-        stiffness = scene.bearing_stiffness[i] if scene.bearing_stiffness else 0.0
-        damping = scene.bearing_damping[i] if scene.bearing_damping else 0.0
+        stiffness, damping = scene.bearing(i)
         moment = stiffness + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
         swing = max(swing, math.sqrt(moment / inertia), abs(scene.initial_rates[1 + i]))
         decay = max(decay, damping / inertia)

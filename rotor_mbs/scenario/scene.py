@@ -128,6 +128,11 @@ class Scene:
         """Columns of the angles that move: 0, the rotor, then 1 + i for each blade i whose pitch has inertia."""
         return [0, *(1 + i for i, blade in enumerate(self.blades) if blade.has_pitch_inertia)]
 
+    def bearing(self, blade: int) -> tuple[float, float]:
+        """Stiffness (N m/rad) and damping (N m s/rad) of the pitch bearing of a blade, counted from 0."""
+        stiffness = self.bearing_stiffness[blade] if self.bearing_stiffness else 0.0
+        return stiffness, self.bearing_damping[blade] if self.bearing_damping else 0.0
+
     @property
     def rotor_key(self) -> tuple[object, ...]:
         """The rotor's parameters and loads: equal for scenes that differ in start, run or label alone."""

@@ -52,8 +52,7 @@ def _blade_row(number: int, blade: Blade) -> str:
 
 
 def _bearing_row(scene: Scene, blade: int) -> str:
-    stiffness = float(scene.bearing_stiffness[blade]) if scene.bearing_stiffness else 0.0
-    damping = float(scene.bearing_damping[blade]) if scene.bearing_damping else 0.0
+    stiffness, damping = map(float, scene.bearing(blade))
     return f"| {blade + 1} | {stiffness!r} | {damping!r} |"
 
 

@@ -130,8 +130,7 @@ def _modes(scene: Scene, blade: int) -> tuple[complex, complex]:
     """Of one pitch about zero, with the rotor fixed: gravity and rotation are negligible beside such a spring."""
     x, y, _ = scene.blades[blade].centre_of_mass
     inertia = scene.blades[blade].inertia[2] + scene.blades[blade].mass * (x * x + y * y)
-    damping = scene.bearing_damping[blade] if scene.bearing_damping else 0.0
-    return oscillator_modes(inertia, scene.bearing_stiffness[blade], damping)
+    return oscillator_modes(inertia, *scene.bearing(blade))
 
 
 def _stays(scene: Scene, method: str, steps: int) -> bool:

@@ -96,7 +96,7 @@ _TARGETS = (
     ),
     # About the common centre of mass, which a change moves to second order alone.
     Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
-    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_of_blade", "_rotor_torque", "_tip_sensor")),
+    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_rotor_torque", "_tip_sensor")),
     Target("multibody", f"{_M}.energy", ("*",)),
     Target("multibody", f"{_M}.timetable", ("at", "torque_segments", "integration_intervals")),
     Target("multibody", f"{_M}.readings", ("_fields", "_add_energies")),

@@ -137,8 +137,7 @@ def _bearing(name: str, first: Part, second: Part) -> list[Part]:
 
 
 def _pitch_spring(scene: Scene, blade: int, seat: str, root: str) -> list[Part]:
-    stiffness = scene.bearing_stiffness[blade] if scene.bearing_stiffness else 0.0
-    damping = scene.bearing_damping[blade] if scene.bearing_damping else 0.0
+    stiffness, damping = scene.bearing(blade)
     name = f"pitch spring {blade + 1}"
     if not stiffness:
         return [_spring(name, seat, root, damping=damping)] if damping else []

@@ -5,8 +5,6 @@ Knows the engine through the blueprint alone. Exact zeros stay exact: no coordin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
@@ -80,20 +78,16 @@ def _tree(scene: Scene) -> Part:
     if scene.gravity != 0.0:
         parameters["gravity"] = [0.0, 0.0, -scene.gravity]
         detail += ", gravity"
-    if any(stiffness := [_of_blade(scene.bearing_stiffness, i) for i in blades]):
+    if any(stiffness := [scene.bearing(i)[0] for i in blades]):
         parameters["jointPControlVector"] = [0.0, *stiffness]
         parameters["jointPositionOffsetVector"] = [0.0 for _ in links]
         detail += ", bearing stiffness"
-    damping = [scene.shaft_damping, *(_of_blade(scene.bearing_damping, i) for i in blades)]
+    damping = [scene.shaft_damping, *(scene.bearing(i)[1] for i in blades)]
     if any(damping):
         parameters["jointDControlVector"] = damping
         parameters["jointVelocityOffsetVector"] = [0.0 for _ in links]
         detail += ", damping"
     return Part("object", _TREE.name, "ObjectKinematicTree", parameters, detail)
-
-
-def _of_blade(values: Sequence[float], blade: int) -> float:
-    return values[blade] if values else 0.0
 
 
 def _rotor_torque(scene: Scene, torque: RotorTorque) -> list[Part]:

@@ -96,9 +96,8 @@ def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
     for i, blade in enumerate(scene.blades):
         phase = [_cosine_of_turn(Fraction(i, count)), _cosine_of_turn(Fraction(i, count) - Fraction(1, 4))]
         if blade.has_pitch_inertia:
-            stiffness = Fraction(scene.bearing_stiffness[i]) if scene.bearing_stiffness else Fraction(0)
-            damping = Fraction(scene.bearing_damping[i]) if scene.bearing_damping else Fraction(0)
-            values = [*phase, *_coefficients(blade, gravity), stiffness, damping, *_rotor_inertia(blade)]
+            bearing = (Fraction(value) for value in scene.bearing(i))
+            values = [*phase, *_coefficients(blade, gravity), *bearing, *_rotor_inertia(blade)]
             forms.append(BladeForm(*(convert(value) for value in values)))
         else:
             inertia += _rotor_inertia(blade)[1]

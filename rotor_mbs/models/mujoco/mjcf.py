@@ -104,8 +104,7 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
     body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(*_quaternion(phase, pitch)))
     if blade.has_pitch_inertia:
-        stiffness = scene.bearing_stiffness[number - 1] if scene.bearing_stiffness else 0.0
-        damping = scene.bearing_damping[number - 1] if scene.bearing_damping else 0.0
+        stiffness, damping = scene.bearing(number - 1)
         _joint(body, number, "0 0 1", stiffness, damping)
     _inertial(body, blade.mass, blade.centre_of_mass, blade.inertia)
     if scene.wants("tip"):
