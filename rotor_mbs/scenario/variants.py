@@ -140,20 +140,17 @@ class Variants:
         self._rotors: dict[tuple[float, ...], Scene] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """A rotor common to all runs is pickled, too, so that the receiver need not validate it, which is slow."""
+        """Once a scene was made, a rotor common to all runs is pickled, too: the receiver need not validate it."""
         return self.__dict__ | {"_rotors": {} if self._rest else self._rotors}
-
-    def prepare(self, values: Sequence[float]) -> None:
-        """Validates the rotor of all runs, where there is only one. Raises TableError.
-
-        values   of any run
-        """
-        if not self._rest:
-            self._rotor((), values)
 
     def scene(self, values: Sequence[float]) -> Scene:
         """The scene with `values`, one per key, in place. Raises TableError."""
-        rotor = self._rotor(tuple(values[i] for i, _ in self._rest), values)
+        numbers = tuple(values[i] for i, _ in self._rest)
+        if numbers not in self._rotors:
+            if len(self._rotors) >= _MAX_ROTORS:
+                self._rotors.clear()
+            self._rotors[numbers] = self._validated(values)
+        rotor = self._rotors[numbers]
         if not self._start:
             return rotor
         state: dict[str, Any] = {name: list(getattr(rotor, name)) for name in _START.values()}
@@ -162,13 +159,6 @@ class Variants:
         state = {name: tuple(numbers) for name, numbers in state.items()}
         scene = replace(rotor, **state)
         return scene if _is_plain(scene) else self._validated(values)
-
-    def _rotor(self, numbers: tuple[float, ...], values: Sequence[float]) -> Scene:
-        if numbers not in self._rotors:
-            if len(self._rotors) >= _MAX_ROTORS:
-                self._rotors.clear()
-            self._rotors[numbers] = self._validated(values)
-        return self._rotors[numbers]
 
     def _validated(self, values: Sequence[float]) -> Scene:
         tables = copy.deepcopy(dict(self._tables))

@@ -82,7 +82,7 @@ class SweepPlan:
         """The runs of `gaps`, cut into what one of `workers` does at once."""
         variants, row = self.sweep.variants(), self.layout.row
         for first, _ in gaps[:1]:
-            variants.prepare(self.values(first, first + 1)[0].tolist())
+            variants.scene(self.values(first, first + 1)[0].tolist())
         left = sum(last - first for first, last in gaps)
         for gap in gaps:
             for first, last in self._by_method(*gap):
