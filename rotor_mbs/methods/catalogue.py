@@ -83,11 +83,8 @@ def is_corrected(name: str) -> bool:
 
 def default_methods() -> tuple[str, ...]:
     """Names of the methods that run where none is named; a fallback in place of one that is not installed."""
-    return tuple(_or_fallback(method) for method in methods() if method.is_default)
-
-
-def _or_fallback(method: Method) -> str:
-    return method.fallback if method.fallback and not method.is_installed else method.name
+    defaults = (method for method in methods() if method.is_default)
+    return tuple(one.name if one.is_installed or not one.fallback else one.fallback for one in defaults)
 
 
 def errata_methods() -> dict[str, str]:

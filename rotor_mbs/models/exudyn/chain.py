@@ -65,7 +65,7 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     return out
 
 
-def parts(scene: Scene, torque: RotorTorque, node: str) -> list[Part]:
+def parts(scene: Scene, torque: RotorTorque, node: str = NODES[0]) -> list[Part]:
     """Everything the engine holds for this scene, in the order it is built; `node` is one of NODES."""
     hub, *blades = placed_bodies(scene)
     built = [Part("object", "ground", "ObjectGround")]

@@ -111,22 +111,18 @@ def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
     return scheme
 
 
-def _tree_items(scene: Scene) -> list[Item]:
-    return blueprint.items(tree.parts(scene, RotorTorque(scene)))
-
-
-def _chain_items(scene: Scene) -> list[Item]:
-    return blueprint.items(chain.parts(scene, RotorTorque(scene), chain.NODES[0]))
-
-
 def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
     """What all six have in common."""
     in_tree = model == "exudyn_tree"
+
+    def items(scene: Scene) -> list[Item]:
+        return blueprint.items((tree if in_tree else chain).parts(scene, RotorTorque(scene)))
+
     return Method(
         name=f"{model}/{integrator}",
         label=f"Exudyn {'tree' if in_tree else 'chain'}, {label}",
         build=_build_tree if in_tree else _build_chain,
-        items=_tree_items if in_tree else _chain_items,
+        items=items,
         distributions=("exudyn",),
         hint="pip install exudyn",
         relative_cost=10.0 if in_tree else 100.0,

@@ -65,7 +65,7 @@ def _all_blades(scene: Scene, moving: Array, fixed: Sequence[float]) -> Array:
     """(n, 1 + blades): the columns that move, and the fixed value where a blade cannot pitch."""
     out = np.empty((len(moving), len(fixed)))
     out[:] = fixed
-    out[:, [0, *(1 + i for i in pitching(scene))]] = moving
+    out[:, scene.moving_coordinates] = moving
     return out
 
 

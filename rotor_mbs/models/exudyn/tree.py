@@ -52,7 +52,7 @@ def link_name(link: int) -> str:
 
 
 def _node(scene: Scene) -> Part:
-    moving = [0, *(1 + i for i in pitching(scene))]
+    moving = scene.moving_coordinates
     parameters = {
         "referenceCoordinates": [0.0] * len(moving),
         "initialCoordinates": [scene.initial_angles[j] for j in moving],
