@@ -13,9 +13,9 @@ from rotor_mbs.analysis.campbell import LinearModes, SceneModes, mode_rows
 from rotor_mbs.analysis.mode_records import linear_dataset, to_records
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.pages.modes import write_modes_pages
 from rotor_mbs.report.plots import modes as plots
-from rotor_mbs.report.run_plots import Drawing
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
@@ -81,29 +81,29 @@ class ModePlots:
     def __init__(self, modes: SceneModes) -> None:
         self._modes = modes
 
-    def __call__(self) -> Drawing:
+    def __call__(self) -> Panels:
         """Campbell diagram: damped frequencies (rad/s) over rotor speed. Raises InputError without speeds."""
         rotation = self._rotation()
         panels = plots.campbell(rotation)
         looks = [plots.mode_look(k) for k in range(len(rotation.names))]
         canvas.legend_inside(panels.axes[0], list(zip(rotation.names, looks, strict=True)))
-        return Drawing(panels.figure)
+        return panels
 
-    def damping(self) -> Drawing:
+    def damping(self) -> Panels:
         """Damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
-        return Drawing(plots.damping(self._rotation()).figure)
+        return plots.damping(self._rotation())
 
-    def multipliers(self) -> Drawing:
+    def multipliers(self) -> Panels:
         """Moduli of the Floquet multipliers over rotor speed. Raises InputError where there are none."""
         if self._modes.floquet is None:
             raise InputError(f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0")
-        return Drawing(plots.multipliers(self._modes.floquet).figure)
+        return plots.multipliers(self._modes.floquet)
 
-    def chart(self) -> Drawing:
+    def chart(self) -> Panels:
         """Growth over a turn over speed and bearing stiffness. Raises InputError where there is none."""
         if self._modes.chart is None:
             raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
-        return Drawing(plots.chart(self._modes.chart).figure)
+        return plots.chart(self._modes.chart)
 
     def _rotation(self) -> LinearModes:
         for one in self._modes.rotation.values():

@@ -6,9 +6,6 @@ Knows solutions and looks; no file, no page, no engine.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,26 +19,6 @@ from rotor_mbs.report.plots.time_histories import Motion, Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.hdf5 import replace_file
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A figure that a notebook shows; `save` writes it; `figure` is the matplotlib Figure, to be changed at will."""
-
-    figure: Any
-
-    def _repr_svg_(self) -> str:
-        return canvas.svg_text(self.figure)
-
-    def save(self, path: str | Path) -> None:
-        """As PDF, SVG or PNG, by the ending of `path`. Raises InputError for another one, StoreError."""
-        kind = Path(path).suffix.removeprefix(".")
-        if kind not in canvas.KINDS:
-            raise InputError(
-                f"{path}: no such kind of picture; allowed: a name that ends in .{', .'.join(canvas.KINDS)}"
-            )
-        replace_file(Path(path), canvas.encoded(self.figure, kind))
 
 
 class RunPlots:
@@ -50,27 +27,27 @@ class RunPlots:
     def __init__(self, run: Solution, reference: Trajectory | None) -> None:
         self._run, self._reference = run, reference
 
-    def __call__(self) -> Drawing:
+    def __call__(self) -> Panels:
         """Angles (rad) and rates (rad/s) over time (s): rotor and pitches."""
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
-        return Drawing(time_histories.motion(Motion(_some(run.time), run.angles, run.rates), (), horizon_s).figure)
+        return time_histories.motion(Motion(_some(run.time), run.angles, run.rates), (), horizon_s)
 
-    def energy(self) -> Drawing:
+    def energy(self) -> Panels:
         """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
         run = self._run
         kinetic, potential, work = (_quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work"))
         scale = energy_scale(run.scene, run.trajectory)
         curves = (kinetic, potential, kinetic + potential - work)
-        return Drawing(time_histories.energies(run.time, curves, scale).figure)
+        return time_histories.energies(run.time, curves, scale)
 
-    def error(self) -> Drawing:
+    def error(self) -> Panels:
         """Largest angle error (rad) against the reference over time. Raises InputError where there is none."""
         return error_figure({self._run.method: self._run}, self._reference)
 
-    def tips(self) -> Drawing:
+    def tips(self) -> Panels:
         """Paths of the blade tips (m). Raises InputError where the scene does not ask for them."""
-        return Drawing(paths(_some(self._run.time), _quantity(self._run, "tip")).figure)
+        return paths(_some(self._run.time), _quantity(self._run, "tip"))
 
 
 class ComparisonPlots:
@@ -79,22 +56,22 @@ class ComparisonPlots:
     def __init__(self, runs: Mapping[str, Solution], reference: Trajectory | None) -> None:
         self._runs, self._reference = runs, reference
 
-    def __call__(self) -> Drawing:
+    def __call__(self) -> Panels:
         """The same as `error`."""
         return self.error()
 
-    def error(self) -> Drawing:
+    def error(self) -> Panels:
         """Largest angle error (rad) of each run against the reference over time. Raises InputError without one."""
         return error_figure(self._runs, self._reference)
 
-    def rotor(self) -> Drawing:
+    def rotor(self) -> Panels:
         """The rotor's angle (rad) by each method over time."""
         runs = list(self._runs.values())
         return _with_legend(
             time_histories.lines([_series(run, run.angles[:, 0]) for run in runs], "rotor angle (rad)", None), runs
         )
 
-    def energy_error(self) -> Drawing:
+    def energy_error(self) -> Panels:
         """|energy less work, less its start| of each run, of the scene's energy scale. Raises InputError without."""
         series = []
         for run in self._runs.values():
@@ -103,7 +80,7 @@ class ComparisonPlots:
         return _with_legend(time_histories.errors(series, "energy error, of the energy scale"), self._runs.values())
 
 
-def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> Drawing:
+def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> Panels:
     """Largest angle error (rad) of each run over time (s), on a logarithmic axis, with the horizon."""
     if reference is None:
         raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
@@ -112,10 +89,10 @@ def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> 
     return _with_legend(picture, runs.values())
 
 
-def _with_legend(picture: Panels, runs: Iterable[Solution]) -> Drawing:
+def _with_legend(picture: Panels, runs: Iterable[Solution]) -> Panels:
     looks = {label_of(run.method): look_of(run.method) for run in runs}
     canvas.legend_inside(picture.axes[0], list(looks.items()))
-    return Drawing(picture.figure)
+    return picture
 
 
 def _series(run: Solution, values: Array) -> Series:

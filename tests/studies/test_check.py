@@ -33,7 +33,7 @@ from rotor_mbs.execution.execute import Outcome, Result
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report import verdict_formats
-from rotor_mbs.scenario import resources
+from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.freeze import write_digests
@@ -320,8 +320,8 @@ def own_references(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(reference_folder(), folder, ignore=shutil.ignore_patterns("*.parts"))
     for path in folder.glob("*.h5"):
         write_digests(path)
-    right = resources._folder
-    monkeypatch.setattr(resources, "_folder", lambda name: folder if name == "reference" else right(name))
+    right = catalogue._folder
+    monkeypatch.setattr(catalogue, "_folder", lambda name: folder if name == "reference" else right(name))
     return folder
 
 

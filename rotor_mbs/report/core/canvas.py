@@ -9,8 +9,9 @@ import io
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -20,47 +21,36 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from rotor_mbs.errors import InputError
 from rotor_mbs.report.core.looks import Look
 from rotor_mbs.report.core.numbers import power
+from rotor_mbs.store.hdf5 import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
-PRINT_STYLE: Any = matplotlib.rc_params_from_file(  # without matplotlib's defaults
-    Path(__file__).with_name("print.mplstyle"), use_default_template=False
+KINDS = ("pdf", "svg", "png")
+_PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
+    matplotlib.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
+    for name in ("page", "print")
 )
-_STYLE: Any = {
-    "font.family": ["sans-serif"],
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9.5,
-    "axes.labelsize": 9.5,
-    "axes.titlesize": 9.5,
-    "xtick.labelsize": 9.5,
-    "ytick.labelsize": 9.5,
-    "xtick.major.size": 0.0,
-    "ytick.major.size": 0.0,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.limits": (-3, 4),
-    "axes.unicode_minus": True,
-    "axes.xmargin": 0.01,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.2,
-    "lines.solid_capstyle": "butt",
-    "path.simplify": True,
-    "path.simplify_threshold": 0.5,
-    "svg.fonttype": "none",
-}
 
 
-class Panels(NamedTuple):
-    """A figure and its axes, from top to bottom."""
+@dataclass(frozen=True)
+class Panels:
+    """A figure and its axes, from top to bottom, to be changed at will; a notebook shows it."""
 
     figure: Figure
     axes: list[Any]
+
+    def _repr_svg_(self) -> str:
+        return svg_text(self.figure)
+
+    def save(self, path: str | Path) -> None:
+        """As PDF, SVG or PNG, by the ending of `path`. Raises InputError for another one, StoreError."""
+        kind = Path(path).suffix.removeprefix(".")
+        if kind not in KINDS:
+            raise InputError(f"{path}: no such kind of picture; allowed: a name that ends in .{', .'.join(KINDS)}")
+        replace_file(Path(path), encoded(self.figure, kind))
 
 
 def panels(heights: tuple[float, ...], x_label: str, *, share_x: bool = True) -> Panels:
@@ -97,7 +87,7 @@ def grid(rows: int, columns: int, height: float, *, for_print: bool = False) -> 
 @contextmanager
 def style(*, for_print: bool = False) -> Iterator[None]:
     """A context in which figures are drawn in the style of the pages, or in that of manuscripts."""
-    with matplotlib.rc_context(PRINT_STYLE if for_print else _STYLE):
+    with matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE):
         yield
 
 
@@ -109,19 +99,20 @@ def font_file() -> Path:
 def legend_below(figure: Figure, labelled: Sequence[tuple[str, Look]]) -> None:
     """A line per (label, look) at the foot of the figure."""
     with style(for_print=True):
-        lines = [Line2D([], [], color=look.colour, ls=look.line) for _, look in labelled]
-        names = [label for label, _ in labelled]
-        figure.legend(lines, names, loc="lower center", ncols=min(len(lines), 5), handlelength=2.6)
+        lines = _samples(labelled)
+        figure.legend(handles=lines, loc="lower center", ncols=min(len(lines), 5), handlelength=2.6)
 
 
 def legend_inside(axes: Any, labelled: Sequence[tuple[str, Look]]) -> None:
     """An entry per (label, look), where the axes have most room."""
     with style():
-        lines = [Line2D([], [], color=look.colour, ls=look.line, marker=look.marker) for _, look in labelled]
-        axes.legend(lines, [label for label, _ in labelled], loc="best", fontsize=8.0)
+        axes.legend(handles=_samples(labelled), loc="best", fontsize=8.0)
 
 
-KINDS = ("pdf", "svg", "png")
+def _samples(labelled: Sequence[tuple[str, Look]]) -> list[Line2D]:
+    return [
+        Line2D([], [], color=look.colour, ls=look.line, marker=look.marker, label=label) for label, look in labelled
+    ]
 
 
 def encoded(figure: Figure, kind: str) -> bytes:
