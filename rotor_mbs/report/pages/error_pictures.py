@@ -39,7 +39,7 @@ def line_picture(
         f"{label} from {number(float(one.values.min()), 3)} to {number(float(one.values.max()), 3)}"
         for label, one in curves.items()
     ]
-    described = f"{caption} over time, in {unit}: {'; '.join(ranges)}."
+    described = f"{caption.partition(':')[0]} over time, in {unit}: {'; '.join(ranges)}."
     return picture(histories.lines(list(curves.values()), axis, horizon), name, caption, described)
 
 
