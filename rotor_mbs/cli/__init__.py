@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import atexit
-import gc
 import os
 import sys
 from collections.abc import Sequence
 
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, StoreError
-from rotor_mbs.execution.collector import collect_seldom
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs a command; returns the exit status of the contract (0, 1, 2, 130)."""
-    collect_seldom()
-    atexit.register(gc.freeze)  # the system frees a process at once; the collector would look through it first: 0.05 s
     try:
         from rotor_mbs.cli.arguments import parse
 

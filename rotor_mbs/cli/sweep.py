@@ -8,13 +8,14 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotor_mbs.cli.terminal import SweepProgress, span
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.execution.engines import open_engine
-from rotor_mbs.execution.pool import ImportedCall, TaskPool
+from rotor_mbs.execution.pool import TaskPool
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.sweep import Sweep
@@ -26,7 +27,7 @@ _MANY = 1_000_000  # runs that are not started without --yes
 
 def sweep(arguments: argparse.Namespace) -> int:
     """1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
-    with _interruptible(), _opened(arguments) as pool:
+    with _interruptible(), closing(open_engine(arguments.engine, arguments.jobs)) as pool:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep_plan import plan_sweep
 
@@ -41,44 +42,28 @@ def sweep(arguments: argparse.Namespace) -> int:
 
 
 def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
-    from rotor_mbs.cli.sweep_meter import Meter
     from rotor_mbs.studies.sweep import run_sweep
 
     output = arguments.output or Path(f"{study.name}.h5")
-    meter = Meter(as_json=arguments.json)
     try:
-        result = run_sweep(
-            study,
-            output,
-            methods=arguments.method or (),
-            engine=pool,
-            part=arguments.part,
-            timeout_s=arguments.timeout,
-            on_progress=meter,
-        )
+        with SweepProgress(as_json=arguments.json) as progress:
+            result = run_sweep(
+                study,
+                output,
+                methods=arguments.method or (),
+                engine=pool,
+                part=arguments.part,
+                timeout_s=arguments.timeout,
+                on_progress=progress,
+            )
     except StoreError as exc:  # the disk, not the input: what is stored stays, the same command continues
-        meter.close()
         print(exc, file=sys.stderr)
         return 1
-    finally:
-        meter.close()
     _summarize(result, as_json=arguments.json)
     if study.picture and arguments.part == (1, 1):
-        from rotor_mbs.cli.sweep_picture import draw
-
         line = draw(study, result.path, output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)
     return 0 if result.is_ok else 1
-
-
-@contextmanager
-def _opened(arguments: argparse.Namespace) -> Iterator[TaskPool]:
-    prepare = ImportedCall("rotor_mbs.studies.sweep_work:prepare")
-    pool = open_engine(arguments.engine, arguments.jobs, prepare)
-    try:
-        yield pool
-    finally:
-        pool.close()
 
 
 @contextmanager
@@ -114,16 +99,9 @@ def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespac
         facts = {"runs": runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
         print(json.dumps(facts))
         return 0
-    print(f"{runs:,} runs by {', '.join(plan.methods)}: about {_readable(seconds)} on {arguments.engine}")
+    print(f"{runs:,} runs by {', '.join(plan.methods)}: about {span(seconds)} on {arguments.engine}")
     print(f"{_size(size)} in 1 file")
     return 0
-
-
-def _readable(seconds: float) -> str:
-    for length, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
-        if seconds >= 2.0 * length:
-            return f"{seconds / length:.1f} {unit}"
-    return f"{seconds:.1f} seconds"
 
 
 def _size(count: float) -> str:
@@ -132,3 +110,26 @@ def _size(count: float) -> str:
             return f"{count:.4g} {unit}"
         count /= 1000.0
     return f"{count:.4g} TB"
+
+
+def draw(sweep: Sweep, dataset: Path, path: Path) -> str:
+    """The picture that a sweep file asks for, to `path`; returns a line about it. Raises InputError, StoreError."""
+    from rotor_mbs.analysis.sweep_numbers import spread_of, stability_map
+    from rotor_mbs.report.plots.sweep import map_figure, spread_figure
+    from rotor_mbs.store.hdf5 import replace_file
+    from rotor_mbs.store.sweep_dataset import StoredSweep
+
+    stored = StoredSweep(dataset)
+    if sweep.picture == "spread":
+        spread = spread_of(stored)
+        text = spread_figure(spread, sweep.title)
+        line = (
+            f"largest Lyapunov exponent {spread.exponent:.3f} ± {spread.uncertainty:.3f} per s "
+            f"({spread.pairs} pairs, {spread.start:.2f} to {spread.end:.2f} s)"
+        )
+    else:
+        found = stability_map(stored, max(abs(angle) for angle in sweep.base.initial_angles[1:]))
+        text = map_figure(found, sweep.title)
+        line = f"the pitches grow tenfold in {found.unstable.sum()} of {found.growth.size} runs"
+    replace_file(path, text.encode())
+    return f"{path}: {line}"

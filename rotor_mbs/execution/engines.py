@@ -6,53 +6,50 @@ The only module that knows dask (an extra, and slow to load). A cluster needs no
 from __future__ import annotations
 
 import os
+import pkgutil
 import re
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.pool import ImportedCall, TaskPool, open_pool
+from rotor_mbs.execution.pool import TaskPool, WorkerPool
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 _CONNECT_S = 3.0
-_INITIALIZE_S = 60.0
+_LOAD_S = 60.0
+
+# By its name: only the workers import it.
+_LOAD = "rotor_mbs.studies.sweep_work:prepare"
 
 # A task's arrays are as large as the last one's. Memory that a process keeps (with the GNU C library, up to 128 MB) it
 # need not get from the system again, page by page: an eleventh of a fast run with many samples.
 _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_": str(1 << 27)}
 
 
-def open_engine(name: str, workers: int, initializer: ImportedCall | None = None) -> TaskPool:
-    """The engine called `name`, with `workers` processes where it is local.
+def open_engine(name: str, workers: int) -> TaskPool:
+    """The engine called `name`, with `workers` processes where it is local; its workers load their code at once.
 
-    Parameters
-    ----------
-    initializer
-        What its workers call first, to load their code.
-
-    Raises
-    ------
-    InputError
-        Where there is no such engine, or it does not answer.
+    Raises InputError where there is no such engine, or it does not answer.
     """
     if name == "local":
         for variable, value in _KEEP_MEMORY.items():
             os.environ.setdefault(variable, value)
-        return open_pool(workers, initializer)
+        return WorkerPool(workers, load_worker)
     if re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
-        return _open_cluster(name.removeprefix("dask:"), initializer)
+        return _open_cluster(name.removeprefix("dask:"))
     raise InputError(f"--engine {name}: no such engine; allowed: {ENGINE_FORMS}")
 
 
-def _open_cluster(address: str, initializer: ImportedCall | None = None) -> Cluster:
-    """The cluster whose scheduler is at `address`, tcp://host:port. Raises InputError where none answers.
+def load_worker() -> None:
+    """Called first in every worker process."""
+    pkgutil.resolve_name(_LOAD)()
 
-    initializer   called once per worker before there are tasks, to load their code
-    """
+
+def _open_cluster(address: str) -> Cluster:
     try:
         from distributed import Client
     except ImportError as exc:
@@ -66,9 +63,8 @@ def _open_cluster(address: str, initializer: ImportedCall | None = None) -> Clus
         client.close()
         raise InputError(f"--engine dask:{address}: the scheduler has no workers; allowed: one with workers")
     cluster = Cluster(client, workers)
-    if initializer is not None:
-        for _ in range(workers):
-            cluster.submit(_call, initializer, _INITIALIZE_S)
+    for _ in range(workers):
+        cluster.submit(_call, load_worker, _LOAD_S)
     return cluster
 
 
@@ -99,7 +95,7 @@ def _call(function: Callable[[], None]) -> None:
 
 
 def _answers(address: str) -> bool:
-    """Whether a scheduler answers there: a client that finds none waits long, and longer when it is closed."""
+    """Whether a scheduler answers there: a client that finds none, or another program, waits for minutes."""
     import asyncio
     import logging
 

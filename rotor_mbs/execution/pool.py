@@ -6,7 +6,6 @@ killed while it waits, or while it writes a result, would stop the others (pebbl
 
 from __future__ import annotations
 
-import gc
 import multiprocessing
 import os
 import pickle
@@ -17,13 +16,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from importlib import import_module
 from multiprocessing import resource_tracker
 from queue import SimpleQueue
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
-
-from rotor_mbs.execution.collector import collect_seldom
 
 if TYPE_CHECKING:  # loaded with the first process
     from pebble import ProcessPool
@@ -78,17 +74,6 @@ class TaskPool(Protocol):
         ...
 
     def close(self) -> None: ...
-
-
-@dataclass(frozen=True)
-class ImportedCall:
-    """A function by its name "module:function", for an initializer whose module only the worker imports."""
-
-    target: str
-
-    def __call__(self) -> None:
-        module, _, name = self.target.partition(":")
-        getattr(import_module(module), name)()
 
 
 class WorkerPool:
@@ -192,11 +177,6 @@ class SerialPool:
         pass
 
 
-def open_pool(workers: int, initializer: Callable[[], None] | None = None, core: int | None = None) -> WorkerPool:
-    """A pool of worker processes of this machine; see `WorkerPool`."""
-    return WorkerPool(workers, initializer, core)
-
-
 def run_tasks(
     work: Callable[[T], R],
     tasks: Sequence[T],
@@ -215,7 +195,7 @@ def run_tasks(
     """
     if not tasks:
         return
-    with open_pool(min(workers, len(tasks))) as pool:
+    with WorkerPool(min(workers, len(tasks))) as pool:
         yield from run_in(pool, work, tasks, timeout_s, split)
 
 
@@ -413,15 +393,11 @@ def _initialize(initializer: Callable[[], None] | None, core: int | None) -> Non
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
-    threshold = gc.get_threshold()
-    collect_seldom()
     try:
         if initializer is not None:
             initializer()
     except Exception as exc:
         _initial_error = exc
-    gc.freeze()
-    gc.set_threshold(*threshold)
 
 
 def _end_with_parent() -> None:

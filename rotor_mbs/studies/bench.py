@@ -19,7 +19,7 @@ from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute_with, ignore_progress
-from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, last_core, one_line, open_pool
+from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, last_core, one_line
 from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
 from rotor_mbs.methods.catalogue import ladders
 from rotor_mbs.methods.ladders import STEP, Ladder
@@ -257,7 +257,7 @@ def measure_points(scene_of: SceneOf, points: Sequence[Sequence[Point]], options
     """
     methods = tuple(dict.fromkeys(point.method for curve in points for point in curve))
     found = Measured()
-    with open_pool(1, StartTimer(methods, scene_of), last_core()) as pool:
+    with WorkerPool(1, StartTimer(methods, scene_of), last_core()) as pool:
         limit = min(_RUN_LIMIT_S, options["budget_s"])
         found.timings = _time(pool, points, options, limit, found)
         for point in found.timings.warm:

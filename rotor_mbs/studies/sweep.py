@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.execution.engines import open_engine
-from rotor_mbs.execution.pool import Finished, ImportedCall, TaskPool, run_in
+from rotor_mbs.execution.pool import Finished, TaskPool, run_in
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.sweep import Sweep
@@ -24,8 +24,6 @@ from rotor_mbs.store.sweep_columns import Rows
 from rotor_mbs.store.sweep_layout import lost_rows
 from rotor_mbs.studies.sweep_plan import ENSEMBLE_RUNS, SweepPlan, plan_sweep
 from rotor_mbs.studies.sweep_work import Chunk, perform
-
-PREPARE = ImportedCall("rotor_mbs.studies.sweep_work:prepare")  # what the workers of a sweep load first
 
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
@@ -93,7 +91,8 @@ def run_sweep(
 
     plan = plan_sweep(sweep, methods, part, timeout_s)
     start = time.monotonic()
-    with _opened(engine, workers) as pool, SweepDataset(output, plan.layout) as dataset:
+    pool = open_engine(engine, workers or os.cpu_count() or 1) if isinstance(engine, str) else engine
+    with nullcontext() if pool is engine else closing(pool), SweepDataset(output, plan.layout) as dataset:
         gaps = dataset.missing()
         runs = plan.last - plan.first
         missing = sum(last - first for first, last in gaps)
@@ -111,18 +110,6 @@ def run_sweep(
         return SweepResult(
             dataset.path, runs, missing, statuses, time.monotonic() - start, _is_ok(plan, dataset.statuses)
         )
-
-
-@contextmanager
-def _opened(engine: str | TaskPool, workers: int | None) -> Iterator[TaskPool]:
-    if not isinstance(engine, str):
-        yield engine
-        return
-    pool = open_engine(engine, workers or os.cpu_count() or 1, PREPARE)
-    try:
-        yield pool
-    finally:
-        pool.close()
 
 
 def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.int8]:

@@ -12,12 +12,13 @@ import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rotor_mbs.execution.pool import ImportedCall, TaskLostError, open_pool, run_in, run_tasks
+from rotor_mbs.execution.pool import TaskLostError, WorkerPool, run_in, run_tasks
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
@@ -57,7 +58,7 @@ def _end(_: object) -> None:
 
 
 def test_two_tasks_at_once_are_in_two_processes(tmp_path: Path) -> None:
-    with open_pool(2) as pool:
+    with WorkerPool(2) as pool:
         futures = [pool.submit(_meet, str(tmp_path), _LONG_S) for _ in range(2)]
         found = {future.result() for future in futures}
     assert len(found) == 2
@@ -65,7 +66,7 @@ def test_two_tasks_at_once_are_in_two_processes(tmp_path: Path) -> None:
 
 
 def test_death_and_time_out_are_told_apart_and_cost_one_task_each(tmp_path: Path) -> None:
-    with open_pool(2) as pool:
+    with WorkerPool(2) as pool:
         died = pool.submit(_meet_and_die, str(tmp_path), _LONG_S)
         late = pool.submit(_meet_and_sleep, str(tmp_path), 2.0)
         with pytest.raises(TaskLostError, match="exit code -9") as death:
@@ -79,7 +80,7 @@ def test_death_and_time_out_are_told_apart_and_cost_one_task_each(tmp_path: Path
 
 def test_a_process_killed_while_it_waits_is_replaced() -> None:
     """The task that finds it dead may be lost, and is then tried again; the pool goes on."""
-    with open_pool(1) as pool:
+    with WorkerPool(1) as pool:
         pid = pool.submit(_pid, None, _LONG_S).result()
         os.kill(pid, signal.SIGKILL)
         assert [end.value != pid and not end.failure for end in run_in(pool, _pid, [0, 1], _LONG_S)] == [True] * 2
@@ -93,7 +94,7 @@ def _large(size: int) -> bytes:
 
 
 def test_a_process_killed_while_it_sends_a_result_does_not_stop_the_pool() -> None:
-    with open_pool(1) as pool:
+    with WorkerPool(1) as pool:
         for _ in range(5):
             pid = pool.submit(_pid, None, _LONG_S).result()
             large = pool.submit(_large, 1 << 28, _LONG_S)
@@ -136,7 +137,7 @@ def _function(_: object) -> object:
 def test_an_error_of_a_task_arrives_and_its_process_goes_on(
     work: Callable[[object], object], task: object, error: type[Exception], text: str
 ) -> None:
-    with open_pool(1) as pool:
+    with WorkerPool(1) as pool:
         pid = pool.submit(_pid, None, _LONG_S).result()
         with pytest.raises(error, match=text):
             pool.submit(work, task, _LONG_S).result()
@@ -144,12 +145,12 @@ def test_an_error_of_a_task_arrives_and_its_process_goes_on(
 
 
 def test_an_infinite_time_limit_is_none() -> None:
-    with open_pool(1) as pool:
+    with WorkerPool(1) as pool:
         assert pool.submit(_pid, None, float("inf")).result() > 0
 
 
 def test_closing_ends_running_tasks_and_starts_no_others(tmp_path: Path) -> None:
-    pool = open_pool(2)
+    pool = WorkerPool(2)
     running = [pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S) for _ in range(2)]
     waiting = pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S)
     while len(list(tmp_path.iterdir())) < 2:
@@ -181,19 +182,22 @@ def _cores(_: object) -> set[int]:
 @pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="no process affinity here")
 def test_one_process_on_one_core_keeps_its_state() -> None:
     core = max(os.sched_getaffinity(0))
-    with open_pool(1, partial(_set_state, 5), core) as pool:
+    with WorkerPool(1, partial(_set_state, 5), core) as pool:
         assert pool.submit(_cores, None, _LONG_S).result() == {core}
         pool.submit(_add_to_state, 6, _LONG_S).result()
         assert pool.submit(_add_to_state, 7, _LONG_S).result() == [5, 6, 7]
 
 
 def test_an_error_of_the_initializer_is_the_error_of_its_tasks() -> None:
-    with open_pool(1, ImportedCall("no_such_module:load")) as pool, pytest.raises(ModuleNotFoundError, match="no_such"):
+    with (
+        WorkerPool(1, partial(import_module, "no_such_module")) as pool,
+        pytest.raises(ModuleNotFoundError, match="no_such"),
+    ):
         pool.submit(_pid, None, _LONG_S).result()
 
 
 def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time() -> None:
-    with open_pool(1) as pool:
+    with WorkerPool(1) as pool:
         pid = pool.submit(_pid, None, _LONG_S).result()
         limits = resource.getrlimit(resource.RLIMIT_NOFILE)
         resource.setrlimit(resource.RLIMIT_NOFILE, (3, limits[1]))
@@ -262,7 +266,7 @@ def test_dead_processes_leave_no_open_files() -> None:
 
 _BUSY_PROGRAM = """
 import os, sys, time
-from rotor_mbs.execution.pool import open_pool
+from rotor_mbs.execution.pool import WorkerPool
 
 def busy(_):
     print(os.getpid(), file=sys.stderr, flush=True)
@@ -271,7 +275,7 @@ def busy(_):
         pass
 
 if __name__ == "__main__":
-    with open_pool(2) as pool:
+    with WorkerPool(2) as pool:
         tasks = [pool.submit(busy, None, 90) for _ in range(4)]
         tasks[0].result()
 """

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from support.scenes import ARM, GRAVITY, MASS, OFFSET, paper
 
 from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
-from rotor_mbs.cli.sweep_picture import draw
+from rotor_mbs.cli.sweep import draw
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
