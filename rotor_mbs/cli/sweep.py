@@ -60,7 +60,7 @@ def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
         print(exc, file=sys.stderr)
         return 1
     _summarize(result, as_json=arguments.json)
-    if study.picture and arguments.part == (1, 1):
+    if study.table.picture and arguments.part == (1, 1):
         line = draw(study, result.path, output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)
     return 0 if result.is_ok else 1
@@ -120,16 +120,16 @@ def draw(sweep: Sweep, dataset: Path, path: Path) -> str:
     from rotor_mbs.store.sweep_dataset import StoredSweep
 
     stored = StoredSweep(dataset)
-    if sweep.picture == "spread":
+    if sweep.table.picture == "spread":
         spread = spread_of(stored)
-        text = spread_figure(spread, sweep.title)
+        text = spread_figure(spread, sweep.table.title)
         line = (
             f"largest Lyapunov exponent {spread.exponent:.3f} ± {spread.uncertainty:.3f} per s "
             f"({spread.pairs} pairs, {spread.start:.2f} to {spread.end:.2f} s)"
         )
     else:
         found = stability_map(stored, max(abs(angle) for angle in sweep.base.initial_angles[1:]))
-        text = map_figure(found, sweep.title)
+        text = map_figure(found, sweep.table.title)
         line = f"the pitches grow tenfold in {found.unstable.sum()} of {found.growth.size} runs"
     replace_file(path, text.encode())
     return f"{path}: {line}"

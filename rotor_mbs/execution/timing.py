@@ -30,17 +30,6 @@ class Warm:
     returned: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Statistics:
-    """Of run times in s."""
-
-    minimum: float
-    lower_quartile: float
-    median: float
-    upper_quartile: float
-    repeats: int
-
-
 @dataclass
 class Timings(Generic[T]):
     """What `conduct` found: run times in s by point, warm-ups by point, points that the budget left out."""
@@ -50,12 +39,16 @@ class Timings(Generic[T]):
     left_out: dict[T, str] = field(default_factory=dict)
 
 
-def statistics(times: Sequence[float]) -> Statistics:
-    """Quartiles by linear interpolation between the order statistics. Raises ValueError where there is no time."""
-    if not times:
-        raise ValueError("no run was timed")
-    low, middle, high = np.quantile(times, (0.25, 0.5, 0.75))
-    return Statistics(min(times), float(low), float(middle), float(high), len(times))
+def statistics(times: Sequence[float]) -> dict[str, float]:
+    """Of run times in s, by the names under which they are stored; quartiles between the order statistics."""
+    low, middle, high = map(float, np.quantile(times, (0.25, 0.5, 0.75)))
+    return {
+        "run_time_s": middle,
+        "run_time_min_s": min(times),
+        "run_time_q1_s": low,
+        "run_time_q3_s": high,
+        "repeats": len(times),
+    }
 
 
 def conduct(

@@ -148,31 +148,34 @@ class SweepTable(Table):
 class Sweep:
     """A base scene and how it is varied.
 
-    base        the scene with the sweep's own changes, before any axis
-    units       of every axis' key
-    outputs     what is stored of each run's samples; () for metrics alone
-    validation, test   shares of the rows marked for them, 0 for no mark
-    text        the TOML text it was read from; path: of the file, as it is shown
+    table   what the sweep's file says
+    base    the scene with the sweep's own changes, before any axis
+    text    the TOML text it was read from
     """
 
-    name: str
-    title: str
+    table: SweepTable
     base: Scene
     design: Design
-    units: tuple[str, ...]
-    methods: tuple[str, ...]
-    settings: Mapping[str, float]
-    outputs: tuple[str, ...]
-    precision: str
-    validation: float
-    test: float
-    picture: str | None
     text: str
-    path: str
+    path: Path
+
+    @property
+    def name(self) -> str:
+        return self.path.stem
 
     @property
     def keys(self) -> tuple[str, ...]:
         return tuple(axis.key for axis in self.design.axes)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of every axis' key."""
+        return tuple(unit_of(parse_key(key)) for key in self.keys)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """What is stored of each run's samples; () for metrics alone."""
+        return self.base.outputs if self.table.outputs is None else tuple(self.table.outputs)
 
     def problem(self, key: KeyPath, message: str) -> str:
         """A line about what the file says at `key`, for an InputError: for errors that only a caller can find."""
@@ -236,31 +239,15 @@ def _toml(table: Mapping[str, object]) -> str:
 Problem = Callable[[KeyPath, str], str]
 
 
-def _problem(source: str, text: str, key: KeyPath, message: str) -> str:
-    return f"{source}:{line_of(find_lines(text), key)}: {message}"
+def _problem(path: Path, text: str, key: KeyPath, message: str) -> str:
+    return f"{shown_path(path)}:{line_of(find_lines(text), key)}: {message}"
 
 
 def _sweep(path: Path, text: str, table: SweepTable, base: Scene | None = None) -> Sweep:
     """What the file's model cannot check: the base scene, the keys of the axes in it, and how many rows there are."""
-    problem = functools.partial(_problem, shown_path(path), text)
+    problem = functools.partial(_problem, path, text)
     base = _changed(base or _base(path, table.scene, problem), table, problem)
-    design = _design(table, problem)
-    sweep = Sweep(
-        name=path.stem,
-        title=table.title,
-        base=base,
-        design=design,
-        units=tuple(unit_of(parse_key(axis.key)) for axis in design.axes),
-        methods=tuple(dict.fromkeys(table.methods)),
-        settings=table.settings,
-        outputs=base.outputs if table.outputs is None else tuple(table.outputs),
-        precision=table.precision,
-        validation=table.validation,
-        test=table.test,
-        picture=table.picture,
-        text=text,
-        path=shown_path(path),
-    )
+    sweep = Sweep(table, base, _design(table, problem), text, path)
     _check_rows(sweep)
     return sweep
 

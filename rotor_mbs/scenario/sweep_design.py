@@ -72,7 +72,7 @@ class Design:
         return tuple(self.axes[digit[0]].count for digit in self._digits)
 
     def rows(self, first: int, last: int) -> Array:
-        """(last - first, axes) the rows of these numbers."""
+        """(last - first, axes) the rows of these numbers; after the last one they begin again."""
         numbers = np.arange(first, last)
         table = np.empty((len(numbers), len(self.axes)))
         for digit in reversed(self._digits):

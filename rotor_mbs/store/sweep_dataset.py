@@ -20,6 +20,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.scenario.sweep_design import split_rows
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store import hdf5, sweep_layout
 from rotor_mbs.store.layout import Column
@@ -116,7 +117,7 @@ def _lay_out(path: Path, layout: SweepLayout) -> None:
     """
     temporary = path.with_name(f".{path.name}.tmp")
     count = layout.last - layout.first
-    expected = _HEAD_BYTES + count * (layout.row.itemsize + 8 * (4 + len(layout.keys)))
+    expected = _HEAD_BYTES + count * (layout.row.itemsize + 8 * (4 + len(layout.sweep.keys)))
     try:
         _reserve(temporary, expected)
         with hdf5.begin_file(temporary) as file:
@@ -150,32 +151,33 @@ def _reserve(path: Path, size: int) -> None:
 
 def _put_run_columns(file: Any, layout: SweepLayout) -> None:
     """What is known of the runs before they are computed."""
-    runs = np.arange(layout.first, layout.last)
+    sweep, runs = layout.sweep, np.arange(layout.first, layout.last)
+    rows = sweep.design.count
     hdf5.put(file, "run", runs, COLUMNS["run"])
     hdf5.put(file, "message_byte", np.arange(sweep_layout.MESSAGE_BYTES, dtype=np.int16), COLUMNS["message_byte"])
-    hdf5.put_attributes(file, {"parameter_keys": list(layout.keys)})
-    values = layout.parameters(layout.first, layout.last)
-    for i, (key, unit) in enumerate(zip(layout.keys, layout.units, strict=True)):
+    hdf5.put_attributes(file, {"parameter_keys": list(sweep.keys)})
+    values = sweep.design.rows(layout.first, layout.last)
+    for i, (key, unit) in enumerate(zip(sweep.keys, sweep.units, strict=True)):
         column = Column(("run",), unit, f"varied parameter {key}")
         hdf5.put(file, sweep_layout.parameter_name(key), np.ascontiguousarray(values[:, i]), column)
-    hdf5.put(file, "variant", runs % layout.variants, COLUMNS["variant"])
-    solver = hdf5.put(file, "solver", (runs // layout.variants).astype(np.int8), COLUMNS["solver"])
+    hdf5.put(file, "variant", runs % rows, COLUMNS["variant"])
+    solver = hdf5.put(file, "solver", (runs // rows).astype(np.int8), COLUMNS["solver"])
     hdf5.put_flags(solver, layout.methods)
-    if layout.splits is not None:
-        split = hdf5.put(file, "split", layout.splits[runs % layout.variants], COLUMNS["split"])
-        hdf5.put_flags(split, SPLITS)
+    if sweep.table.validation or sweep.table.test:
+        splits = split_rows(rows, sweep.table.validation, sweep.table.test, sweep.table.seed)
+        hdf5.put_flags(hdf5.put(file, "split", splits[runs % rows], COLUMNS["split"]), SPLITS)
 
 
 def _put_result_columns(file: Any, layout: SweepLayout) -> None:
     """Scales, then room for metrics and trajectories."""
-    for name, (values, scale) in sweep_layout.scales(layout.scene, layout.outputs).items():
+    for name, (values, scale) in sweep_layout.scales(layout.sweep.base, layout.sweep.outputs).items():
         dataset = hdf5.put(file, name, values, scale)
         if name == "time":
             hdf5.put_attributes(dataset, {"standard_name": "time"})
         if name == "coordinate":
-            hdf5.put_attributes(dataset, {"labels": layout.scene.coordinate_labels})
+            hdf5.put_attributes(dataset, {"labels": layout.sweep.base.coordinate_labels})
     count, row = layout.last - layout.first, layout.row
-    for name, column in {**METRICS, **sweep_layout.trajectories(layout.outputs)}.items():
+    for name, column in {**METRICS, **sweep_layout.trajectories(layout.sweep.outputs)}.items():
         kind, shape = row[name].base, (count, *row[name].shape)
         if name == "message":
             kind, shape = np.dtype("u1"), (count, sweep_layout.MESSAGE_BYTES)

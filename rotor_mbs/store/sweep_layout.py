@@ -9,7 +9,7 @@ angles ...                    (run, time, coordinate) trajectories, as asked for
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import SCALES, Quantity
 from rotor_mbs.solution.status import code_of
@@ -55,30 +56,19 @@ class SweepLayout:
 
     identity     hash of the sweep's numbers, methods and versions
     attributes   of the file
-    scene        the base: number of blades, samples, duration
-    parameters   from (first, last) run to (last - first, keys) numbers
-    variants     rows of the design: run r is row r mod variants, by method r div variants
-    splits       (variants,) codes of SPLITS; or None
-    first, last  runs of the file: first ... last - 1
+    first, last  runs of the file: first ... last - 1; run r is row r mod rows of the design, by method r div rows
     """
 
     identity: str
     attributes: Mapping[str, object]
-    scene: Scene
-    outputs: Sequence[str]
-    precision: str
-    keys: Sequence[str]
-    units: Sequence[str]
+    sweep: Sweep
     methods: Sequence[str]
-    variants: int
-    parameters: Callable[[int, int], NDArray[np.float64]]
-    splits: NDArray[np.int8] | None
     first: int
     last: int
 
     @property
     def row(self) -> np.dtype[np.void]:
-        return row_type(self.scene, self.outputs, self.precision)
+        return row_type(self.sweep.base, self.sweep.outputs, self.sweep.table.precision)
 
 
 def parameter_name(key: str) -> str:

@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,17 +30,7 @@ from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.records import Record, write_records
 from rotor_mbs.store.results_file import ResultsFile
-from rotor_mbs.studies.bench_worker import (
-    BenchScene,
-    Judged,
-    Point,
-    Prepared,
-    Request,
-    SceneOf,
-    StartTimer,
-    ask,
-    prepared_scene,
-)
+from rotor_mbs.studies.bench_worker import Judged, Point, PointScenes, Prepared, ask, prepared_scene, start_timer
 from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
 
 BENCH = "bench"
@@ -144,7 +135,8 @@ def _measure_scene(jobs: Sequence[Job]) -> list[Record]:
     by_curve = {ladder.curve: ladder for ladder in ladders()}
     own = [by_curve[str(job.case.options["curve"])] for job in jobs]
     points = [_points(ladder, short.duration / (short.samples - 1)) for ladder in own]
-    measured = measure_points(BenchScene(case.scene, results), points, case.options)
+    scenes = {point: (short, reference) for curve in points for point in curve}
+    measured = measure_points(scenes, points, case.options)
     shared = {
         "scene_hash": case.scene_hash,
         "horizon_s": horizon(reference),
@@ -229,9 +221,7 @@ class Measured:
             row["status"] = STATUSES.index(status)
             row["run_time_s"] = self.timings.warm[point].seconds
         else:
-            times = statistics(self.timings.times[point])
-            values = (times.median, times.minimum, times.lower_quartile, times.upper_quartile)
-            row |= dict(zip(names, values, strict=True))
+            row |= statistics(self.timings.times[point])
             judged, prepared = self.judged[point], self.prepared[point]
             if judged.status in ("ok", "inaccurate"):  # the errors of a run that broke off are those of its part
                 row |= {name: judged.metrics.get(name, np.nan) for name in _ERRORS}
@@ -239,7 +229,6 @@ class Measured:
                 "setup_time_s": prepared.setup_s,
                 "setup_again_time_s": prepared.setup_again_s,
                 "output_time_s": judged.output_s,
-                "repeats": times.repeats,
                 "steps": judged.steps,
                 "status": STATUSES.index(judged.status),
                 "false_success": int(judged.false_success),
@@ -248,44 +237,35 @@ class Measured:
         return row
 
 
-def measure_points(scene_of: SceneOf, points: Sequence[Sequence[Point]], options: Mapping[str, Any]) -> Measured:
+def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], options: Mapping[str, Any]) -> Measured:
     """Times all points in rounds, and judges the last run of each; in one worker process on one core.
 
-    scene_of   picklable, from a point to its scene and reference
     points     by curve, each coarse to fine
     options    `repeats` and `budget_s`
     """
-    methods = tuple(dict.fromkeys(point.method for curve in points for point in curve))
+    methods = tuple(dict.fromkeys(point.method for point in scenes))
+    limit = min(_RUN_LIMIT_S, options["budget_s"])
     found = Measured()
-    with WorkerPool(1, StartTimer(methods, scene_of), last_core()) as pool:
-        limit = min(_RUN_LIMIT_S, options["budget_s"])
-        found.timings = _time(pool, points, options, limit, found)
-        for point in found.timings.warm:
-            if point not in found.unanswered:
-                found.judged[point] = _answer(pool, Request("judge", point), limit)
+    with WorkerPool(1, partial(start_timer, methods, scenes), last_core()) as pool:
+
+        def answer(task: str, point: Point) -> Any:
+            return pool.submit(ask, (task, point), limit).result()
+
+        def warm_up(point: Point) -> Warm:
+            start = time.perf_counter()
+            try:
+                found.prepared[point] = answer("prepare", point)
+            except TaskLostError as exc:
+                found.unanswered[point] = ("timed_out" if exc.failure == "timed_out" else "solver_failed", str(exc))
+            except Exception as exc:
+                found.unanswered[point] = ("solver_failed", one_line(exc))
+            else:
+                return Warm(found.prepared[point].run_s, returned=True)
+            return Warm(time.perf_counter() - start, returned=False)
+
+        def repeat(point: Point) -> float:
+            return float(answer("repeat", point))
+
+        found.timings = conduct(points, warm_up, repeat, options["budget_s"], options["repeats"], time.perf_counter)
+        found.judged = {point: answer("judge", point) for point in found.prepared}
     return found
-
-
-def _time(
-    pool: WorkerPool, points: Sequence[Sequence[Point]], options: Mapping[str, Any], limit: float, found: Measured
-) -> Timings[Point]:
-    def warm_up(point: Point) -> Warm:
-        start = time.perf_counter()
-        try:
-            found.prepared[point] = _answer(pool, Request("prepare", point), limit)
-        except TaskLostError as exc:
-            found.unanswered[point] = ("timed_out" if exc.failure == "timed_out" else "solver_failed", str(exc))
-        except Exception as exc:
-            found.unanswered[point] = ("solver_failed", one_line(exc))
-        else:
-            return Warm(found.prepared[point].run_s, returned=True)
-        return Warm(time.perf_counter() - start, returned=False)
-
-    def repeat(point: Point) -> float:
-        return float(_answer(pool, Request("repeat", point), limit))
-
-    return conduct(points, warm_up, repeat, options["budget_s"], options["repeats"], time.perf_counter)
-
-
-def _answer(pool: WorkerPool, request: Request, limit: float) -> Any:
-    return pool.submit(ask, request, limit).result()

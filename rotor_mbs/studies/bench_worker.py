@@ -5,13 +5,12 @@ A point is one method at one setting. Engines are loaded beforehand, so that thi
 
 from __future__ import annotations
 
-import functools
 import gc
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -45,14 +44,6 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Request:
-    """To the timing worker."""
-
-    do: Literal["prepare", "repeat", "judge"]
-    point: Point
-
-
-@dataclass(frozen=True)
 class Prepared:
     """Seconds: of the first build (everything compiled anew), of a second one, and of one run (the warm-up)."""
 
@@ -74,34 +65,23 @@ class Judged:
     metrics: Metrics
 
 
-SceneOf: TypeAlias = Callable[[Point], tuple[Scene, Trajectory | None]]
+# Of each point its scene, and its reference if there is one.
+PointScenes: TypeAlias = Mapping[Point, tuple[Scene, Trajectory | None]]
 
 
 class PointTimer:
-    """Answers requests about points. A point not prepared here (the process before this one was ended) is prepared when
-    first asked for.
+    """Prepares, repeats and judges points; first prepares one that the process before this one had prepared."""
 
-    scene_of    the scene of a point, and its reference if there is one
-    """
-
-    def __init__(self, scene_of: SceneOf, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._scene_of, self._clock = scene_of, clock
+    def __init__(self, scenes: PointScenes, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._scenes, self._clock = scenes, clock
         self._solvers: dict[Point, Solver] = {}
         self._last: dict[Point, Integration] = {}
         self._first_angles: dict[Point, Array] = {}
 
-    def __call__(self, request: Request) -> Prepared | float | Judged:
-        point = request.point
-        if request.do == "prepare":
-            return self._prepare(point)
-        if point not in self._solvers:
-            self._prepare(point)
-        return self._timed_run(point) if request.do == "repeat" else self._judge(point)
-
-    def _prepare(self, point: Point) -> Prepared:
+    def prepare(self, point: Point) -> Prepared:
         method = find_method(point.method)
         settings = method.settings.of(point.method, dict(point.settings))
-        scene, _ = self._scene_of(point)
+        scene, _ = self._scenes[point]
         setups = []
         for _ in range(2):
             start = self._clock()
@@ -112,18 +92,27 @@ class PointTimer:
         self._first_angles[point] = self._solvers[point].observe().angles
         return Prepared(setups[0], setups[1], seconds)
 
+    def repeat(self, point: Point) -> float:
+        """Seconds of one more run."""
+        if point not in self._solvers:
+            self.prepare(point)
+        return self._timed_run(point)
+
     def _timed_run(self, point: Point) -> float:
         solver = self._solvers[point]
         start = self._clock()
         self._last[point] = solver.integrate()
         return self._clock() - start
 
-    def _judge(self, point: Point) -> Judged:
+    def judge(self, point: Point) -> Judged:
+        """The last run; the point is done with."""
+        if point not in self._solvers:
+            self.prepare(point)
         start = self._clock()
         trajectory = self._solvers[point].observe()
         output = self._clock() - start
         integration = self._last[point]
-        scene, reference = self._scene_of(point)
+        scene, reference = self._scenes[point]
         method = find_method(point.method)
         run = Solution(scene, point.method, trajectory, integration, dict(point.settings))
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
@@ -148,44 +137,22 @@ def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[st
     return "inaccurate", f"angle error {error:.1e} rad before the horizon: as large as the motion"
 
 
-@dataclass(frozen=True)
-class StartTimer:
-    """Makes its process one that does nothing but time points: engines loaded, collector off. See `ask`."""
-
-    methods: tuple[str, ...]
-    scene_of: SceneOf
-
-    def __call__(self) -> None:
-        global _timer
-        for method in self.methods:
-            find_method(method).load()
-        gc.disable()
-        _timer = PointTimer(self.scene_of)
-
-
 _timer: PointTimer | None = None
 
 
-def ask(request: Request) -> Prepared | float | Judged:
-    """The answer of the timer that this process was started with."""
-    assert _timer is not None  # by StartTimer
-    return _timer(request)
+def start_timer(methods: Sequence[str], scenes: PointScenes) -> None:
+    """Makes this process one that does nothing but time points: engines loaded, collector off."""
+    global _timer
+    for method in methods:
+        find_method(method).load()
+    gc.disable()
+    _timer = PointTimer(scenes)
 
 
-@dataclass(frozen=True)
-class BenchScene:
-    """The scene of every point of a bench; its reference is read in the worker. results: the file that has it."""
-
-    scene: Scene
-    results: Path
-
-    def __call__(self, _: Point) -> tuple[Scene, Trajectory]:
-        return _prepared(self)
-
-
-@functools.lru_cache(maxsize=1)
-def _prepared(bench: BenchScene) -> tuple[Scene, Trajectory]:
-    return prepared_scene(bench.scene, bench.results)
+def ask(request: tuple[str, Point]) -> Any:
+    """What the timer of this process answers: ("prepare", "repeat" or "judge", point)."""
+    task, point = request
+    return getattr(_timer, task)(point)
 
 
 def prepared_scene(scene: Scene, results: Path) -> tuple[Scene, Trajectory]:

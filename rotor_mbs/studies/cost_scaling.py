@@ -68,14 +68,6 @@ def _with_blades(scene: Scene, count: int) -> Scene:
     )
 
 
-@dataclass(frozen=True)
-class _SceneBySize:
-    study: CostStudy
-
-    def __call__(self, point: Point) -> tuple[Scene, None]:
-        return self.study.scenes[point.setting], None
-
-
 def run_cost_scaling(
     methods: Sequence[str],
     output: Path,
@@ -117,7 +109,8 @@ def _measure(study: CostStudy, jobs: Sequence[Job]) -> list[Record]:
         ]
         for job in jobs
     ]
-    measured = measure_points(_SceneBySize(study), points, jobs[0].case.options)
+    scenes = {point: (study.scenes[point.setting], None) for curve in points for point in curve}
+    measured = measure_points(scenes, points, jobs[0].case.options)
     started = time.strftime("%Y-%m-%dT%H:%M:%S")
     return [_curve(study, job.case, measured.rows(own), started) for job, own in zip(jobs, points, strict=True)]
 

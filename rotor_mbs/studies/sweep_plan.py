@@ -6,18 +6,15 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from importlib.util import find_spec
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.environment import machine, numerics_fingerprint, versions
 from rotor_mbs.methods.catalogue import check_names, find_method
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.scenario.sweep_design import split_rows
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.store.sweep_layout import SweepLayout
 from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk
@@ -48,41 +45,15 @@ class SweepPlan:
     def rows(self) -> int:
         return self.sweep.design.count
 
-    @cached_property
+    @property
     def layout(self) -> SweepLayout:
-        sweep = self.sweep
-        splits = None
-        if sweep.validation or sweep.test:
-            splits = split_rows(self.rows, sweep.validation, sweep.test, sweep.design.seed)
-        return SweepLayout(
-            identity=self._identity(),
-            attributes=self._attributes(),
-            scene=sweep.base,
-            outputs=sweep.outputs,
-            precision=sweep.precision,
-            keys=sweep.keys,
-            units=sweep.units,
-            methods=self.methods,
-            variants=self.rows,
-            parameters=self.values,
-            splits=splits,
-            first=self.first,
-            last=self.last,
-        )
-
-    def values(self, first: int, last: int) -> NDArray[np.float64]:
-        """(last - first, keys) of these runs."""
-        pieces = [
-            self.sweep.design.rows(start % self.rows, start % self.rows + end - start)
-            for start, end in self._by_method(first, last)
-        ]
-        return np.concatenate(pieces)
+        return SweepLayout(self._identity(), self._attributes(), self.sweep, self.methods, self.first, self.last)
 
     def chunks(self, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
         """The runs of `gaps`, cut into what one of `workers` does at once."""
         variants, row = self.sweep.variants(), self.layout.row
         for first, _ in gaps[:1]:
-            variants.scene(self.values(first, first + 1)[0].tolist())
+            variants.scene(self.sweep.design.rows(first, first + 1)[0].tolist())
         left = sum(last - first for first, last in gaps)
         for gap in gaps:
             for first, last in self._by_method(*gap):
@@ -94,8 +65,8 @@ class SweepPlan:
 
     def _chunk(self, variants: Variants, method: str, row: np.dtype[np.void], start: int, end: int) -> Chunk:
         known = find_method(method).defaults
-        settings = {key: value for key, value in self.sweep.settings.items() if key in known}
-        return Chunk(variants, method, settings, row, start, self.values(start, end), self.time_limit_s)
+        settings = {key: value for key, value in self.sweep.table.settings.items() if key in known}
+        return Chunk(variants, method, settings, row, start, self.sweep.design.rows(start, end), self.time_limit_s)
 
     @staticmethod
     def _chunk_size(method: str, row_bytes: int, share: int) -> int:
@@ -111,43 +82,42 @@ class SweepPlan:
             first = end
 
     def _identity(self) -> str:
-        sweep = self.sweep
-        digest = hashlib.sha256()
+        sweep, table = self.sweep, self.sweep.table
         content = [
             _FORMAT,
             scene_hash(sweep.base),
             sweep.keys,
-            sweep.design.combine,
+            table.combine,
             [axis.is_drawn for axis in sweep.design.axes],
             self.methods,
-            dict(sweep.settings),
+            table.settings,
             sweep.outputs,
-            sweep.precision,
-            [sweep.validation, sweep.test],
-            sweep.design.seed,
+            table.precision,
+            [table.validation, table.test],
+            table.seed,
             [self.first, self.last],
             versions(),
             numerics_fingerprint(),
         ]
-        digest.update(json.dumps(content, sort_keys=True).encode())
+        digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
         for values in sweep.design.values:
             digest.update(values.tobytes())
         return digest.hexdigest()
 
     def _attributes(self) -> dict[str, object]:
-        sweep = self.sweep
+        sweep, table = self.sweep, self.sweep.table
         return {
-            "title": sweep.title,
+            "title": table.title,
             "sweep_toml": sweep.text,
             "base_scene": sweep.base.name,
             "scene_toml": sweep.base.text,
             "scene_hash": scene_hash(sweep.base),
-            "combine": sweep.design.combine,
+            "combine": table.combine,
             "shape": json.dumps(sweep.design.shape),
-            "seed": sweep.design.seed,
-            "validation_share": sweep.validation,
-            "test_share": sweep.test,
-            "settings": json.dumps(dict(sweep.settings), sort_keys=True),
+            "seed": table.seed,
+            "validation_share": table.validation,
+            "test_share": table.test,
+            "settings": json.dumps(table.settings, sort_keys=True),
             "runs_of_all_parts": self.rows * len(self.methods),
             **versions(),
             **machine(),
@@ -159,7 +129,7 @@ def _chosen(sweep: Sweep, methods: Sequence[str]) -> tuple[str, ...]:
     if methods:
         return check_names(methods)
     try:
-        return check_names(sweep.methods)
+        return check_names(sweep.table.methods)
     except InputError as exc:
         raise InputError([sweep.problem(("methods",), f"methods: {words}") for words in exc.problems]) from exc
 
@@ -168,7 +138,7 @@ def plan_sweep(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time
     """The runs of part k of n (1, 1 for all). Raises InputError, MethodRefusal where a method cannot do them."""
     chosen = _chosen(sweep, methods)
     known = {key for method in chosen for key in find_method(method).defaults}
-    unknown = [key for key in sweep.settings if key not in known]
+    unknown = [key for key in sweep.table.settings if key not in known]
     if unknown:
         words = f"is no setting of {', '.join(chosen)}; allowed: {', '.join(sorted(known)) or 'none'}"
         raise InputError([sweep.problem(("settings", key), f"settings.{key}: {words}") for key in unknown])

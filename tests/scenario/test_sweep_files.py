@@ -78,7 +78,7 @@ def test_the_shares_for_validation_and_test_are_exact_and_drawn() -> None:
 
 def test_validation_and_test_leave_rows_for_training(tmp_path: Path) -> None:
     axis = '[[axis]]\nkey = "gravity"\nvalues = [1, 2]\n'
-    assert _load(tmp_path, f"validation = 0.5\ntest = 0.25\n{axis}").test == 0.25
+    assert _load(tmp_path, f"validation = 0.5\ntest = 0.25\n{axis}").table.test == 0.25
     with pytest.raises(InputError, match=r"s\.toml:4: test: .* leave no rows for training; allowed: a share"):
         _load(tmp_path, f"validation = 0.5\ntest = 0.5\n{axis}")
 

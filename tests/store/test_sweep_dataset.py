@@ -9,7 +9,6 @@ import resource
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -18,6 +17,7 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.scenario.sweep import sweep_of
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.sweep_columns import MISSING, Rows
 from rotor_mbs.store.sweep_dataset import StoredSweep, SweepDataset
@@ -27,23 +27,11 @@ _RUNS = 23
 _STARTS = list(range(0, _RUNS, 4))
 
 
-def _layout(**changes: object) -> SweepLayout:
-    facts = {
-        "identity": "i",
-        "attributes": {"title": "t", "shape": "[23]"},
-        "scene": paper("fig11", samples=5),
-        "outputs": ("angles", "energy"),
-        "precision": "float64",
-        "keys": ("bearing.stiffness", "initial.angles[1]"),
-        "units": ("N m/rad", "rad"),
-        "methods": ("lagrange/taylor",),
-        "variants": _RUNS,
-        "parameters": lambda first, last: np.arange(first, last, dtype=float)[:, None] * [1.0, 0.1],
-        "splits": (np.arange(_RUNS) % 3).astype(np.int8),
-        "first": 0,
-        "last": _RUNS,
-    }
-    return SweepLayout(**{**facts, **changes})  # type: ignore[arg-type]
+def _layout(identity: str = "i", last: int = _RUNS, samples: int = 5) -> SweepLayout:
+    axes = {"bearing.stiffness": np.arange(_RUNS), "initial.angles[1]": 0.1 * np.arange(_RUNS)}
+    outputs = ["angles", "energy"]
+    sweep = sweep_of(paper("fig11"), axes, combine="zip", samples=samples, outputs=outputs, validation=0.25, test=0.25)
+    return SweepLayout(identity, {"title": "t", "shape": "[23]"}, sweep, ("lagrange/taylor",), 0, last)
 
 
 def _rows(first: int, count: int, layout: SweepLayout) -> Rows:
@@ -83,7 +71,8 @@ def test_it_opens_in_xarray_at_every_moment(tmp_path: Path, engine: str) -> None
         assert data.bearing_stiffness.values.tolist() == list(range(_RUNS))
         assert data.bearing_stiffness.attrs["units"] == "N m/rad"
         assert data.initial_angles_1.attrs["units"] == "rad"
-        assert data.split.attrs["flag_meanings"].split()[data.split.values[5]] == "test"
+        assert data.split.attrs["flag_meanings"].split() == ["train", "validation", "test"]
+        assert np.bincount(data.split.values).tolist() == [11, 6, 6]
         assert data.status.attrs["flag_meanings"].split() == list(STATUSES)
         assert "method" not in data.dims
         assert "method" not in data.variables
@@ -223,9 +212,8 @@ def test_a_full_tmpfs_is_reported_before_the_first_run(tmp_path: Path) -> None:
     if os.getuid() or subprocess.run(mount, capture_output=True).returncode:
         pytest.skip("may not mount a tmpfs here")
     try:
-        large = _layout(scene=replace(paper("fig11"), samples=2001))
         with pytest.raises(StoreError, match=os.strerror(errno.ENOSPC)):
-            SweepDataset(place / "s.h5", large).__enter__()
+            SweepDataset(place / "s.h5", _layout(samples=2001)).__enter__()
         assert not list(place.iterdir())
         with SweepDataset(place / "s.h5", _layout()) as dataset:
             _fill(dataset, _layout(), _STARTS)

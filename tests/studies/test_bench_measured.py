@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import time
+from collections import defaultdict
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.solution.metrics import angle_error
 from rotor_mbs.store.records import Record, read_records
-from rotor_mbs.studies.bench_worker import Judged, Point, PointTimer, Prepared, Request, thinned, thinned_reference
+from rotor_mbs.studies.bench_worker import Judged, Point, PointTimer, thinned, thinned_reference
 
 
 def errors_of(method: str, settings: Mapping[str, object], name: str = "fig08", intervals: int = 100) -> float:
@@ -82,19 +83,18 @@ def test_every_method_but_the_printed_ones_has_a_ladder_of_six_rungs_or_more() -
     assert len({one.curve for one in found}) == len(found)
 
 
-def process() -> PointTimer:
+def process(clock: Callable[[], float] = time.perf_counter) -> PointTimer:
     scene, k = thinned(paper("fig09"))
-    return PointTimer(lambda _: (scene, thinned_reference(reference(f"paper/{'fig09'}"), k)))
+    found = scene, thinned_reference(reference("paper/fig09"), k)
+    return PointTimer(defaultdict(lambda: found), clock)
 
 
 def measured(point: Point) -> Judged:
     """What the point's runs are worth."""
     here = process()
-    assert isinstance(here(Request("prepare", point)), Prepared)
-    assert isinstance(here(Request("repeat", point)), float)
-    judged = here(Request("judge", point))
-    assert isinstance(judged, Judged)
-    return judged
+    here.prepare(point)
+    here.repeat(point)
+    return here.judge(point)
 
 
 DOP853 = Point("x", "lagrange/dop853", 0, 1e-5, (("absolute_tolerance", 1e-7), ("relative_tolerance", 1e-5)))
@@ -127,22 +127,15 @@ def test_a_method_made_twice_slower_moves_up_by_two(monkeypatch: pytest.MonkeyPa
         return honest(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(closed_form, "accelerations", counted)
-    scene, k = thinned(paper("fig09"))
-    timing = PointTimer(
-        lambda _: (scene, thinned_reference(reference(f"paper/{'fig09'}"), k)), clock=lambda: float(now[0])
-    )
-    timing(Request("prepare", DOP853))
+    timing = process(clock=lambda: float(now[0]))
+    timing.prepare(DOP853)
     once = OdeSolver.integrate
-    fast = timing(Request("repeat", DOP853))
+    fast = timing.repeat(DOP853)
     monkeypatch.setattr(OdeSolver, "integrate", lambda solver: (once(solver), once(solver))[1])
-    slow = timing(Request("repeat", DOP853))
-    assert isinstance(fast, float)
-    assert isinstance(slow, float)
+    slow = timing.repeat(DOP853)
     assert fast > 1000.0
     assert slow == 2.0 * fast
-    judged = timing(Request("judge", DOP853))
-    assert isinstance(judged, Judged)
-    assert judged.metrics["angle_error_max"] == measured(DOP853).metrics["angle_error_max"]
+    assert timing.judge(DOP853).metrics["angle_error_max"] == measured(DOP853).metrics["angle_error_max"]
 
 
 def bench(tmp_path: Path, *arguments: str, name: str = "b.h5") -> int:
@@ -315,7 +308,7 @@ def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
     for who in contestants:
         points = [point for point in timings.times if point[0] == who]
         errors = np.maximum([runs[point][1]() for point in points], 1e-17)
-        seconds = np.array([statistics(timings.times[point]).median for point in points])
+        seconds = np.array([statistics(timings.times[point])["run_time_s"] for point in points])
         reached = time_to_reach(errors, seconds, TARGETS_RAD[-1])
         assert reached is not None, who
         found[who] = reached
