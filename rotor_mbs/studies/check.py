@@ -6,7 +6,7 @@ import math
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rotor_mbs.analysis.verdicts import Verdict, verdicts
@@ -19,7 +19,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import changed_arrays
 from rotor_mbs.store.read import open_results
-from rotor_mbs.studies.check_probes import Measurement, perform_probe, probes, speed_probes
+from rotor_mbs.studies.check_probes import measured, perform_probe, probes, speed_probes
 from rotor_mbs.studies.frozen import shipped_files
 from rotor_mbs.studies.run import run_scenes
 
@@ -146,19 +146,15 @@ def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Ve
     """Verdicts on measurements, in the order of `cases`; a measurement that was lost fails."""
     available = [case for case in cases if is_available(case.method)]
     outcomes = {outcome.case: outcome for outcome in compute(available, perform_probe, workers, _TIMEOUT_S)}
-    return [judge_measured(one, bounds) for case in available for one in measured(outcomes[case])]
+    return [judge_measured(one, bounds) for case in available for one in measurements(outcomes[case])]
 
 
-def measured(outcome: Outcome) -> list[Measurement]:
+def measurements(outcome: Outcome) -> list[Verdict]:
     """What a probe found; where it was lost, one measurement that is not a number."""
-    if outcome.result.value is not None:
-        found: list[Measurement] = outcome.result.value
-        return found
-    case = outcome.case
-    return [Measurement(case.study, case.scene.name, case.method, "all", math.nan, "", outcome.result.message)]
+    found: list[Verdict] | None = outcome.result.value
+    return found if found is not None else [measured(outcome.case, "all", math.nan, "", outcome.result.message)]
 
 
-def judge_measured(one: Measurement, bounds: Bounds) -> Verdict:
+def judge_measured(one: Verdict, bounds: Bounds) -> Verdict:
     """A measured number against its bound."""
-    bound = bounds.of(one.check, one.method).value
-    return Verdict(one.check, one.scene, one.method, one.channel, one.value, bound, one.unit, one.look_at)
+    return replace(one, bound=bounds.of(one.check, one.method).value)

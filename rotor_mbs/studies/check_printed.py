@@ -66,36 +66,36 @@ def _phases(blades: int) -> list[float]:
 
 def _accelerations(blades: int) -> float:
     text = literal.one_blade_accelerations if blades == 1 else literal.three_blade_accelerations
-    worst = 0.0
+    found = []
     for angles, rates, constants in _random(blades):
         for gravity in (constants[3], 0.0):
             own = (*constants[:3], gravity)
             derived = DerivedRotor(*own, _phases(blades), AS_PRINTED).accelerations(_TORQUE, angles, rates)
-            worst = _larger(worst, _off(text(*own, _TORQUE, [*angles, *rates]), derived))
-    return worst
+            found.append(_off(text(*own, _TORQUE, [*angles, *rates]), derived))
+    return float(np.max(found))  # NaN where one is
 
 
 def _corrected(blades: int) -> float:
     """Each erratum that changes nothing by itself is left in: E3 where E2 is corrected."""
-    worst = 0.0
+    found = []
     for angles, rates, (m, c, d, g) in _random(blades):
         form = rotor_form(_scene(blades, m, c, d, g))
         exact = closed_form.accelerations(angles, rates, form, _TORQUE, math.sin, math.cos)
         for errata in (CORRECTED, Errata(e1=False, e2=False, e3=True)):
             derived = DerivedRotor(m, c, d, g, _phases(blades), errata).accelerations(_TORQUE, angles, rates)
-            worst = _larger(worst, _off(derived, exact))
-    return worst
+            found.append(_off(derived, exact))
+    return float(np.max(found))  # NaN where one is
 
 
 def _fixed_pitch() -> float:
-    worst = 0.0
+    found = []
     for angles, rates, (m, _, d, g) in _random(3):
         for gravity in (g, 0.0):
             form = rotor_form(_scene(1, m, 0.0, d, gravity))
             exact = closed_form.accelerations(angles[:1], rates[:1], form, _TORQUE, math.sin, math.cos)
-            found = literal.fixed_pitch_acceleration(m, d, gravity, _TORQUE, angles[0] - 0.7, [0.7])
-            worst = _larger(worst, _off([found], exact))
-    return worst
+            printed = literal.fixed_pitch_acceleration(m, d, gravity, _TORQUE, angles[0] - 0.7, [0.7])
+            found.append(_off([printed], exact))
+    return float(np.max(found))  # NaN where one is
 
 
 def _scene(blades: int, m: float, c: float, d: float, g: float) -> Scene:
@@ -107,8 +107,3 @@ def _scene(blades: int, m: float, c: float, d: float, g: float) -> Scene:
 def _off(found: object, expected: object) -> float:
     a, b = np.array(found, dtype=float), np.array(expected, dtype=float)
     return float(np.abs(a - b).max() / max(1.0, float(np.abs(b).max())))
-
-
-def _larger(worst: float, off: float) -> float:
-    """The larger; NaN where either is NaN."""
-    return off if not off <= worst else worst

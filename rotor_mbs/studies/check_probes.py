@@ -6,10 +6,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, Result
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
@@ -18,24 +19,10 @@ from rotor_mbs.scenario.bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
-from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.studies.check_printed import differences
 from rotor_mbs.studies.check_rules import SCENE, known_runs, metrics_off, shares_off
 from rotor_mbs.studies.frozen import load_frozen
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """A number for a verdict that no results file holds."""
-
-    check: str
-    scene: str
-    method: str
-    channel: str
-    value: float
-    unit: str
-    look_at: str
-
 
 # Scenes of probes that need none of the shipped ones.
 _OWN_SCENES = ("random states", "made by hand")
@@ -74,14 +61,19 @@ def speed_probes() -> list[Case]:
 _ORDER_STEPS = (0.002, 0.001, 0.0005, 0.00025)  # s
 
 
-def measure(case: Case) -> Iterable[Measurement]:
-    """The measurements of a probe, one by one; NaN where a run did not get to its end."""
+def measure(case: Case) -> Iterable[Verdict]:
+    """The measurements of a probe, one by one, not yet with a bound; NaN where a run did not get to its end."""
     return _KINDS[case.study](case)
 
 
 def perform_probe(job: Job) -> Result:
     """All measurements of a probe, in a worker process."""
     return Result("ok", value=list(measure(job.case)))
+
+
+def measured(case: Case, channel: str, value: float, unit: str = "", look_at: str = "") -> Verdict:
+    """A number that no results file holds."""
+    return Verdict(case.study, case.scene.name, case.method, channel, value, math.nan, unit, look_at)
 
 
 def _scene(case: Case, duration: float) -> Scene:
@@ -93,7 +85,7 @@ def _run(case: Case, scene: Scene, **settings: object) -> Trajectory | None:
     return run.trajectory if len(run.trajectory.time) == scene.samples else None
 
 
-def _symmetry(case: Case) -> list[Measurement]:
+def _symmetry(case: Case) -> list[Verdict]:
     """Every blade in the place of the next one and the rotor turned back by one; the mirror image in the rotor's plane.
 
     The mirror turns y into -y: azimuths stay, pitches change sign.
@@ -109,7 +101,7 @@ def _symmetry(case: Case) -> list[Measurement]:
         blades=(scene.blades[-1], *scene.blades[:-1]),
     )
     mirrored = replace(scene, initial_angles=(q[0], *(-a for a in q[1:])), initial_rates=(w[0], *(-r for r in w[1:])))
-    growth = _growth(case.scene.name, scene.samples)
+    growth = running_growth(load_frozen(case.scene.name))[: scene.samples]
     found = []
     for name, variant, columns, sign in (
         ("blades permuted", permuted, [2, *range(3, len(q)), 1], 1.0),
@@ -121,11 +113,11 @@ def _symmetry(case: Case) -> list[Measurement]:
             pitches = np.abs(sign * other.angles[:, columns] - base.angles[:, 1:]).max(axis=1)
             value = float((pitches / growth).max())
         look = "a blade's phase, or a term that knows its blade's number or side"
-        found.append(Measurement("symmetry", case.scene.name, case.method, name, value, "per growth", look))
+        found.append(measured(case, name, value, "per growth", look))
     return found
 
 
-def _order(case: Case) -> list[Measurement]:
+def _order(case: Case) -> list[Verdict]:
     """The slope of log error over log step, against the reference, over 0.5 s."""
     scene = _scene(case, 0.5)
     exact = load_frozen(case.scene.name).angles[: scene.samples]
@@ -136,17 +128,17 @@ def _order(case: Case) -> list[Measurement]:
         errors.append(math.nan if found is None else float(np.abs(found.angles - exact).max()))
     order = float(np.polyfit(np.log(_ORDER_STEPS), np.log(errors), 1)[0]) if np.isfinite(errors).all() else math.nan
     look = f"fitted {order:.3f}, expected {expected:g}: the scheme, or a force evaluated at the wrong time"
-    return [Measurement("order", case.scene.name, case.method, "angles", abs(order - expected), "", look)]
+    return [measured(case, "angles", abs(order - expected), "", look)]
 
 
-def _reference(case: Case) -> list[Measurement]:
+def _reference(case: Case) -> list[Verdict]:
     """Computed now against frozen; a fallback reference is compared within its own uncertainty."""
     scene = case.scene
     frozen = load_frozen(case.scene.name)
     found = solve(REFERENCE, scene, {}).trajectory
     look = "the closed form, its coefficients, or a touched file under reference/"
     if len(found.time) != scene.samples or found.angle_uncertainty is None or found.error_growth is None:
-        return [Measurement("reference", case.scene.name, REFERENCE, "recomputed", math.nan, "rad", look)]
+        return [measured(case, "recomputed", math.nan, "rad", look)]
     off = np.abs(found.angles - frozen.angles).max(axis=1)
     beyond = float(np.maximum(off - 10.0 * found.angle_uncertainty, 0.0).max())
     if found.angle_uncertainty.max() > 1e-12:
@@ -155,32 +147,32 @@ def _reference(case: Case) -> list[Measurement]:
     growth = np.abs(np.log(running_growth(found) / running_growth(frozen)))
     until = horizon_samples(frozen)
     return [
-        Measurement("reference", case.scene.name, REFERENCE, "recomputed angles", beyond, "rad", look),
-        Measurement("growth", case.scene.name, REFERENCE, "error growth", float(growth[:until].max()), "log", look),
+        measured(case, "recomputed angles", beyond, "rad", look),
+        replace(measured(case, "error growth", float(growth[:until].max()), "log", look), check="growth"),
     ]
 
 
-def _printed(case: Case) -> Iterator[Measurement]:
+def _printed(case: Case) -> Iterator[Verdict]:
     for channel, off, look in differences():
-        yield Measurement("printed", case.scene.name, case.method, channel, off, "relative", look)
+        yield measured(case, channel, off, "relative", look)
 
 
-def _rules(case: Case) -> Iterator[Measurement]:
+def _rules(case: Case) -> Iterator[Verdict]:
     """One number for each known run: 1 where its status is not the known one."""
     for run in known_runs(load_bounds(), method_names(is_corrected=True)):
         fault = run.faults()
         look = fault or "its known status"
-        yield Measurement("rules", case.scene.name, run.method, run.name, float(bool(fault)), "faults", look)
+        yield replace(measured(case, run.name, float(bool(fault)), "faults", look), method=run.method)
     for channel, off in metrics_off():
         look = f"off by {off:.1e}: a number that is stored with a run"
-        yield Measurement("rules", case.scene.name, "*", channel, float(not off <= 1e-12), "faults", look)
+        yield measured(case, channel, float(not off <= 1e-12), "faults", look)
     for scene in find_scenes(["check"]):
         off = shares_off(scene)
         look = f"off by {off:.1e}: what decides that a motion is singular"
-        yield Measurement("rules", scene.name, "*", "rotor inertia share", float(not off <= 1e-12), "faults", look)
+        yield replace(measured(case, "rotor inertia share", float(not off <= 1e-12), "faults", look), scene=scene.name)
 
 
-def _speed(case: Case) -> list[Measurement]:
+def _speed(case: Case) -> list[Verdict]:
     """Run time over that of a fixed piece of arithmetic just before and after it, against the ratio on file.
 
     The median over fifteen runs: other load of the machine affects both, or one run alone.
@@ -196,7 +188,7 @@ def _speed(case: Case) -> list[Measurement]:
     ratio = float(np.median(ratios))
     expected = SPEED_RATIOS[case.method]
     look = f"{ratio:.3g} calibration runs, {expected:g} on file: a slower engine, or our own code around it"
-    return [Measurement("speed", case.scene.name, case.method, "run time", ratio / expected, "times", look)]
+    return [measured(case, "run time", ratio / expected, "times", look)]
 
 
 def _calibration() -> float:
@@ -216,11 +208,7 @@ _SPEED_RUNS = 15
 SPEED_RATIOS = {"lagrange/taylor": 0.23, "exudyn_tree/rk67": 13.1}
 
 
-def _growth(name: str, samples: int) -> Array:
-    return running_growth(load_frozen(name))[:samples]
-
-
-_KINDS: dict[str, Callable[[Case], Iterable[Measurement]]] = {
+_KINDS: dict[str, Callable[[Case], Iterable[Verdict]]] = {
     "symmetry": _symmetry,
     "order": _order,
     "reference": _reference,

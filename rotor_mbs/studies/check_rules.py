@@ -115,7 +115,7 @@ def shares_off(scene: Scene) -> float:
     """The rotor's remaining share of inertia against the one from a mass matrix by plain rotation, at random."""
     rng = np.random.default_rng(2020)
     count = 1 + len(scene.blades)
-    worst = 0.0
+    off = []
     for angles in rng.uniform(-math.pi, math.pi, (5, 1, count)):
         mass = np.zeros((count, count))  # T is ½ q̇·M q̇: by polarisation
         for i, j in itertools.product(range(count), repeat=2):
@@ -124,9 +124,8 @@ def shares_off(scene: Scene) -> float:
             mass[i, j] = 0.5 * (plus - minus)
         free = scene.moving_coordinates[1:]
         share = 1.0 - sum(mass[0, i] ** 2 / mass[i, i] for i in free) / mass[0, 0]
-        off = abs(float(rotor_inertia_shares(scene, angles)[0]) - share)
-        worst = off if not off <= worst else worst
-    return worst
+        off.append(abs(float(rotor_inertia_shares(scene, angles)[0]) - share))
+    return float(np.max(off))  # NaN where one is
 
 
 def _moving(pitch: float = 0.0) -> Trajectory:

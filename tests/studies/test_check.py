@@ -38,7 +38,7 @@ from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.freeze import write_digests
 from rotor_mbs.studies import check, check_probes
-from rotor_mbs.studies.check_probes import Measurement, measure, probe, probes
+from rotor_mbs.studies.check_probes import measure, probe, probes
 
 ROOT = Path(__file__).parents[2]
 SCENES = ("check/general", "check/held")
@@ -577,11 +577,11 @@ def test_json_on_standard_output_is_alone_there(good: Path, capsys: pytest.Captu
 
 def test_a_measurement_that_is_lost_fails() -> None:
     lost = Outcome(probe("order", "paper/fig11", METHOD), Result("worker_died", "its process died"))
-    (measured,) = check.measured(lost)
-    verdict = check.judge_measured(measured, load_bounds())
+    (found,) = check.measurements(lost)
+    verdict = check.judge_measured(found, load_bounds())
     assert not verdict.passed
     assert verdict.look_at == "its process died"
-    assert not check.judge_measured(Measurement("tip", "s", METHOD, "c", math.nan, "", ""), load_bounds()).passed
+    assert not check.judge_measured(Verdict("tip", "s", METHOD, "c", math.nan, 0.0, "", ""), load_bounds()).passed
 
 
 @pytest.mark.slow
