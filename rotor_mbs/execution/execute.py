@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
@@ -76,6 +76,7 @@ class Store(Protocol):
 Perform: TypeAlias = Callable[[Job], Result]
 Run: TypeAlias = Callable[[Sequence[Job]], Iterable[Finished[Job, Result]]]
 OnProgress: TypeAlias = Callable[[int, int, Outcome], None]
+OnTimeOut: TypeAlias = Callable[[Job, str], Result]
 
 
 def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
@@ -84,41 +85,26 @@ def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
 
 def execute(
     cases: Iterable[Case],
-    perform: Perform,
-    store: Store,
-    workers: int,
-    timeout_s: float,
-    on_progress: OnProgress = ignore_progress,
-    on_time_out: Callable[[Job, str], Result] | None = None,
-) -> list[Outcome]:
-    """The outcomes of the cases that `store` did not have; those that others are compared with come first.
-
-    perform       computes a job and writes its part, in a worker process
-    workers       parallel processes; 0: one after the other in this process
-    timeout_s     of one case; its process is ended where the case has not ended itself a while after that
-    on_progress   called with (cases done, of how many, outcome) after each
-    on_time_out   writes the part of a job whose process was ended, in this process
-
-    Raises InputError where another process is writing the output, StoreError, and what `perform` raises of RotorError.
-    """
-    return execute_with(cases, _in_pool(perform, workers, timeout_s), store, on_progress, on_time_out, timeout_s)
-
-
-def execute_with(
-    cases: Iterable[Case],
     run: Run,
     store: Store,
     on_progress: OnProgress = ignore_progress,
-    on_time_out: Callable[[Job, str], Result] | None = None,
-    timeout_s: float = float("inf"),
+    on_time_out: OnTimeOut | None = None,
 ) -> list[Outcome]:
-    """The same, where `run` has its own way to compute a list of jobs: a bench times them together."""
+    """The outcomes of the cases that `store` did not have; those that others are compared with come first.
+
+    run           computes a list of jobs and writes their parts: `in_pool`, or a study's own way (a bench times its
+                  jobs together)
+    on_progress   called with (cases done, of how many, outcome) after each
+    on_time_out   writes the part of a job whose process was ended, in this process
+
+    Raises InputError where another process is writing the output, StoreError, and what `run` raises of RotorError.
+    """
     with _parts_folder(store.path) as parts:
         stored = store.stored_keys()
         missing = [case for case in cases if case.key not in stored and not _part(parts, case.key).exists()]
         made: list[Outcome] = []
         for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
-            jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored), timeout_s) for case in wave]
+            jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored)) for case in wave]
             for outcome in _outcomes(jobs, run, on_time_out):
                 made.append(outcome)
                 on_progress(len(made), len(missing), outcome)
@@ -131,21 +117,28 @@ def execute_with(
 
 def compute(cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float) -> Iterator[Outcome]:
     """Outcomes of cases of which nothing is stored, as they come."""
-    jobs = [Job(case, Path(), None, timeout_s) for case in cases]
-    return _outcomes(jobs, _in_pool(perform, workers, timeout_s), None)
+    return _outcomes([Job(case, Path()) for case in cases], in_pool(perform, workers, timeout_s), None)
 
 
-def _in_pool(perform: Perform, workers: int, timeout_s: float) -> Run:
+def in_pool(perform: Perform, workers: int, timeout_s: float) -> Run:
+    """Computes jobs in parallel processes.
+
+    perform       computes a job and writes its part
+    workers       parallel processes; 0: one job after the other in this process
+    timeout_s     of one job; its process is ended where it has not ended itself a while after that
+    """
+
     def run(jobs: Sequence[Job]) -> Iterable[Finished[Job, Result]]:
+        limited = [replace(job, time_limit_s=timeout_s) for job in jobs]
         if not workers:
-            return (Finished(job, perform(job)) for job in jobs)
+            return (Finished(job, perform(job)) for job in limited)
         # What ends itself at its time limit needs a moment to write what it has.
-        return run_tasks(perform, jobs, workers, 1.2 * timeout_s + 10.0)
+        return run_tasks(perform, limited, workers, 1.2 * timeout_s + 10.0)
 
     return run
 
 
-def _outcomes(jobs: Sequence[Job], run: Run, on_time_out: Callable[[Job, str], Result] | None) -> Iterator[Outcome]:
+def _outcomes(jobs: Sequence[Job], run: Run, on_time_out: OnTimeOut | None) -> Iterator[Outcome]:
     ready = []
     for job in jobs:
         if job.reference is None or job.reference.exists():
@@ -156,7 +149,7 @@ def _outcomes(jobs: Sequence[Job], run: Run, on_time_out: Callable[[Job, str], R
         yield Outcome(finished.task.case, _result(finished, on_time_out))
 
 
-def _result(finished: Finished[Job, Result], on_time_out: Callable[[Job, str], Result] | None) -> Result:
+def _result(finished: Finished[Job, Result], on_time_out: OnTimeOut | None) -> Result:
     if finished.value is not None:
         return finished.value
     if isinstance(finished.error, RotorError):

@@ -19,7 +19,7 @@ import numpy as np
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute_with, ignore_progress
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, last_core, one_line
 from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
 from rotor_mbs.methods.catalogue import ladders
@@ -90,7 +90,7 @@ def run_bench(
         able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
         cases += [_bench_case(scene, ladder, repeats, budget_s) for ladder in chosen if ladder.method in able]
         left_out += refused
-    made = execute_with(cases, _time_by_scene, ResultsFile(output), on_progress)
+    made = execute(cases, _time_by_scene, ResultsFile(output), on_progress)
     return BenchReport(len(scenes), made, left_out)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import cost_exponent
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute_with, ignore_progress
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.execution.pool import Finished
 from rotor_mbs.methods.catalogue import methods as all_methods
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -91,7 +91,7 @@ def run_cost_scaling(
         for study in cost_studies()
         for method in chosen
     ]  # fmt: skip
-    return execute_with(cases, _time_by_study, ResultsFile(output), on_progress)
+    return execute(cases, _time_by_study, ResultsFile(output), on_progress)
 
 
 def _time_by_study(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:

@@ -26,7 +26,7 @@ from rotor_mbs.analysis.mode_records import to_records
 from rotor_mbs.analysis.modes import Array, Floquet, ModeSet, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.scenario.scene import Scene
@@ -66,7 +66,7 @@ def modes_of_scenes(
     options = {"speeds": _increasing(speeds, "speeds"), "stiffnesses": _increasing(stiffnesses, "stiffnesses")}
     method = next(iter(linearizing_methods().values())).name  # a case names one; the study asks all of them
     cases = [Case(scene, method, study="modes", options=options, sources=_SOURCES) for scene in scenes]
-    return execute(cases, perform_modes, ResultsFile(output), workers, timeout_s, on_progress)
+    return execute(cases, in_pool(perform_modes, workers, timeout_s), ResultsFile(output), on_progress)
 
 
 def perform_modes(job: Job) -> Result:

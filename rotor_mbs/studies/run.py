@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.execution.case import RUN, Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.execution.pool import one_line
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, is_corrected
 from rotor_mbs.methods.selection import choose
@@ -82,8 +83,10 @@ def run_scenes(
         reference = reference_case(scene, use_frozen=use_frozen)
         cases += [reference, *run_cases(scene, methods[scene.name], reference, settings or {})]
     refuse_losses(output, cases)
-    cases.sort(key=_slowest_first)
-    made = execute(cases, perform_run, ResultsFile(output), workers, timeout_s, on_progress, _store_time_out)
+    # Slowest first, so that no long run starts last and keeps one process busy while the others wait.
+    cases.sort(key=lambda case: -find_method(case.method).relative_cost)
+    run = in_pool(perform_run, workers, timeout_s)
+    made = execute(cases, run, ResultsFile(output), on_progress, partial(store_failure, "timed_out"))
     return RunReport(made, len(cases) - len(made))
 
 
@@ -148,11 +151,11 @@ def perform_run(job: Job) -> Result:
         try:
             run = solve(case.method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
-            return store_failure(job, "timed_out", str(exc))
+            return store_failure("timed_out", job, str(exc))
         except RotorError as exc:
-            return store_failure(job, "solver_failed", str(exc))
+            return store_failure("solver_failed", job, str(exc))
         except Exception as exc:
-            return store_failure(job, "solver_failed", one_line(exc))
+            return store_failure("solver_failed", job, one_line(exc))
     if case.method == REFERENCE:
         reference: Trajectory | None = run.trajectory
     else:
@@ -169,7 +172,7 @@ def perform_run(job: Job) -> Result:
     return Result(verdict.status, verdict.message, float(np.median(run.run_times_s)))
 
 
-def store_failure(job: Job, status: str, message: str) -> Result:
+def store_failure(status: str, job: Job, message: str) -> Result:
     """Stores a run that left no samples."""
     case = job.case
     run = _without_samples(case.scene, case.method, message, case.settings)
@@ -182,15 +185,6 @@ def _without_samples(scene: Scene, method: str, message: str, settings: Mapping[
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     return Solution(scene, method, trajectory, Integration(False, message), dict(settings))
-
-
-def _store_time_out(job: Job, message: str) -> Result:
-    return store_failure(job, "timed_out", message)
-
-
-def _slowest_first(case: Case) -> float:
-    """So that no long run starts last and keeps one process busy while the others wait."""
-    return -find_method(case.method).relative_cost
 
 
 def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:

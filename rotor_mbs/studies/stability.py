@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rotor_mbs.analysis.stability import SuiteRun, suite_runs
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -75,7 +75,7 @@ def complete_records(
     process died."""
     cases = [*_step_cases(scenes, suite_runs(output)), *_conservation_cases(scenes, methods)]
     store = ResultsFile(output)
-    made = execute(cases, perform_record, store, workers, _RECORD_LIMIT_S, on_progress)
+    made = execute(cases, in_pool(perform_record, workers, _RECORD_LIMIT_S), store, on_progress)
     names, wanted = {scene.name for scene in scenes}, {case.key for case in cases}
     records = read_records(output, "steps", "limits", "conservation")
     stale = {record.key for record in records if record.scene in names} - wanted

@@ -14,7 +14,7 @@ from support.scenes import paper
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, Outcome, Result, execute
+from rotor_mbs.execution.execute import Job, Outcome, Result, execute, in_pool
 
 SCENE = paper("fig08")
 METHOD = "lagrange/dop853"
@@ -60,7 +60,7 @@ def _keys(path: Path) -> list[str]:
 
 
 def in_this_process(cases: Sequence[Case], store: TextStore) -> list[Outcome]:
-    return execute(cases, perform, store, workers=0, timeout_s=10.0)
+    return execute(cases, in_pool(perform, 0, 10.0), store)
 
 
 def test_what_is_stored_is_skipped_and_the_rest_is_merged(tmp_path: Path) -> None:
@@ -92,14 +92,14 @@ def test_a_case_whose_reference_was_not_computed_is_not_computed(tmp_path: Path)
 def test_a_process_that_dies_leaves_no_record_and_the_same_call_tries_again(tmp_path: Path) -> None:
     store = TextStore(tmp_path / "out.json")
     cases = [case(1), case(13), case(2, case(13).key)]
-    made = {one.case.key: one for one in execute(cases, perform, store, workers=2, timeout_s=60.0)}
+    made = {one.case.key: one for one in execute(cases, in_pool(perform, 2, 60.0), store)}
     assert made[case(13).key].result.status == "worker_died"
     assert made[cases[2].key].result.status == "no_reference"
     assert set(store.read()) == {case(1).key}
     parts = tmp_path / "out.json.parts"
     parts.mkdir()
     (parts / "survives").touch()
-    assert all(one.is_computed for one in execute(cases, perform, store, workers=2, timeout_s=60.0))
+    assert all(one.is_computed for one in execute(cases, in_pool(perform, 2, 60.0), store))
     assert set(store.read()) == {one.key for one in cases}
 
 
@@ -112,7 +112,7 @@ def test_an_interrupted_call_goes_on_where_it_stopped(tmp_path: Path) -> None:
 
     cases = [case(1), case(2), case(3)]
     with pytest.raises(KeyboardInterrupt):
-        execute(cases, perform, store, 0, 10.0, interrupt)
+        execute(cases, in_pool(perform, 0, 10.0), store, interrupt)
     assert not store.path.exists()
     assert len(in_this_process(cases, store)) == 2
     assert set(store.read()) == {one.key for one in cases}
@@ -125,7 +125,7 @@ def test_two_processes_do_not_write_one_output(tmp_path: Path) -> None:
         in_this_process([case(2)], TextStore(tmp_path / "out.json"))
 
     with pytest.raises(InputError, match="another process is writing it now"):
-        execute([case(1)], perform, store, 0, 10.0, start_another)
+        execute([case(1)], in_pool(perform, 0, 10.0), store, start_another)
     in_this_process([case(2)], store)
     assert set(store.read()) == {case(1).key, case(2).key}
 
