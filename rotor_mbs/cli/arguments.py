@@ -83,7 +83,7 @@ def _add_runs(commands: _Commands) -> None:
 
     run = _command(commands, "run", "a batch of scenes into one results file", "runs:run")
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
-    run.add_argument("-m", "--method", action="append", metavar="METHOD", help="model/integrator; may be repeated")
+    _add_methods(run)
     run.add_argument(
         "--set", action="append", type=_setting, metavar="NAME=VALUE",
         help="a setting of the methods, in place of its default; may be repeated",
@@ -95,7 +95,7 @@ def _add_runs(commands: _Commands) -> None:
 def _add_bench(commands: _Commands) -> None:
     bench = _command(commands, "bench", "error against run time, method by method", "bench:bench")
     bench.add_argument("scenes", nargs="*", metavar="SCENE", help=_SCENES)
-    bench.add_argument("-m", "--method", action="append", metavar="METHOD", help="model/integrator; may be repeated")
+    _add_methods(bench)
     bench.add_argument("-o", "--output", type=_file, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
     bench.add_argument("--growth", action="store_true", help="also how cost grows with blades and with duration")
     bench.add_argument(
@@ -208,9 +208,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
 def _add_sweep(commands: _Commands) -> None:
     sweep = _command(commands, "sweep", "a parameter study into one dataset", "sweep:sweep")
     sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
-    sweep.add_argument(
-        "-m", "--method", action="append", metavar="METHOD", help="in place of the file's; may be repeated"
-    )
+    _add_methods(sweep, "in place of the file's")
     sweep.add_argument("-o", "--output", type=_file, metavar="FILE", help="(default: the sweep's name with .h5)")
     sweep.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
     sweep.add_argument("--part", type=_part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
@@ -294,6 +292,10 @@ def _late(target: str) -> Callable[[argparse.Namespace], int]:
         return int(function(arguments))
 
     return call
+
+
+def _add_methods(parser: argparse.ArgumentParser, text: str = "model/integrator") -> None:
+    parser.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{text}; may be repeated")
 
 
 def _add_jobs(parser: argparse.ArgumentParser) -> None:

@@ -19,8 +19,7 @@ from rotor_mbs.execution.pool import TaskPool
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.sweep import Sweep
-    from rotor_mbs.studies.sweep import SweepResult
-    from rotor_mbs.studies.sweep_plan import SweepPlan
+    from rotor_mbs.studies.sweep import SweepPlan, SweepResult
 
 _MANY = 1_000_000  # runs that are not started without --yes
 
@@ -29,15 +28,14 @@ def sweep(arguments: argparse.Namespace) -> int:
     """1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
     with _interruptible(), closing(open_engine(arguments.engine, arguments.jobs)) as pool:
         from rotor_mbs.scenario.sweep import load_sweep
-        from rotor_mbs.studies.sweep_plan import plan_sweep
+        from rotor_mbs.studies.sweep import plan_sweep
 
         study = load_sweep(arguments.file)
         plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             return _show_estimate(plan, pool, arguments)
-        runs = plan.last - plan.first
-        if runs > _MANY and not arguments.yes:
-            raise InputError(f"{arguments.file}: {runs:,} runs; allowed without --yes: at most {_MANY:,}")
+        if plan.runs > _MANY and not arguments.yes:
+            raise InputError(f"{arguments.file}: {plan.runs:,} runs; allowed without --yes: at most {_MANY:,}")
         return _run(study, pool, arguments)
 
 
@@ -93,13 +91,12 @@ def _summarize(result: SweepResult, *, as_json: bool) -> None:
 def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies.sweep import estimate_seconds
 
-    runs = plan.last - plan.first
-    size, seconds = runs * plan.layout.row.itemsize, estimate_seconds(plan, pool)
+    size, seconds = plan.runs * plan.layout.row.itemsize, estimate_seconds(plan, pool)
     if arguments.json:
-        facts = {"runs": runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
+        facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
         print(json.dumps(facts))
         return 0
-    print(f"{runs:,} runs by {', '.join(plan.methods)}: about {span(seconds)} on {arguments.engine}")
+    print(f"{plan.runs:,} runs by {', '.join(plan.methods)}: about {span(seconds)} on {arguments.engine}")
     print(f"{_size(size)} in 1 file")
     return 0
 

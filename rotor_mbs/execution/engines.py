@@ -20,7 +20,6 @@ R = TypeVar("R")
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 _CONNECT_S = 3.0
-_LOAD_S = 60.0
 
 # By its name: only the workers import it.
 _LOAD = "rotor_mbs.studies.sweep_work:prepare"
@@ -31,21 +30,20 @@ _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_"
 
 
 def open_engine(name: str, workers: int) -> TaskPool:
-    """The engine called `name`, with `workers` processes where it is local; its workers load their code at once.
+    """The engine called `name`, with `workers` processes where it is local; these load their code at once.
 
     Raises InputError where there is no such engine, or it does not answer.
     """
     if name == "local":
         for variable, value in _KEEP_MEMORY.items():
             os.environ.setdefault(variable, value)
-        return WorkerPool(workers, load_worker)
+        return WorkerPool(workers, _load)
     if re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
         return _open_cluster(name.removeprefix("dask:"))
     raise InputError(f"--engine {name}: no such engine; allowed: {ENGINE_FORMS}")
 
 
-def load_worker() -> None:
-    """Called first in every worker process."""
+def _load() -> None:
     pkgutil.resolve_name(_LOAD)()
 
 
@@ -62,10 +60,7 @@ def _open_cluster(address: str) -> Cluster:
     if not workers:
         client.close()
         raise InputError(f"--engine dask:{address}: the scheduler has no workers; allowed: one with workers")
-    cluster = Cluster(client, workers)
-    for _ in range(workers):
-        cluster.submit(_call, load_worker, _LOAD_S)
-    return cluster
+    return Cluster(client, workers)
 
 
 class Cluster:
@@ -88,10 +83,6 @@ class Cluster:
 
     def close(self) -> None:
         self._client.close()
-
-
-def _call(function: Callable[[], None]) -> None:
-    function()
 
 
 def _answers(address: str) -> bool:

@@ -224,11 +224,6 @@ class StoredSweep:
             for first in range(0, len(dataset), runs):
                 yield dataset[first : first + runs]
 
-    def message(self, run: int) -> str:
-        """Why the run (counted in this file) did not end well; "" where it did."""
-        with hdf5.open_file(self._path) as file:
-            return bytes(file["message"][run]).rstrip(b"\0").decode(errors="replace")
-
     def _dataset(self, file: Any, name: str) -> Any:
         if name not in file:
             raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")

@@ -17,7 +17,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.store.sweep_dataset import StoredSweep, SweepDataset
-from rotor_mbs.studies.sweep_plan import plan_sweep
+from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import rows_of
 
 

@@ -35,7 +35,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.system import build_system
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep_plan import plan_sweep
+from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import Chunk, rows_of
 
 pytestmark = pytest.mark.slow

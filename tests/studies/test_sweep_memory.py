@@ -14,7 +14,7 @@ import pytest
 
 from rotor_mbs.execution.engines import open_engine
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep_plan import plan_sweep
+from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import perform
 
 pytestmark = [
