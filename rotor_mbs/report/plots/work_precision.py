@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,21 +22,16 @@ FRONT_COLOUR = "#c8c8c8"
 _LOWEST_ERROR, _RAIL_START, _RAIL, _RAIL_END = 1e-16, 3.0, 20.0, 120.0
 
 
-class _Drawn(NamedTuple):
-    errors: Any
-    seconds: Any
-
-
 def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
     """All curves of a scene; `small` for one of many side by side: front and curves alone."""
     picture = canvas.panels((height,), "largest angle error up to the horizon (rad)")
     axes = picture.axes[0]
-    drawn = [_Drawn(*points(curve, with_setup=with_setup)) for curve in curves]
+    drawn = [points(curve, with_setup=with_setup) for curve in curves]
     _front(axes, drawn)
-    for curve, one in zip(curves, drawn, strict=True):
+    for curve, (errors, seconds) in zip(curves, drawn, strict=True):
         style = look_of(curve.name)
         axes.plot(
-            np.maximum(one.errors, _LOWEST_ERROR), one.seconds, color=style.colour, linestyle=style.line,
+            np.maximum(errors, _LOWEST_ERROR), seconds, color=style.colour, linestyle=style.line,
             marker=style.marker, markersize=3.0 if small else 4.2, markerfacecolor="white", linewidth=1.0,
         )  # fmt: skip
         if not with_setup and not small:
@@ -56,9 +51,8 @@ def _uncertainty(curves: Sequence[Record]) -> float:
     return max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
 
 
-def _front(axes: Any, drawn: Sequence[_Drawn]) -> None:
-    errors = np.concatenate([one.errors for one in drawn] or [np.empty(0)])
-    seconds = np.concatenate([one.seconds for one in drawn] or [np.empty(0)])
+def _front(axes: Any, drawn: Sequence[tuple[Any, Any]]) -> None:
+    errors, seconds = np.concatenate(drawn, axis=1) if drawn else np.empty((2, 0))
     chosen = pareto(errors, seconds)
     best = np.maximum(errors[chosen], _LOWEST_ERROR)
     axes.plot(best, seconds[chosen], color=FRONT_COLOUR, linewidth=6.0, solid_capstyle="round", zorder=0.5)
@@ -79,7 +73,7 @@ def _rail(axes: Any, curve: Record, style: Look, with_setup: bool) -> None:
     axes.plot(np.full(len(seconds), _RAIL), seconds, linestyle="none", marker="x", markersize=4.0, color=style.colour)
 
 
-def _axes(axes: Any, drawn: Sequence[_Drawn], curves: Sequence[Record]) -> None:
+def _axes(axes: Any, drawn: Sequence[tuple[Any, Any]], curves: Sequence[Record]) -> None:
     if has_visible_uncertainty(curves):
         axes.axvspan(_LOWEST_ERROR / 10.0, _uncertainty(curves), color=GREY, alpha=0.2, linewidth=0)
     axes.axvspan(_RAIL_START, _RAIL_END, color="#f2e3de", linewidth=0, zorder=0)
@@ -88,7 +82,7 @@ def _axes(axes: Any, drawn: Sequence[_Drawn], curves: Sequence[Record]) -> None:
     exponents = range(-3, -17, -3)
     axes.set_xticks([_RAIL, *(10.0**e for e in exponents)], ["failed", *(power(e) for e in exponents)])
     axes.set_xticks([], minor=True)
-    times = [*(one.seconds for one in drawn), *(curve.arrays["run_time_s"][failed(curve)] for curve in curves)]
+    times = [*(seconds for _, seconds in drawn), *(curve.arrays["run_time_s"][failed(curve)] for curve in curves)]
     known = np.concatenate([np.ravel(time) for time in times] or [np.empty(0)])
     known = known[np.isfinite(known) & (known > 0.0)]
     low, high = (known.min(), known.max()) if len(known) else (1e-3, 1.0)
