@@ -19,8 +19,8 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in so
 # Where a method is chosen by its name: the selection rule, the check, the suite's patient method, defaults of the
 # API, and the printed equations, which the analysis of the paper is about.
 CHOSEN = {
-    "methods/selection.py", "studies/check.py", "studies/check_probes.py", "studies/check_rules.py",
-    "studies/stability.py", "studies/sweep_work.py", "analysis/methods.py", "analysis/verdicts.py", "api.py",
+    "methods/selection.py", "studies/check.py", "studies/check_probes.py", "studies/check_known_runs.py",
+    "studies/stability.py", "studies/sweep_work.py", "analysis/run_selection.py", "analysis/verdicts.py", "api.py",
     "scenario/sweep.py",
 }  # fmt: skip
 
@@ -78,7 +78,7 @@ def test_an_engine_is_its_package_and_one_line() -> None:
 
 
 def test_a_quantity_is_its_declaration_and_its_producers() -> None:
-    allowed = {"solution/quantities.py", "models/exudyn/readings.py", "studies/check_rules.py"}
+    allowed = {"solution/quantities.py", "models/exudyn/readings.py", "studies/check_known_runs.py"}
     assert naming(r"\bconstraint_error\b") <= allowed  # the rules' hand-made runs have one
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
 from rotor_mbs.analysis.statistics import measure
 from rotor_mbs.store.read import StoredRun, StoredScene
@@ -51,8 +51,8 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
     """The numbers and claims that `scenes` can decide for at least one model; of `items`, by default of all."""
     found = []
     for item in published() if items is None else items:
-        printed = _outcome(item, _Runs(scenes, methods.printed_run))
-        found.append(Claim(item, printed, _outcome(item, _Runs(scenes, methods.corrected_run))))
+        printed = _outcome(item, _Runs(scenes, run_selection.printed_run))
+        found.append(Claim(item, printed, _outcome(item, _Runs(scenes, run_selection.reference_or_corrected_run))))
     return [claim for claim in found if claim.is_decided]
 
 

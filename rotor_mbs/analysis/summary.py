@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.scenario.catalogue import natural_order
@@ -114,7 +114,7 @@ def _on_condition(figure: str, numbers: Sequence[Claim], scenes: Mapping[str, St
     of = numbers[0].published.of
     assert of is not None  # every number has it
     stored = scenes[of.scene]
-    run = methods.printed_run(stored)
+    run = run_selection.printed_run(stored)
     assert run is not None  # it has given the number
     rounding = any(claim.published.rounding for claim in numbers)
     scene = scene_of(stored)
@@ -123,7 +123,7 @@ def _on_condition(figure: str, numbers: Sequence[Claim], scenes: Mapping[str, St
 
 
 def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
-    runs = {name: run for name in natural_order(scenes) if (run := methods.printed_run(scenes[name])) is not None}
+    runs = {name: run for name in natural_order(scenes) if (run := run_selection.printed_run(scenes[name])) is not None}
     gains = {name: run.attributes["energy_gain_J"] for name, run in runs.items() if "energy_gain_J" in run.attributes}
     if not gains:
         return None
@@ -135,8 +135,8 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
 
 
 def _agreement(scenes: Mapping[str, StoredScene]) -> tuple[Agreement, ...]:
-    names = dict.fromkeys(name for scene in scenes.values() for name in methods.corrected_runs(scene))
-    return tuple(_worst(name, scenes) for name in methods.in_catalogue_order(names))
+    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
+    return tuple(_worst(name, scenes) for name in run_selection.in_catalogue_order(names))
 
 
 def _worst(method: str, scenes: Mapping[str, StoredScene]) -> Agreement:

@@ -16,7 +16,7 @@ from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.rehydrate import Rehydrated, rehydrate
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
-from rotor_mbs.scenario.bounds import Bounds
+from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import energy_slack, judge, quantity_bound, quantity_errors
 from rotor_mbs.solution.metrics import Metrics, compare, energy_scale

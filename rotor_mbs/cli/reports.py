@@ -7,7 +7,7 @@ import hashlib
 import os
 from pathlib import Path
 
-from rotor_mbs.execution.environment import fingerprint
+from rotor_mbs.execution.provenance import fingerprint
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import open_results

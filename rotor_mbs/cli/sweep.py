@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from rotor_mbs.cli.terminal import SweepProgress, span
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.engines import open_engine
 from rotor_mbs.execution.pool import TaskPool
+from rotor_mbs.execution.task_pools import open_task_pool
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.sweep import Sweep
@@ -26,7 +26,7 @@ _MANY = 1_000_000  # runs that are not started without --yes
 
 def sweep(arguments: argparse.Namespace) -> int:
     """1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
-    with _interruptible(), closing(open_engine(arguments.engine, arguments.jobs)) as pool:
+    with _interruptible(), closing(open_task_pool(arguments.engine, arguments.jobs)) as pool:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import plan_sweep
 

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rotor_mbs.execution.environment import fingerprint, numerics_fingerprint, versions_with
+from rotor_mbs.execution.provenance import fingerprint, numerics_fingerprint, versions_with
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene, scene_hash
 

@@ -13,7 +13,7 @@ from rotor_mbs.methods.ladders import STEP, Ladder, Look
 from rotor_mbs.methods.settings import Settings
 
 if TYPE_CHECKING:  # reading the catalogue needs none of them
-    from rotor_mbs.scenario.bounds import Bound
+    from rotor_mbs.scenario.accuracy_bounds import Bound
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.linearization import Linearization
     from rotor_mbs.solution.record import Integration, Item, Trajectory

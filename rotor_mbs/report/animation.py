@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError, StoreError
@@ -67,7 +67,7 @@ def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image
     scene = scene_of(stored)
     runs = {
         label_of(run.method): run
-        for run in (methods.printed_run(stored), methods.corrected_run(stored))
+        for run in (run_selection.printed_run(stored), run_selection.reference_or_corrected_run(stored))
         if run is not None and "angles" in run
     }
     if scene is None or not runs:

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from rotor_mbs.analysis import errata as errata_analysis
-from rotor_mbs.analysis import methods, published
+from rotor_mbs.analysis import published, run_selection
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
@@ -75,7 +75,7 @@ def _prepared(opened: Results) -> tuple[Context, dict[str, str], tuple[PaperFigu
 
 
 def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
-    printed = (methods.PRINTED, *errata_methods().values())
+    printed = (run_selection.PRINTED, *errata_methods().values())
     return any(name in scene.methods for scene in scenes.values() for name in printed)
 
 
@@ -98,8 +98,8 @@ def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int) -> dict[
 
 def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, object]:
     """The task of a worker: the page of each scene, and the content of each figure. Raises StoreError."""
+    from rotor_mbs.report.pages.figures import walk_figure
     from rotor_mbs.report.pages.scene import scene_page  # late: matplotlib, in the workers alone
-    from rotor_mbs.report.pages.walk import walk_figure
 
     names = list(context.files)
     neighbours = dict(zip(names, zip(["", *names], [*names[1:], ""], strict=False), strict=True))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look
 from rotor_mbs.store.read import StoredRun, StoredScene
@@ -65,12 +65,12 @@ def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """The scene's runs by the keys of HEADINGS, those that have samples of angles and rates."""
     exudyn = [
-        run for name, run in methods.corrected_runs(scene).items()
-        if (method := look_up(name)) and "exudyn" in method.distributions and methods.has_samples(run)
+        run for name, run in run_selection.corrected_runs(scene).items()
+        if (method := look_up(name)) and "exudyn" in method.distributions and run_selection.has_samples(run)
     ]  # fmt: skip
     runs = {
-        "printed": methods.printed_run(scene),
-        "corrected": methods.corrected_run(scene),
+        "printed": run_selection.printed_run(scene),
+        "corrected": run_selection.reference_or_corrected_run(scene),
         "exudyn": next(iter(exudyn), None),
     }
     found: dict[str, StoredRun] = {}

@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
 from rotor_mbs.scenario import scene
-from rotor_mbs.scenario.bounds import CHECKS
+from rotor_mbs.scenario.accuracy_bounds import CHECKS
 from rotor_mbs.scenario.validation import Line, NotNegative, Number, PerBlade, Table, Text, Vector, invalid, nearest
 
 MAX_BLADES = 10_000

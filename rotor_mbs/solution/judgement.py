@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.scenario.bounds import Bound, Bounds, shipped_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import Metrics, compare
 from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities

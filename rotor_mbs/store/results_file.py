@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.execution.environment import machine, versions
+from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.layout import TOGETHER, key_of

@@ -22,7 +22,7 @@ from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import Metrics
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.studies.frozen import load_reference
+from rotor_mbs.studies.stored_references import load_reference
 
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
 # a bench would time the reading of samples.

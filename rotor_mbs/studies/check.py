@@ -14,14 +14,14 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import OnProgress, Outcome, compute, ignore_progress
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
-from rotor_mbs.scenario.bounds import Bounds
+from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import changed_arrays
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.check_probes import measured, perform_probe, probes, speed_probes
-from rotor_mbs.studies.frozen import shipped_files
 from rotor_mbs.studies.run import run_scenes
+from rotor_mbs.studies.stored_references import shipped_files
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")

@@ -15,14 +15,14 @@ from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, Result
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.scenario.bounds import load_bounds
+from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
 from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.studies.check_known_runs import SCENE, known_runs, metrics_off, shares_off
 from rotor_mbs.studies.check_printed import differences
-from rotor_mbs.studies.check_rules import SCENE, known_runs, metrics_off, shares_off
-from rotor_mbs.studies.frozen import load_frozen
+from rotor_mbs.studies.stored_references import load_frozen
 
 # Scenes of probes that need none of the shipped ones.
 _OWN_SCENES = ("random states", "made by hand")

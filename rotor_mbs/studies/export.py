@@ -20,7 +20,7 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import Array, Quantity
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.studies.benchmark_text import description, evaluation_program
-from rotor_mbs.studies.frozen import frozen_file, frozen_solution
+from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
 
 _AXES = "xyz"
 
@@ -70,7 +70,7 @@ def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
     return list(texts)
 
 
-def reference_trajectory(scene: Scene) -> Trajectory:
+def rebuilt_reference(scene: Scene) -> Trajectory:
     """The scene's reference: the shipped one, else computed. Raises StoreError where it does not reach the end."""
     number = scene_hash(scene)
     shipped = frozen_file(number) is not None
@@ -120,12 +120,12 @@ def _names(quantity: Quantity, scene: Scene) -> list[str]:
 
 
 def _reference_csv(scene: Scene) -> str:
-    return trajectory_csv(scene, reference_trajectory(scene))
+    return trajectory_csv(scene, rebuilt_reference(scene))
 
 
 def _benchmark(scene: Scene) -> dict[str, str]:
     """Texts of a benchmark problem by file name: description, reference, error and acceptance as a program, models."""
-    trajectory = reference_trajectory(scene)
+    trajectory = rebuilt_reference(scene)
     return {
         "description.md": description(scene, trajectory),
         "reference.csv": trajectory_csv(scene, trajectory),

@@ -6,8 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rotor_mbs.analysis.errata import CheckedEntry, errata_fingerprint, write_errata
-from rotor_mbs.execution.environment import numerics_fingerprint
 from rotor_mbs.execution.execute import OnProgress, ignore_progress
+from rotor_mbs.execution.provenance import numerics_fingerprint
 from rotor_mbs.methods.catalogue import default_methods, errata_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results

@@ -24,7 +24,7 @@ from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import ResultsFile
 from rotor_mbs.store.write import write_run
-from rotor_mbs.studies.frozen import digest, frozen_file, frozen_solution, load_reference
+from rotor_mbs.studies.stored_references import digest, frozen_file, frozen_solution, load_reference
 
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5

@@ -23,7 +23,7 @@ from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.records import Record
-from rotor_mbs.studies.frozen import load_reference
+from rotor_mbs.studies.stored_references import load_reference
 
 STEPS, LIMIT = "steps", "limits"
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.execution.engines import open_engine
-from rotor_mbs.execution.environment import machine, numerics_fingerprint, versions
 from rotor_mbs.execution.pool import Finished, TaskPool, run_in
+from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
+from rotor_mbs.execution.task_pools import open_task_pool
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.scene import scene_hash
@@ -229,7 +229,7 @@ def run_sweep(
     """
     plan = plan_sweep(sweep, methods, part, timeout_s)
     start = time.monotonic()
-    pool = open_engine(engine, workers or os.cpu_count() or 1) if isinstance(engine, str) else engine
+    pool = open_task_pool(engine, workers or os.cpu_count() or 1) if isinstance(engine, str) else engine
     with nullcontext() if pool is engine else closing(pool), SweepDataset(output, plan.layout) as dataset:
         gaps = dataset.missing()
         missing = sum(last - first for first, last in gaps)

@@ -10,7 +10,7 @@ import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import claims, rounds_to
 from rotor_mbs.analysis.errata import CheckedEntry, effects, entries, write_errata
 from rotor_mbs.analysis.exact import escape_rate
@@ -136,11 +136,11 @@ def test_a_run_that_ended_early_is_named(tmp_path: Path) -> None:
 def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path: Path) -> None:
     right = [Made(FIG11, name, rotor(np.zeros_like)) for name in ("exudyn_tree/rk67", TAYLOR, REFERENCE, PRINTED)]
     with open_results(store(tmp_path / "a.h5", right)) as results:
-        assert methods.corrected_run(results.scenes["paper/fig11"]).method == REFERENCE
-        assert list(methods.in_order(results.scenes["paper/fig11"]))[:2] == [PRINTED, REFERENCE]
+        assert run_selection.reference_or_corrected_run(results.scenes["paper/fig11"]).method == REFERENCE
+        assert list(run_selection.in_order(results.scenes["paper/fig11"]))[:2] == [PRINTED, REFERENCE]
     with open_results(store(tmp_path / "b.h5", right[:2])) as results:
-        assert methods.corrected_run(results.scenes["paper/fig11"]).method == TAYLOR
-        assert methods.printed_run(results.scenes["paper/fig11"]) is None
+        assert run_selection.reference_or_corrected_run(results.scenes["paper/fig11"]).method == TAYLOR
+        assert run_selection.printed_run(results.scenes["paper/fig11"]) is None
 
 
 def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:

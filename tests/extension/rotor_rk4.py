@@ -8,7 +8,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import Look, Method, Settings, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder
 from rotor_mbs.methods.settings import number
-from rotor_mbs.scenario.bounds import Bound
+from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.solution.record import Integration, Item, Trajectory
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.bounds import Bound, load_bounds, read_bounds, shipped_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds, read_bounds, shipped_bounds
 
 BAD = {
     "an unknown key": ('check = "tip"\nmethod = "*"\nvalue = 1\nreason = "x"\nunit = "m"', 6,

@@ -20,7 +20,7 @@ from rotor_mbs.models.exudyn import adapter, chain, readings
 from rotor_mbs.models.exudyn.methods import MultibodySolver
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.timetable import RotorTorque
-from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution import judgement
 from rotor_mbs.solution.judgement import Judgement, energy_conditioning, judge

@@ -12,7 +12,7 @@ from support.scenes import paper
 
 from rotor_mbs.execution.timing import Timings, Warm, allot, conduct, statistics
 from rotor_mbs.methods.base import Settings
-from rotor_mbs.scenario.bounds import Bound
+from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Integration, Item, Trajectory
 from rotor_mbs.studies import bench_worker

@@ -34,7 +34,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario import catalogue
-from rotor_mbs.scenario.bounds import Bound, Bounds, load_bounds
+from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.freeze import write_digests
 from rotor_mbs.studies import check, check_probes

@@ -28,7 +28,7 @@ from support.comparison_dop853 import straightforward
 from support.scenes import paper
 
 from rotor_mbs.cli import main
-from rotor_mbs.execution.engines import open_engine
+from rotor_mbs.execution.task_pools import open_task_pool
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import ensemble
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
@@ -196,7 +196,7 @@ def test_a_fast_run_is_integration_and_arrays_but_for_a_tenth(tmp_path: Path) ->
     work = plan_sweep(load_sweep(_file(tmp_path, 201, _RUNS, "lagrange/taylor")), ("lagrange/taylor",), (1, 1), 60.0)
     chunks = list(work.chunks([(0, _RUNS)], 2))[::4]  # large ones, and small ones at the end, as two workers have them
     runs = sum(len(chunk.values) for chunk in chunks)
-    engine = open_engine("local", 1)
+    engine = open_task_pool("local", 1)
     try:
         shares = [engine.submit(_shares, chunks, 60.0).result() for _ in range(1 + _ROUNDS)]
     finally:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from rotor_mbs.execution.engines import open_engine
+from rotor_mbs.execution.task_pools import open_task_pool
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import perform
@@ -61,7 +61,7 @@ def _resident(_: object) -> float:
 def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, duration: float) -> None:
     """10,000 runs after the first thousand: at most 20 MB."""
     work = plan_sweep(load_sweep(_file(tmp_path, method, 11_000, samples, duration)), (), (1, 1), 60.0)
-    engine = open_engine("local", 1)
+    engine = open_task_pool("local", 1)
     try:
         before = 0.0
         for chunk in work.chunks([(0, 11_000)]):

@@ -408,7 +408,7 @@ STATUS_WORDS = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "ti
 
 def _verdicts_of(group: str) -> Iterator[list[Any]]:
     """What `check` says, the cheap parts first. Imported here: after the mutant's text was put in place."""
-    from rotor_mbs.scenario.bounds import load_bounds
+    from rotor_mbs.scenario.accuracy_bounds import load_bounds
     from rotor_mbs.studies import check, check_probes
 
     if group in ("lagrange", "printed", "rules"):

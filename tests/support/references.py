@@ -12,7 +12,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import open_results
-from rotor_mbs.studies.frozen import reference_trajectory
+from rotor_mbs.studies.stored_references import rebuilt_reference
 
 TAYLOR = "lagrange/taylor"
 
@@ -27,7 +27,7 @@ def reference(name: str) -> Trajectory:
     with open_results(reference_folder() / f"{name.split('/')[0]}.h5") as results:
         stored = results.scenes[name].reference
         assert stored is not None
-        return reference_trajectory(scene(name), stored)
+        return rebuilt_reference(scene(name), stored)
 
 
 def run(one: Scene, method: str = TAYLOR, **settings: object) -> Solution:

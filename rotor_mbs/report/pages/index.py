@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally, finding
@@ -44,8 +44,8 @@ def versions(results: Results) -> list[tuple[str, str]]:
 
 def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
     """A row per scene: its horizon, the printed model's departure, the errors of the corrected models."""
-    corrected = methods.in_catalogue_order(
-        dict.fromkeys(name for scene in scenes.values() for name in methods.corrected_runs(scene))
+    corrected = run_selection.in_catalogue_order(
+        dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
     )
     head = ["Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain"]
     for name in corrected:
@@ -56,7 +56,7 @@ def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> 
             TableCell(name, href=files[name], note=scene.title),
             str(scene.attributes.get("figures", "")),
             quantity(horizon(scene), "s", 3),
-            *_printed_cells(scene.methods.get(methods.PRINTED)),
+            *_printed_cells(scene.methods.get(run_selection.PRINTED)),
         ]
         rows.append([*cells, *(cell for method in corrected for cell in _corrected_cells(scene.methods.get(method)))])
     caption = "Angle errors are the largest up to the horizon, against the quad-precision reference"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
@@ -47,8 +47,8 @@ class DrawnRuns:
     @classmethod
     def of(cls, scene: StoredScene) -> DrawnRuns:
         """The runs of `scene` that have samples."""
-        printed, corrected = methods.printed_run(scene), methods.corrected_run(scene)
-        good = {n: run for n, run in methods.corrected_runs(scene).items() if methods.has_samples(run)}
+        printed, corrected = run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene)
+        good = {n: run for n, run in run_selection.corrected_runs(scene).items() if run_selection.has_samples(run)}
         others = {name: run for name, run in good.items() if corrected is None or name != corrected.method}
         return cls(scene, printed, corrected, others, scene_tables.horizon(scene))
 
@@ -113,7 +113,7 @@ def _lead(drawn: DrawnRuns) -> list[str]:
         gain = metric(printed, "energy_gain_J")
         energy = "" if gain is None else f"; its energy rises by up to {prefixed(gain, 'J')}"
         found.append(f"The printed model departs from the reference by up to {quantity(departure, 'rad')}{energy}.")
-    runs = [run for run in methods.corrected_runs(drawn.scene).values() if run.status == "ok"]
+    runs = [run for run in run_selection.corrected_runs(drawn.scene).values() if run.status == "ok"]
     errors = [error for run in runs if (error := metric(run, "angle_error_max")) is not None]
     if errors and drawn.horizon is not None:
         found.append(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
@@ -47,7 +47,7 @@ def metrics_table(scene: StoredScene) -> PageTable:
         "Tip error to the horizon (m)", "Energy drift (relative)", "Joint gap (m)", "Zero pitch", "Steps",
         "Evaluations", "Set-up", "Run",
     )  # fmt: skip
-    rows = [_metrics_row(run) for run in methods.in_order(scene).values()]
+    rows = [_metrics_row(run) for run in run_selection.in_order(scene).values()]
     return PageTable("", head, rows, numeric=(2, 3, 4, 5, 6, 8, 9, 10, 11)).without_empty_columns()
 
 
@@ -96,10 +96,10 @@ def metrics_notes(scene: StoredScene) -> list[str]:
 def failures(scene: StoredScene) -> list[str]:
     """A sentence for every run that is not ok."""
     found = []
-    for run in methods.in_order(scene).values():
+    for run in run_selection.in_order(scene).values():
         if run.status != "ok":
             message = str(run.attributes.get("message", ""))
-            reached = float(run.array("time")[-1]) if methods.has_samples(run) else 0.0
+            reached = float(run.array("time")[-1]) if run_selection.has_samples(run) else 0.0
             parts = [f"{label_of(run.method)}: {status_text(run.status)}", *([message] if message else [])]
             found.append(f"{'. '.join(parts)} (samples up to {quantity(reached, 's', 4)})")
     return found

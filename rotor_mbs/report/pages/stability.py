@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.analysis import methods
+from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.stability import (
     OUTCOMES,
     TARGET,
@@ -138,8 +138,10 @@ def _shown(value: float | None) -> str:
 
 
 def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[Record]) -> dict[str, object]:
-    corrected = methods.corrected_runs(scene)
-    runs = {name: run for name, run in corrected.items() if methods.has_samples(run) and len(run.array("time")) > 1}
+    corrected = run_selection.corrected_runs(scene)
+    runs = {
+        name: run for name, run in corrected.items() if run_selection.has_samples(run) and len(run.array("time")) > 1
+    }
     return {
         "name": scene.name,
         "title": scene.title,
@@ -149,7 +151,7 @@ def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[R
         "source": opening_comment(scene),
         "toml": str(scene.attributes["scene_toml"]),
         "outcomes": Section(tables=[_outcome_table(own)]),
-        "motion": _motion(methods.corrected_run(scene)),
+        "motion": _motion(run_selection.reference_or_corrected_run(scene)),
         "errors": _errors(scene, runs),
         "steps": _error_over_step(ladders),
         "has_errata": False,

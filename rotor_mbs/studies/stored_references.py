@@ -49,7 +49,7 @@ def load_reference(path: Path, scene: Scene) -> Trajectory | None:
         stored = results.scenes[scene.name].reference if scene.name in results.scenes else None
         if stored is None or not len(stored.array("time")):
             return None
-        return reference_trajectory(scene, stored)
+        return rebuilt_reference(scene, stored)
 
 
 def load_frozen(name: str) -> Trajectory:
@@ -63,7 +63,7 @@ def load_frozen(name: str) -> Trajectory:
     raise StoreError(f"{reference_folder()}: no frozen reference of {name}; `rotor-mbs reference` makes one")
 
 
-def reference_trajectory(scene: Scene, stored: StoredRun) -> Trajectory:
+def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
     """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form."""
     from rotor_mbs.models.lagrange import samples
 
@@ -87,7 +87,7 @@ def frozen_solution(scene: Scene, scene_hash: str) -> tuple[Solution, dict[str, 
         stored = next(s for s in results.scenes.values() if s.attributes["scene_hash"] == scene_hash).reference
         assert stored is not None  # a file of references has one for each scene
         facts = stored.attributes
-        trajectory = reference_trajectory(scene, stored)
+        trajectory = rebuilt_reference(scene, stored)
         is_complete = len(trajectory.time) == scene.samples
         engine = Integration(
             is_complete,

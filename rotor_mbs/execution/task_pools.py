@@ -29,7 +29,7 @@ _LOAD = "rotor_mbs.studies.sweep_work:prepare"
 _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_": str(1 << 27)}
 
 
-def open_engine(name: str, workers: int) -> TaskPool:
+def open_task_pool(name: str, workers: int) -> TaskPool:
     """The engine called `name`, with `workers` processes where it is local; these load their code at once.
 
     Raises InputError where there is no such engine, or it does not answer.

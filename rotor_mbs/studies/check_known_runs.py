@@ -12,7 +12,7 @@ import numpy as np
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.methods.catalogue import is_corrected
-from rotor_mbs.scenario.bounds import Bounds
+from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.judgement import judge, rotor_inertia_shares
 from rotor_mbs.solution.metrics import compare

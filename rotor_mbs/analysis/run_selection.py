@@ -32,7 +32,7 @@ def corrected_runs(scene: StoredScene) -> dict[str, StoredRun]:
     return {name: scene.methods[name] for name in in_catalogue_order(scene.methods) if is_corrected(name)}
 
 
-def corrected_run(scene: StoredScene) -> StoredRun | None:
+def reference_or_corrected_run(scene: StoredScene) -> StoredRun | None:
     """The reference, else the first run of a corrected model that has samples; None without either."""
     candidates = [scene.reference, *corrected_runs(scene).values()]
     return next((run for run in candidates if run is not None and has_samples(run)), None)
