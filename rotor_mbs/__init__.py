@@ -6,6 +6,7 @@ The Python API. Everything is loaded when it is first used: importing this packa
     run                      one scene by one method: a `Run`
     compare                  one scene by several methods, against its reference: a `Comparison`
     sweep                    one scene over the values of its parameters: a `SweepData`
+    claims                   the paper's claims in words as shares of many runs, its numbers under other conditions
     export                   a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark problem
     modes                    natural frequencies, damping and shapes over rotor speed: `Modes`
     open                     a results file: runs by their path; the dataset of a sweep
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from rotor_mbs.methods.base import Method as Method
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
+    from rotor_mbs.studies.claims import claims as claims
     from rotor_mbs.studies.export import export as export
 
 _PLACES = {
@@ -63,6 +65,7 @@ _PLACES = {
     "rotor_mbs.errors": ("InputError", "MethodRefusal", "RotorError", "StoreError"),
     "rotor_mbs.methods.base": ("Method",),
     "rotor_mbs.scenario.scene": ("Blade", "Scene"),
+    "rotor_mbs.studies.claims": ("claims",),
     "rotor_mbs.studies.export": ("export",),
 }
 _HOME = {name: place for place, names in _PLACES.items() for name in names}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
@@ -56,6 +57,29 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
     return [claim for claim in found if claim.is_decided]
 
 
+class Numbers(Protocol):
+    """Where the numbers of a claim are read off: the runs of one model, one for each scene."""
+
+    def has(self, scene: str) -> bool:
+        """Whether there is a run of the scene that can decide anything."""
+
+    def value(self, asked: TrajectoryNumber) -> float | None:
+        """The number; None where it is undefined, or where there is no run."""
+
+
+def readings_of(item: Published, numbers: Numbers) -> tuple[Reading, ...]:
+    """The tests of a claim in words, in order."""
+    return tuple(_read(test, numbers) for test in item.tests)
+
+
+def all_hold(readings: Iterable[Reading]) -> bool | None:
+    """False as soon as one fails, even where others cannot be decided; None where none fails and one is undecided."""
+    verdicts = [reading.holds for reading in readings]
+    if False in verdicts:
+        return False
+    return None if None in verdicts or not verdicts else True
+
+
 @dataclass(frozen=True)
 class _Runs:
     scenes: Mapping[str, StoredScene]
@@ -63,6 +87,9 @@ class _Runs:
 
     def of(self, scene: str) -> StoredRun | None:
         return self.choose(self.scenes[scene]) if scene in self.scenes else None
+
+    def has(self, scene: str) -> bool:
+        return self.of(scene) is not None
 
     def value(self, asked: TrajectoryNumber) -> float | None:
         run = self.of(asked.scene)
@@ -74,8 +101,8 @@ def _outcome(item: Published, runs: _Runs) -> ClaimResult:
     if item.of is not None:
         value = runs.value(item.of)
         return ClaimResult(None if value is None else rounds_to(value, item.value, item.decimals), value, (), early)
-    readings = tuple(_read(test, runs) for test in item.tests)
-    return ClaimResult(_all_hold(readings), None, readings, early)
+    readings = readings_of(item, runs)
+    return ClaimResult(all_hold(readings), None, readings, early)
 
 
 def rounds_to(value: float, printed: float, decimals: int) -> bool:
@@ -87,19 +114,11 @@ def _ended_early(run: StoredRun | None) -> bool:
     return run is not None and run.status not in ("ok", "inaccurate")
 
 
-def _all_hold(readings: Iterable[Reading]) -> bool | None:
-    """False as soon as one fails, even where others cannot be decided."""
-    verdicts = [reading.holds for reading in readings]
-    if False in verdicts:
-        return False
-    return None if None in verdicts or not verdicts else True
-
-
-def _read(test: Condition, runs: _Runs) -> Reading:
-    if runs.of(test.of.scene) is None or (test.than is not None and runs.of(test.than.scene) is None):
+def _read(test: Condition, numbers: Numbers) -> Reading:
+    if not numbers.has(test.of.scene) or (test.than is not None and not numbers.has(test.than.scene)):
         return Reading(test, None, None, None)
-    value = runs.value(test.of)
-    limit = runs.value(test.than) if test.than is not None else None
+    value = numbers.value(test.of)
+    limit = numbers.value(test.than) if test.than is not None else None
     undefined = value is None or (test.than is not None and limit is None)
     return Reading(test, value, limit, False if undefined else _relation(test, value, limit))
 

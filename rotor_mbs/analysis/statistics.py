@@ -1,4 +1,4 @@
-"""One number read off a stored run: an extreme, a range, how it grows.
+"""One number read off a run: an extreme, a range, how it grows.
 
 Extremes are read at an integrator's own output points where the run has them, as off a printed figure.
 """
@@ -6,19 +6,27 @@ Extremes are read at an integrator's own output points where the run has them, a
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.published import TrajectoryNumber
-from rotor_mbs.store.read import StoredRun
 
 Array = NDArray[np.float64]
 
 _DATASETS = {"angle": "angles", "rate": "rates"}
 
 
-def measure(run: StoredRun, asked: TrajectoryNumber) -> float | None:
+class RunArrays(Protocol):
+    """Arrays of a run by name: time (n,), angles, rates (n, 1 + blades); refined_time and so on where it has them."""
+
+    def __contains__(self, name: str, /) -> bool: ...
+
+    def array(self, name: str) -> Array: ...
+
+
+def measure(run: RunArrays, asked: TrajectoryNumber) -> float | None:
     """The number in rad or rad/s (reversals and growth: 1); None where the run has no such data or it is undefined."""
     series = _series(run, _DATASETS[asked.quantity], asked.coordinate)
     if series is None:
@@ -26,7 +34,7 @@ def measure(run: StoredRun, asked: TrajectoryNumber) -> float | None:
     return STATISTICS[asked.statistic](*series)
 
 
-def _series(run: StoredRun, name: str, coordinate: int) -> tuple[Array, Array] | None:
+def _series(run: RunArrays, name: str, coordinate: int) -> tuple[Array, Array] | None:
     for time, values in (("refined_time", f"refined_{name}"), ("time", name)):
         if time in run and values in run:
             data = run.array(values)

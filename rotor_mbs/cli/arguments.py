@@ -54,6 +54,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_sweep,
         _add_stability,
         _add_modes,
+        _add_claims,
         _add_report,
         _add_export,
     ):
@@ -166,6 +167,26 @@ def _add_modes(commands: _Commands) -> None:
     modes.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
     modes.add_argument("--json", action="store_true", help="the table as JSON, for a script")
     _add_batch_options(modes, timeout_s=_CHART_TIMEOUT_S)
+
+
+def _add_claims(commands: _Commands) -> None:
+    claims = _command(
+        commands, "claims", "the paper's claims in words as shares of many runs, its numbers under other conditions",
+        "claims:claims",
+    )  # fmt: skip
+    claims.add_argument("-o", "--output", type=_file, default=Path("claims.h5"), metavar="FILE", help=_default("FILE"))
+    claims.add_argument(
+        "--runs", type=_positive(int, "a whole number from 1 up"), default=100, metavar="N",
+        help="starts moved by up to 1e-15 rad, for each scene, method and duration (default: %(default)s)",
+    )  # fmt: skip
+    claims.add_argument(
+        "--seed",
+        type=_positive(int, "a whole number from 1 up"),
+        default=2020,
+        metavar="N",
+        help="of the moved starts (default: %(default)s)",
+    )
+    _add_jobs(claims)
 
 
 def _add_report(commands: _Commands) -> None:

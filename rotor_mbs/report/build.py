@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rotor_mbs.analysis import errata as errata_analysis
 from rotor_mbs.analysis import published, run_selection
+from rotor_mbs.analysis.claim_records import ClaimStudy, stored_claims
 from rotor_mbs.analysis.claims import Claim, claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
@@ -37,6 +38,7 @@ class Context:
     claims: tuple[Claim, ...]
     conditions: Mapping[str, str]
     has_errata: bool
+    study: ClaimStudy | None
 
 
 def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
@@ -64,14 +66,15 @@ def _prepared(opened: Results) -> tuple[Context, dict[str, str], tuple[PaperFigu
     files = page_names(scenes)
     decided = tuple(claims(scenes))
     conditions = published.conditions() if decided else {}
+    study = stored_claims(opened) if decided else None
     entries = errata_analysis.entries(opened)
     errata = published.errata() if entries or _has_printed_model(scenes) else ()
     figures = available(scenes)
-    index = index_page(opened, scenes, files, decided, conditions, errata, has_walk=bool(figures))
+    index = index_page(opened, scenes, files, decided, conditions, errata, has_walk=bool(figures), study=study)
     pages = {INDEX: render("index", index)}
     if errata:
         pages[ERRATA] = render("errata", errata_page(errata, entries, scenes, files))
-    return Context(opened.path, files, decided, conditions, bool(errata)), pages, figures
+    return Context(opened.path, files, decided, conditions, bool(errata), study), pages, figures
 
 
 def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
@@ -113,7 +116,7 @@ def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, object]:
             own = [claim for claim in context.claims if part in claim.published.scenes]
             page = scene_page(
                 opened.scenes[part], own, context.conditions,
-                has_errata=context.has_errata, previous=previous, following=following,
+                has_errata=context.has_errata, previous=previous, following=following, study=context.study,
             )  # fmt: skip
             found[part] = render("scene", page)
     return found

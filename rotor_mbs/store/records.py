@@ -4,6 +4,7 @@
     /stability/<kind>/<scene>/<method>       step ladders, stability limits and conservation over `row`
     /errata                                  the check of the printed entries over `row`
     /modes/<scene>/<model>/<kind>            modes over speed; its arrays have dimensions of their own
+    /claims/shares, /claims/numbers          the paper's claims from many starts, its numbers under other conditions
 Writes and reads them; judges nothing.
 """
 
@@ -32,6 +33,7 @@ _FOLDERS = {
     "conservation": "stability/conservation",
     "errata": "errata",
     "modes": "modes",
+    "claims": "claims",
 }
 _DIMENSIONS = {"bench": "setting"}  # of the others: row
 _SETTING_UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
@@ -60,6 +62,15 @@ _COLUMNS = {
     "energy_drift_rms": ("1", "energy error over perturbed starts, root mean square, of its scale"),
     "difference": ("1", "largest relative difference of a printed entry from the derivative"),
     "agrees": ("1", "1 where the printed entry is the derivative"),
+    "duration": ("s", "duration of the runs"),
+    "share": ("1", "share of the deciding runs in which the claim holds"),
+    "deciding": ("1", "runs that decide, of those from moved starts"),
+    "relative_tolerance": ("1", "relative tolerance of ode45"),
+    "absolute_tolerance": ("rad", "absolute tolerance of ode45, also in rad/s"),
+    "remainder": ("N m", "moment of the weights at the start of Fig. 5, zero but for rounding"),
+    "angle": ("rad", "the number where it is an angle, else NaN"),
+    "rate": ("rad/s", "the number where it is a rate, else NaN"),
+    "reproduced": ("1", "1 where the number has the printed digits"),
 }
 
 
@@ -69,7 +80,7 @@ class Record:
 
     Attributes
     ----------
-    kind : "bench", "steps", "limits", "conservation", "errata" or "modes".
+    kind : "bench", "steps", "limits", "conservation", "errata", "modes" or "claims".
     scene : "paper/fig05"; "" where the record belongs to no scene.
     name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
     attributes : plain values; `run_hash` stands for all that decides the numbers.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.analysis.claim_records import shipped_claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.scenario.catalogue import reference_folder
@@ -20,7 +21,7 @@ from rotor_mbs.store.read import StoredRun, open_results
 
 def shipped_files() -> list[Path]:
     """The files of frozen references."""
-    return sorted(reference_folder().glob("*.h5"))
+    return sorted(set(reference_folder().glob("*.h5")) - {shipped_claims()})
 
 
 def frozen_file(scene_hash: str) -> Path | None:

@@ -125,7 +125,7 @@ def rotor_gravity(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5
 
     Equal to the printed form but for rounding, which decides Fig. 5: it starts at rest in an unstable equilibrium of
     these equations, so that its motion is amplified rounding error. There the printed bracket is exactly zero, and
-    nothing moves; the three terms leave -4.3e-13 N m, with which the three published numbers come out for T = 12 s.
+    nothing moves; the three terms leave -4.2e-13 N m, with which the three published numbers come out for T = 12 s.
     Other ways of writing the row are in `gravity_rows`.
     """
     second, third = c2 / 2 + root3 / 2 * s2, c2 / 2 - root3 / 2 * s2

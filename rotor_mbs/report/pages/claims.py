@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from rotor_mbs.analysis.claim_shares import ClaimShares
 from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
 from rotor_mbs.analysis.published import TrajectoryNumber
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import fixed, number, quantity
+from rotor_mbs.report.pages import claim_study
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
 _STATISTICS = {
@@ -33,9 +35,9 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
     return PageTable("Published numbers", head, rows, numeric=(2, 3, 5))
 
 
-def claim_table(claims: Iterable[Claim]) -> PageTable:
-    """The claims in words, a row each."""
-    rows = [_claim_row(claim) for claim in claims if not claim.published.is_number]
+def claim_table(claims: Iterable[Claim], shares: ClaimShares | None = None) -> PageTable:
+    """The claims in words, a row each: by the shares of many runs where there are any, else by the stored runs."""
+    rows = [_claim_row(claim, shares) for claim in claims if not claim.published.is_number]
     return PageTable("Published claims", ("Figure", "In the paper", "As printed", "Corrected model"), rows)
 
 
@@ -67,16 +69,22 @@ def _number_row(claim: Claim) -> Row:
     ]
 
 
-def _claim_row(claim: Claim) -> Row:
+def _claim_row(claim: Claim, shares: ClaimShares | None) -> Row:
     item = claim.published
-    return [
-        item.figure,
-        TableCell(item.statement, note=f"«{item.quote}»", note_language="es"),
-        *(
-            replace(_verdict(one.holds, "holds", "does not hold"), note=_evidence(one) if one.holds is not None else "")
-            for one in (claim.printed, claim.corrected)
-        ),
-    ]
+    quoted = TableCell(item.statement, note=f"«{item.quote}»", note_language="es")
+    if shares is None or item.id not in shares.claims:
+        return [item.figure, quoted, _stored_verdict(claim.printed), _stored_verdict(claim.corrected)]
+    cells = []
+    for method, stored in zip(shares.methods, (claim.printed, claim.corrected), strict=True):
+        cell = claim_study.verdict_cell(shares.of(item.id, method))
+        alone = _stored_verdict(stored)
+        cells.append(replace(cell, note=f"{cell.note}. The run stored here: {alone.text}. {alone.note}".strip()))
+    return [item.figure, quoted, *cells]
+
+
+def _stored_verdict(result: ClaimResult) -> TableCell:
+    cell = _verdict(result.holds, "holds", "does not hold")
+    return replace(cell, note=_evidence(result) if result.holds is not None else "")
 
 
 def _verdict(holds: bool | None, yes: str, no: str) -> TableCell:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rotor_mbs.analysis import run_selection
+from rotor_mbs.analysis.claim_records import ClaimStudy
+from rotor_mbs.analysis.claim_shares import ClaimShares
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally, finding
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, quantity
+from rotor_mbs.report.pages import claim_study
 from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
 from rotor_mbs.store.read import Results, StoredRun, StoredScene
@@ -21,20 +24,31 @@ _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py"
 
 def index_page(
     results: Results, scenes: Mapping[str, StoredScene], files: Mapping[str, str], claims: Sequence[Claim],
-    conditions: Mapping[str, str], errata: Sequence[Erratum], *, has_walk: bool,
+    conditions: Mapping[str, str], errata: Sequence[Erratum], *, has_walk: bool, study: ClaimStudy | None = None,
 ) -> dict[str, object]:  # fmt: skip
-    """scenes: in order; files: the file name of each scene's page; errata: empty where there is no such page."""
+    """scenes: in order; files: the file name of each scene's page; errata: empty where there is no such page.
+
+    study: the claims on many runs, and the numbers under other conditions; None where there is none
+    """
+    shares = None if study is None else study.shares
+    trials = [] if study is None else claim_study.trial_tables(study.numbers)[:1]
+    notes = [] if shares is None else [claim_study.study_note(shares)]
     general = [text for key, text in conditions.items() if not key.startswith("fig")]
     return {
-        "finding": finding_sentences(finding(scenes, claims)),
+        "finding": finding_sentences(finding(scenes, claims), study if _has_all(claims, shares) else None),
         "scenes": Section(tables=[scene_table(scenes, files)]),
-        "numbers": Section(tables=[claim_tables.number_table(claims)], notes=general),
-        "claims": Section(tables=[claim_tables.claim_table(claims)]),
+        "numbers": Section(tables=[claim_tables.number_table(claims), *trials], notes=general),
+        "claims": Section(tables=[claim_tables.claim_table(claims, shares)], notes=notes),
         "errata": Section(tables=[_errata_table(errata)]),
         "versions": versions(results),
         "is_paper": bool(claims),
         "has_walk": has_walk,
     }
+
+
+def _has_all(claims: Sequence[Claim], shares: ClaimShares | None) -> bool:
+    """Whether the file has the runs of every claim in words that was studied."""
+    return shares is not None and {claim.published.id for claim in claims} >= set(shares.claims)
 
 
 def versions(results: Results) -> list[tuple[str, str]]:
@@ -89,13 +103,21 @@ def _errata_table(errata: Sequence[Erratum]) -> PageTable:
     return PageTable(caption, ("Erratum", "Equation", "Printed", "Correct", "Reason"), rows)
 
 
-def finding_sentences(facts: Finding) -> list[str]:
-    """At most three sentences: what is reproduced, what is wrong in print, how well the corrected models agree."""
-    sentences = [_reproduced(facts), _printed_energy(facts.energy), _agreement(facts.agreement)]
+def finding_sentences(facts: Finding, study: ClaimStudy | None = None) -> list[str]:
+    """A few sentences: what is reproduced, which claims hold, what is wrong in print, how corrected models agree."""
+    claims = "" if study is None else claim_study.headline(study.shares)
+    numbers = "" if study is None or facts.numbers is None else claim_study.numbers_headline(study.numbers)
+    sentences = [
+        _reproduced(facts, with_claims=not claims),
+        numbers,
+        claims,
+        _printed_energy(facts.energy),
+        _agreement(facts.agreement),
+    ]
     return [sentence for sentence in sentences if sentence]
 
 
-def _reproduced(facts: Finding) -> str:
+def _reproduced(facts: Finding, *, with_claims: bool) -> str:
     numbers, printed, corrected = facts.numbers, facts.claims_printed, facts.claims_corrected
     if numbers is None:
         tallies = [(printed, "printed"), (corrected, "corrected")]
@@ -109,7 +131,7 @@ def _reproduced(facts: Finding) -> str:
         text += f": {'; '.join(map(_condition, facts.reproduced))}"
     if facts.numbers_corrected is not None:
         text += f". The corrected model reproduces {facts.numbers_corrected.count or 'none'}"
-    if printed is not None and corrected is not None:
+    if with_claims and printed is not None and corrected is not None:
         text += (
             f"; of the paper's claims in words {_share(printed)} hold in the printed model, {_share(corrected)} in the "
             "corrected model"

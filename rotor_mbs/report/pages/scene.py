@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis import run_selection
+from rotor_mbs.analysis.claim_records import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, quantity
 from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages import claim_study, error_pictures, scene_tables
 from rotor_mbs.report.pages import claims as claim_tables
-from rotor_mbs.report.pages import error_pictures, scene_tables
 from rotor_mbs.report.pages.quantities import quantity_sections
 from rotor_mbs.report.pages.scene_tables import metric
 from rotor_mbs.report.pages.viewer import viewer
@@ -70,13 +71,12 @@ class DrawnRuns:
 
 def scene_page(
     scene: StoredScene, claims: Sequence[Claim], conditions: Mapping[str, str], *,
-    has_errata: bool, previous: str, following: str,
+    has_errata: bool, previous: str, following: str, study: ClaimStudy | None = None,
 ) -> dict[str, object]:  # fmt: skip
     """claims: those of the paper about this scene; conditions: what the paper does not print, by key; previous and
-    following: file names of the neighbouring pages, or ""."""
+    following: file names of the neighbouring pages, or ""; study: the claims on many runs, None where there is none."""
     drawn = DrawnRuns.of(scene)
     own = conditions.get(scene.name.rpartition("/")[2])
-    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims)]
     figures = str(scene.attributes.get("figures", ""))
     sides = {label_of(run.method): run for run in drawn.sides.values()}
     return {
@@ -87,7 +87,7 @@ def scene_page(
         "source": opening_comment(scene),
         "lead": _lead(drawn),
         "failures": scene_tables.failures(scene),
-        "claims": Section(tables=[table for table in tables if table.rows], notes=[own] if own else []),
+        "claims": _claims_section(claims, study, [own] if own else []),
         "viewer": viewer(scene, sides) if drawn.sides_with("tip") else None,
         "paths": paths_section(drawn),
         "motion": motion_section(drawn),
@@ -100,6 +100,17 @@ def scene_page(
         "previous": previous,
         "next": following,
     }
+
+
+def _claims_section(claims: Sequence[Claim], study: ClaimStudy | None, notes: list[str]) -> Section:
+    """The numbers and claims about a scene; where a number is rounding error, what it is under other conditions."""
+    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims, study.shares if study else None)]
+    if study is not None and tables[1].rows:
+        notes = [*notes, claim_study.study_note(study.shares)]
+    if study is not None and any(claim.published.rounding for claim in claims):
+        tables += claim_study.trial_tables(study.numbers)
+        notes = [*notes, claim_study.trial_note(study.numbers)]
+    return Section(tables=[table for table in tables if table.rows], notes=notes)
 
 
 def _lead(drawn: DrawnRuns) -> list[str]:

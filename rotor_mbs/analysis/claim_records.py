@@ -1,0 +1,136 @@
+"""The study of claims and numbers as records of a results file, and read back: from a report's file or as shipped."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.analysis.claim_shares import RULE, ClaimShare, ClaimShares
+from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials
+from rotor_mbs.analysis.published import published
+from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.store.read import Results, open_results
+from rotor_mbs.store.records import Record, read_record, records_in
+
+KIND, SHARES, NUMBERS = "claims", "shares", "numbers"
+
+
+@dataclass(frozen=True)
+class ClaimStudy:
+    """Both tables."""
+
+    shares: ClaimShares
+    numbers: NumberTrials
+
+
+def shipped_claims() -> Path:
+    """The study shipped with the package, made by `rotor-mbs claims`."""
+    return reference_folder() / "claims.h5"
+
+
+def stored_claims(results: Results | None = None) -> ClaimStudy | None:
+    """The study in an open results file, else the shipped one; None where there is none."""
+    found = {} if results is None else _records(results)
+    if len(found) < 2 and shipped_claims().exists():
+        with open_results(shipped_claims()) as shipped:
+            found = _records(shipped)
+    return _study(found) if len(found) == 2 else None
+
+
+def records_of(study: ClaimStudy, seed: int, made_with: Mapping[str, str]) -> list[Record]:
+    """Two records, found by a content hash. made_with: versions of the programs."""
+    facts = {"seed": seed, "made_with": json.dumps(dict(made_with), sort_keys=True)}
+    return [_hashed(_shares_record(study.shares), facts), _hashed(_numbers_record(study.numbers), facts)]
+
+
+def _hashed(record: Record, facts: Mapping[str, object]) -> Record:
+    attributes = {**record.attributes, **facts}
+    content = [attributes, {name: np.asarray(values).tolist() for name, values in record.arrays.items()}]
+    key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return Record(record.kind, record.scene, record.name, {"run_hash": key, **attributes}, record.arrays)
+
+
+def _records(results: Results) -> dict[str, Record]:
+    found = [read_record(path, group) for path, group in records_in(results.root, KIND)]
+    return {record.name: record for record in found}
+
+
+def _study(records: Mapping[str, Record]) -> ClaimStudy:
+    return ClaimStudy(_shares(records[SHARES]), _numbers(records[NUMBERS]))
+
+
+def _shares_record(study: ClaimShares) -> Record:
+    shares = study.shares
+    texts = {
+        "claims": [one.claim for one in shares],
+        "methods": [one.method for one in shares],
+        "marks": [one.marks for one in shares],
+    }
+    numbers: dict[str, Any] = {
+        "duration": np.array([one.duration for one in shares]),
+        "share": np.array([one.share for one in shares]),
+        "deciding": np.array([one.deciding for one in shares], dtype=np.int64),
+    }
+    facts = {"spread_rad": study.spread, "runs": study.runs, "rule": RULE}
+    return Record(KIND, "", SHARES, {**facts, **texts}, numbers)
+
+
+def _shares(record: Record) -> ClaimShares:
+    facts = record.attributes
+    columns = zip(facts["claims"], facts["methods"], record.arrays["duration"].tolist(), facts["marks"], strict=True)
+    return ClaimShares(tuple(ClaimShare(*row) for row in columns), float(facts["spread_rad"]), int(facts["runs"]))
+
+
+def _numbers_record(study: NumberTrials) -> Record:
+    trials, usual = study.trials, study.usual
+    is_rate = {item.id: item.of is not None and item.of.quantity == "rate" for item in published()}
+    texts = {
+        "numbers": [one.number for one in trials],
+        "gravity_rows": [one.conditions.gravity_row for one in trials],
+        "row_names": [row.name for row in study.rows],
+        "row_formulas": [row.formula for row in study.rows],
+        "rows_of_56": [row.name for row in study.rows if row.is_of_56],
+    }
+    arrays: dict[str, Any] = {
+        "duration": np.array([one.conditions.duration for one in trials]),
+        "relative_tolerance": np.array([one.conditions.relative_tolerance for one in trials]),
+        "absolute_tolerance": np.array([one.conditions.absolute_tolerance for one in trials]),
+        "remainder": np.array([one.remainder for one in trials]),
+        "angle": np.array([np.nan if is_rate[one.number] else one.value for one in trials]),
+        "rate": np.array([one.value if is_rate[one.number] else np.nan for one in trials]),
+        "reproduced": np.array([one.reproduced for one in trials], dtype=np.int8),
+    }
+    facts = {
+        "usual_row": usual.gravity_row,
+        "usual_duration_s": usual.duration,
+        "usual_relative_tolerance": usual.relative_tolerance,
+        "usual_absolute_tolerance": usual.absolute_tolerance,
+    }
+    return Record(KIND, "", NUMBERS, {**facts, **texts}, arrays)
+
+
+def _numbers(record: Record) -> NumberTrials:
+    facts, arrays = record.attributes, {name: values.tolist() for name, values in record.arrays.items()}
+    conditions = map(
+        Conditions, facts["gravity_rows"], arrays["duration"], arrays["relative_tolerance"],
+        arrays["absolute_tolerance"],
+    )  # fmt: skip
+    values = [rate if np.isnan(angle) else angle for angle, rate in zip(arrays["angle"], arrays["rate"], strict=True)]
+    trials = map(
+        NumberTrial, facts["numbers"], conditions, values, map(bool, arrays["reproduced"]), arrays["remainder"]
+    )
+    usual = Conditions(
+        facts["usual_row"], facts["usual_duration_s"], facts["usual_relative_tolerance"],
+        facts["usual_absolute_tolerance"],
+    )  # fmt: skip
+    rows = [
+        GravityRowText(name, formula, name in facts["rows_of_56"])
+        for name, formula in zip(facts["row_names"], facts["row_formulas"], strict=True)
+    ]
+    return NumberTrials(tuple(trials), usual, tuple(rows))
