@@ -97,7 +97,7 @@ def test_no_two_classes_have_one_name() -> None:
 
 @pytest.mark.parametrize("name", SOURCES)
 def test_functions_and_files_are_short(name: str) -> None:
-    assert len(SOURCES[name].splitlines()) <= 460
+    assert len(SOURCES[name].splitlines()) <= 450
     for node in ast.walk(ast.parse(SOURCES[name])):
         if isinstance(node, ast.FunctionDef):
             first = min([node.lineno, *(one.lineno for one in node.decorator_list)])
