@@ -23,7 +23,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
-from rotor_mbs.solution.metrics import compare as metrics_of
+from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.text_table import TextTable

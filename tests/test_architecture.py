@@ -19,7 +19,7 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in so
 # Where a method is chosen by its name: the selection rule, the check, the suite's patient method, defaults of the
 # API, and the printed equations, which the analysis of the paper is about.
 CHOSEN = {
-    "methods/selection.py", "studies/check.py", "studies/check_probes.py", "studies/check_known_runs.py",
+    "methods/selection.py", "studies/check.py", "studies/check_probes.py", "studies/check_status_rules.py",
     "studies/stability.py", "studies/sweep_work.py", "analysis/run_selection.py", "analysis/verdicts.py", "api.py",
     "scenario/sweep.py",
 }  # fmt: skip
@@ -78,7 +78,7 @@ def test_an_engine_is_its_package_and_one_line() -> None:
 
 
 def test_a_quantity_is_its_declaration_and_its_producers() -> None:
-    allowed = {"solution/quantities.py", "models/exudyn/readings.py", "studies/check_known_runs.py"}
+    allowed = {"solution/quantities.py", "models/exudyn/sensor_samples.py", "studies/check_status_rules.py"}
     assert naming(r"\bconstraint_error\b") <= allowed  # the rules' hand-made runs have one
 
 

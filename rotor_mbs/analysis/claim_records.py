@@ -15,7 +15,8 @@ from rotor_mbs.analysis.claim_shares import RULE, ClaimShare, ClaimShares
 from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials
 from rotor_mbs.analysis.published import published
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.store.read import Results, open_results
+from rotor_mbs.store.layout import KEY_ATTRIBUTE
+from rotor_mbs.store.read import OpenResults, open_results
 from rotor_mbs.store.records import Record, read_record, records_in
 
 KIND, SHARES, NUMBERS = "claims", "shares", "numbers"
@@ -34,7 +35,7 @@ def shipped_claims() -> Path:
     return reference_folder() / "claims.h5"
 
 
-def stored_claims(results: Results | None = None) -> ClaimStudy | None:
+def stored_claims(results: OpenResults | None = None) -> ClaimStudy | None:
     """The study in an open results file, else the shipped one; None where there is none."""
     found = {} if results is None else _records(results)
     if len(found) < 2 and shipped_claims().exists():
@@ -53,10 +54,10 @@ def _hashed(record: Record, facts: Mapping[str, object]) -> Record:
     attributes = {**record.attributes, **facts}
     content = [attributes, {name: np.asarray(values).tolist() for name, values in record.arrays.items()}]
     key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-    return Record(record.kind, record.scene, record.name, {"run_hash": key, **attributes}, record.arrays)
+    return Record(record.kind, record.scene, record.name, {KEY_ATTRIBUTE: key, **attributes}, record.arrays)
 
 
-def _records(results: Results) -> dict[str, Record]:
+def _records(results: OpenResults) -> dict[str, Record]:
     found = [read_record(path, group) for path, group in records_in(results.root, KIND)]
     return {record.name: record for record in found}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.read import Results, StoredScene
+from rotor_mbs.store.read import OpenResults, StoredScene
 from rotor_mbs.store.records import Record, read_record, write_records
 
 
@@ -53,12 +53,12 @@ def write_errata(path: Path, checks: Sequence[CheckedEntry], fingerprint: str) -
     write_records(path, [Record(_GROUP, "", "", {"fingerprint": fingerprint, **texts}, numbers)])
 
 
-def errata_fingerprint(results: Results) -> str:
+def errata_fingerprint(results: OpenResults) -> str:
     """Of the code that made the checks in an open file; "" where it has none."""
     return str(results.root[_GROUP].attrs["fingerprint"]) if _GROUP in results.root else ""
 
 
-def entries(results: Results) -> list[CheckedEntry]:
+def entries(results: OpenResults) -> list[CheckedEntry]:
     """The checks in an open file, in order; none where it has none."""
     if _GROUP not in results.root:
         return []

@@ -95,7 +95,7 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
 
 
 def to_records(modes: SceneModes, attributes: Mapping[str, Any]) -> list[Record]:
-    """The records of a results file; attributes: of every one of them, its `run_hash` among them."""
+    """The records of a results file; attributes: of every one of them, its key among them."""
     common = {
         "title": modes.title,
         "blades": modes.blades,

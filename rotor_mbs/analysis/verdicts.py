@@ -19,10 +19,10 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import energy_slack, judge, quantity_bound, quantity_errors
-from rotor_mbs.solution.metrics import Metrics, compare, energy_scale
+from rotor_mbs.solution.metrics import Metrics, energy_scale, metrics_of
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.read import Results, StoredRun, StoredScene
+from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Verdict:
         return self.bound / self.value if self.value else math.inf
 
 
-def verdicts(results: Results, frozen: Sequence[Results], bounds: Bounds) -> list[Verdict]:
+def verdicts(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Verdict]:
     """Every verdict that the file allows, in the order of its scenes. `frozen`: the shipped references.
 
     Raises InputError where a stored scene is none.
@@ -159,7 +159,7 @@ def _energies_off(scene: Scene, trajectory: Trajectory) -> dict[str, float]:
 def _of_corrected_model(run: StoredRun, bounds: Bounds, found: Rehydrated, trajectory: Trajectory) -> Iterator[Verdict]:
     """What is asked only of a model that claims the corrected equations: reference, energy balance, exact solutions."""
     scene = found.scene
-    metrics = compare(scene, trajectory, found.reference)
+    metrics = metrics_of(scene, trajectory, found.reference)
     if scene.wants("angles") and "angle_error_per_growth" in metrics:
         look = f"{metrics['angle_error_max']:.1e} rad up to {metrics['horizon_s']:.2f} s: a term, a parameter, the step"
         yield _make("agreement", run, "angles", metrics["angle_error_per_growth"], bounds, "per growth", look)
@@ -206,7 +206,7 @@ def _distance(first: Array, second: Array) -> float:
     return float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max()) if first.size else 0.0
 
 
-def _of_paper(results: Results, bounds: Bounds) -> Iterator[Verdict]:
+def _of_paper(results: OpenResults, bounds: Bounds) -> Iterator[Verdict]:
     """The paper's numbers, in units of their last printed digit."""
     for claim in claims(results.scenes):
         item, value = claim.published, claim.printed.value

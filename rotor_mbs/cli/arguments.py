@@ -80,9 +80,9 @@ def _add_runs(commands: _Commands) -> None:
         commands, "reproduce", "every scene of the paper by every model, and the report", "runs:reproduce"
     )
     reproduce.add_argument("-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help=_default("DIR"))
-    _add_batch_options(reproduce)
+    _add_pool_options(reproduce)
 
-    run = _command(commands, "run", "a batch of scenes into one results file", "runs:run")
+    run = _command(commands, "run", "scenes by methods, into one results file", "runs:run")
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     _add_methods(run)
     run.add_argument(
@@ -90,7 +90,7 @@ def _add_runs(commands: _Commands) -> None:
         help="a setting of the methods, in place of its default; may be repeated",
     )  # fmt: skip
     run.add_argument("-o", "--output", type=_file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
-    _add_batch_options(run)
+    _add_pool_options(run)
 
 
 def _add_bench(commands: _Commands) -> None:
@@ -115,7 +115,7 @@ def _add_reference(commands: _Commands) -> None:
     )
     reference.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     reference.add_argument("-o", "--output", type=_file, required=True, metavar="FILE")
-    _add_batch_options(reference)
+    _add_pool_options(reference)
 
 
 def _add_check(commands: _Commands) -> None:
@@ -146,7 +146,7 @@ def _add_stability(commands: _Commands) -> None:
         "-o", "--output", type=_file, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
     )
     stability.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
-    _add_batch_options(stability, timeout_s=_SUITE_TIMEOUT_S)
+    _add_pool_options(stability, timeout_s=_SUITE_TIMEOUT_S)
 
 
 def _add_modes(commands: _Commands) -> None:
@@ -166,7 +166,7 @@ def _add_modes(commands: _Commands) -> None:
     modes.add_argument("-o", "--output", type=_file, default=Path("modes.h5"), metavar="FILE", help=_default("FILE"))
     modes.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
     modes.add_argument("--json", action="store_true", help="the table as JSON, for a script")
-    _add_batch_options(modes, timeout_s=_CHART_TIMEOUT_S)
+    _add_pool_options(modes, timeout_s=_CHART_TIMEOUT_S)
 
 
 def _add_claims(commands: _Commands) -> None:
@@ -236,7 +236,7 @@ def _add_sweep(commands: _Commands) -> None:
     sweep.add_argument("--dry-run", action="store_true", help="how many runs, about how long, how much")
     sweep.add_argument("--yes", action="store_true", help="start a sweep of over a million runs")
     sweep.add_argument("--json", action="store_true", help="progress and summary as JSON lines")
-    _add_batch_options(sweep)
+    _add_pool_options(sweep)
 
 
 def _span(text: str) -> tuple[float, ...]:
@@ -326,7 +326,7 @@ def _add_jobs(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def _add_batch_options(parser: argparse.ArgumentParser, timeout_s: float = _DEFAULT_TIMEOUT_S) -> None:
+def _add_pool_options(parser: argparse.ArgumentParser, timeout_s: float = _DEFAULT_TIMEOUT_S) -> None:
     _add_jobs(parser)
     parser.add_argument(
         "--timeout", type=_positive(float, "seconds, more than 0"), default=timeout_s, metavar="SECONDS",

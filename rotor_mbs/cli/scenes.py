@@ -12,7 +12,7 @@ from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Scene, scene_fields
 
 if TYPE_CHECKING:  # numpy behind it is too heavy for `list`
-    from rotor_mbs.solution.record import Item
+    from rotor_mbs.methods.base import BuiltItem
 
 
 def list_all(arguments: argparse.Namespace) -> int:
@@ -95,7 +95,7 @@ class _Model:
 
     name: str
     methods: list[str]
-    items: list[Item] = field(default_factory=list)
+    items: list[BuiltItem] = field(default_factory=list)
     refused: str = ""
     is_linearized: bool = False
 

@@ -74,7 +74,7 @@ class Store(Protocol):
 
 
 Perform: TypeAlias = Callable[[Job], Result]
-Run: TypeAlias = Callable[[Sequence[Job]], Iterable[Finished[Job, Result]]]
+JobRunner: TypeAlias = Callable[[Sequence[Job]], Iterable[Finished[Job, Result]]]
 OnProgress: TypeAlias = Callable[[int, int, Outcome], None]
 OnTimeOut: TypeAlias = Callable[[Job, str], Result]
 
@@ -85,19 +85,19 @@ def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
 
 def execute(
     cases: Iterable[Case],
-    run: Run,
+    run_jobs: JobRunner,
     store: Store,
     on_progress: OnProgress = ignore_progress,
     on_time_out: OnTimeOut | None = None,
 ) -> list[Outcome]:
     """The outcomes of the cases that `store` did not have; those that others are compared with come first.
 
-    run           computes a list of jobs and writes their parts: `in_pool`, or a study's own way (a bench times its
+    run_jobs      computes a list of jobs and writes their parts: `in_pool`, or a study's own way (a bench times its
                   jobs together)
     on_progress   called with (cases done, of how many, outcome) after each
     on_time_out   writes the part of a job whose process was ended, in this process
 
-    Raises InputError where another process is writing the output, StoreError, and what `run` raises of RotorError.
+    Raises InputError where another process is writing the output, StoreError, and what `run_jobs` raises of RotorError.
     """
     with _parts_folder(store.path) as parts:
         stored = store.stored_keys()
@@ -105,7 +105,7 @@ def execute(
         made: list[Outcome] = []
         for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
             jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored)) for case in wave]
-            for outcome in _outcomes(jobs, run, on_time_out):
+            for outcome in _outcomes(jobs, run_jobs, on_time_out):
                 made.append(outcome)
                 on_progress(len(made), len(missing), outcome)
         new = {case.key for case in missing}
@@ -120,7 +120,7 @@ def compute(cases: Iterable[Case], perform: Perform, workers: int, timeout_s: fl
     return _outcomes([Job(case, Path()) for case in cases], in_pool(perform, workers, timeout_s), None)
 
 
-def in_pool(perform: Perform, workers: int, timeout_s: float) -> Run:
+def in_pool(perform: Perform, workers: int, timeout_s: float) -> JobRunner:
     """Computes jobs in parallel processes.
 
     perform       computes a job and writes its part
@@ -128,24 +128,24 @@ def in_pool(perform: Perform, workers: int, timeout_s: float) -> Run:
     timeout_s     of one job; its process is ended where it has not ended itself a while after that
     """
 
-    def run(jobs: Sequence[Job]) -> Iterable[Finished[Job, Result]]:
+    def run_jobs(jobs: Sequence[Job]) -> Iterable[Finished[Job, Result]]:
         limited = [replace(job, time_limit_s=timeout_s) for job in jobs]
         if not workers:
             return (Finished(job, perform(job)) for job in limited)
         # What ends itself at its time limit needs a moment to write what it has.
         return run_tasks(perform, limited, workers, 1.2 * timeout_s + 10.0)
 
-    return run
+    return run_jobs
 
 
-def _outcomes(jobs: Sequence[Job], run: Run, on_time_out: OnTimeOut | None) -> Iterator[Outcome]:
+def _outcomes(jobs: Sequence[Job], run_jobs: JobRunner, on_time_out: OnTimeOut | None) -> Iterator[Outcome]:
     ready = []
     for job in jobs:
         if job.reference is None or job.reference.exists():
             ready.append(job)
         else:
             yield Outcome(job.case, Result("no_reference", "its reference was not computed"))
-    for finished in run(ready) if ready else ():
+    for finished in run_jobs(ready) if ready else ():
         yield Outcome(finished.task.case, _result(finished, on_time_out))
 
 

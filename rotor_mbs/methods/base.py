@@ -16,9 +16,18 @@ if TYPE_CHECKING:  # reading the catalogue needs none of them
     from rotor_mbs.scenario.accuracy_bounds import Bound
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.linearization import Linearization
-    from rotor_mbs.solution.record import Integration, Item, Trajectory
+    from rotor_mbs.solution.record import Array, Integration, Trajectory
 
-__all__ = ["Look", "Method", "Settings", "Solver", "stability_polynomial"]
+__all__ = ["BuiltItem", "Look", "Method", "RunBlock", "Settings", "Solver", "stability_polynomial"]
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltItem:
+    """One thing a model builds for a scene: kind is node, object, marker, load, sensor, equation or term."""
+
+    kind: str
+    name: str
+    detail: str = ""
 
 
 class Solver(Protocol):
@@ -29,6 +38,39 @@ class Solver(Protocol):
 
     def observe(self) -> Trajectory:
         """Samples of the last integration, cut before the first row that is not finite."""
+
+
+class RunBlock(Protocol):
+    """Many runs at once, of scenes with the same number of blades and samples and the same outputs.
+
+    Arrays have the run as their first dimension; None where the scenes do not ask for them. After a run broke off its
+    samples are NaN.
+
+    angles, rates           (runs, n, 1 + blades) rad, rad/s
+    kinetic_energy, potential_energy, work   (runs, n) J
+    integrations, samples   what the engine reports of each run, and how many samples it has
+    """
+
+    @property
+    def angles(self) -> Array: ...
+    @property
+    def rates(self) -> Array: ...
+    @property
+    def kinetic_energy(self) -> Array | None: ...
+    @property
+    def potential_energy(self) -> Array | None: ...
+    @property
+    def work(self) -> Array | None: ...
+    @property
+    def integrations(self) -> Sequence[Integration]: ...
+    @property
+    def samples(self) -> Sequence[int]: ...
+    @property
+    def quantities(self) -> Mapping[str, Array]:
+        """Arrays by name, those that are there."""
+
+    def trajectory(self, i: int) -> Trajectory:
+        """Run i alone, cut where it broke off."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +106,7 @@ class Method:
     label: str
     look: Look
     build: Callable[[Scene, Any], Solver]
-    items: Callable[[Scene], list[Item]]
+    items: Callable[[Scene], list[BuiltItem]]
     settings: type[Settings] = Settings
     is_corrected: bool = True
     is_default: bool = False
@@ -79,7 +121,7 @@ class Method:
     cost_scaling: Mapping[str, object] | None = None
     relative_cost: float = 1.0
     bounds: tuple[Bound, ...] = ()
-    solve_many: Callable[[Sequence[Scene], Any], Any] | None = None
+    solve_many: Callable[[Sequence[Scene], Any], RunBlock] | None = None
     linearize: Callable[[Scene, Any, float, float], Linearization] | None = None
     load: Callable[[], object] = lambda: None
 

@@ -1,4 +1,7 @@
-"""A method's ladder of settings for the bench: from useless to its round-off floor. Knows numbers, no method."""
+"""A method's curve in the bench: its ladder of settings, from useless to the round-off floor, and how it is drawn.
+
+Knows numbers, no method.
+"""
 
 from __future__ import annotations
 

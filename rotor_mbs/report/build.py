@@ -19,10 +19,10 @@ from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.paper_figures import PaperFigure, available
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import Results, StoredScene, open_results
+from rotor_mbs.store.read import OpenResults, StoredScene, open_results
 
 Part = str | PaperFigure  # a scene by its name, or a figure of the paper
-_BATCHES = 2  # per worker
+_GROUPS = 2  # per worker
 _TIMEOUT_S = 600.0
 
 
@@ -58,7 +58,7 @@ def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
     return output / INDEX
 
 
-def _prepared(opened: Results) -> tuple[Context, dict[str, str], tuple[PaperFigure, ...]]:
+def _prepared(opened: OpenResults) -> tuple[Context, dict[str, str], tuple[PaperFigure, ...]]:
     """The context, the pages that need the whole file, and the figures that it has."""
     scenes = {name: opened.scenes[name] for name in natural_order(opened.scenes)}
     if not scenes:
@@ -89,8 +89,8 @@ def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int) -> dict[
     work = partial(make_parts, context)
     if workers <= 1:
         return work(parts)
-    # More batches than workers, so that none waits long for the last one; each batch opens the file.
-    count = _BATCHES * workers
+    # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
+    count = _GROUPS * workers
     found: dict[Part, object] = {}
     for finished in run_tasks(work, [parts[start::count] for start in range(count)], workers, _TIMEOUT_S):
         if finished.value is None:

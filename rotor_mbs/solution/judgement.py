@@ -1,4 +1,4 @@
-"""The one judgement of a run, from its samples: batches, bench, check and report use it. Knows no engine and no file.
+"""The one judgement of a run, from its samples: runs, bench, check and report use it. Knows no engine and no file.
 
 The bounds are those of reference/accuracy.toml, which `check` reads, too, and those that a quantity brings: a status
 and a verdict cannot follow from different numbers.
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution.metrics import Metrics, compare
+from rotor_mbs.solution.metrics import Metrics, metrics_of
 from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
@@ -92,7 +92,7 @@ def judged(run: Solution, reference: Trajectory | None) -> Solution:
 
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
     """Finite? End reached? Through a singularity? Energy, quantities, reference? The first no names the status."""
-    metrics = compare(scene, run.trajectory, reference)
+    metrics = metrics_of(scene, run.trajectory, reference)
     status, message = _broken_off(scene, run)
     if not status and run.is_corrected:
         status, message = _through_singularity(scene, run, reference)

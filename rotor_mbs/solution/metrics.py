@@ -1,4 +1,4 @@
-"""How far a run is from a reference, and from its own energy: one set of metrics for batches, reports and checks.
+"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks.
 
 Angles and energies have rules of their own here; every other quantity is measured as its declaration says. Knows
 samples only; no engine, no file, no bound (those are in `judgement`).
@@ -63,7 +63,7 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
     return weights + springs + kinetic + work
 
 
-def compare(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
+def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
     """The metrics stored with a run, by the names of the file format; those that do not exist are left out."""
     metrics: Metrics = {}
     if not len(run.time):

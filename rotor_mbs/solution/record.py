@@ -7,7 +7,7 @@ from typing import Any
 
 from rotor_mbs.solution.quantities import NAMES, Array
 
-__all__ = ["Array", "Integration", "Item", "Trajectory"]
+__all__ = ["Array", "Integration", "Trajectory"]
 
 
 class Trajectory:
@@ -50,7 +50,8 @@ class Trajectory:
         return Trajectory(**{**arrays, **changes})
 
     def __getattr__(self, name: str) -> Any:
-        # Not mypy's `Array | None`: an array that the scene asks for is there.
+        # A quantity is an attribute, so that models and metrics read `run.work` whoever declared it. The type is not
+        # `Array | None`: what the scene asks for is there.
         if name in NAMES:
             return self.quantities.get(name)
         raise AttributeError(f"a trajectory has no attribute {name!r}")
@@ -82,12 +83,3 @@ class Integration:
     steps: int | None = None
     rhs_evaluations: int | None = None
     out_of_time: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Item:
-    """One thing a model builds for a scene: kind is node, object, marker, load, sensor, equation or term."""
-
-    kind: str
-    name: str
-    detail: str = ""

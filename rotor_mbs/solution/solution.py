@@ -79,6 +79,8 @@ class Solution:
         return known[name]
 
     def __getattr__(self, name: str) -> Array:
+        # Called for names that are no field: quantities of plug-ins are attributes like the built-in ones. Names that
+        # start with "_" stay unknown, as copying and pickling ask for those of an object that is not yet filled.
         if not name.startswith("_") and "trajectory" in self.__dict__:
             try:
                 return self[name]

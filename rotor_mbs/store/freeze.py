@@ -14,7 +14,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.solution.quantities import BUILT_IN
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.read import Results, StoredRun, open_results
+from rotor_mbs.store.read import OpenResults, StoredRun, open_results
 from rotor_mbs.store.write import put_datasets
 
 # What cannot be computed again from angles and rates, and the scales.
@@ -52,7 +52,7 @@ def write_digests(references: Path) -> None:
     hdf5.replace_file(references.with_suffix(".sha256"), "".join(lines).encode())
 
 
-def changed_arrays(results: Results) -> dict[str, list[str]]:
+def changed_arrays(results: OpenResults) -> dict[str, list[str]]:
     """By scene, the arrays of its reference that are not what was frozen, are new or are gone; [] where all is well.
 
     Raises StoreError where there is no digest file.
@@ -72,7 +72,7 @@ def changed_arrays(results: Results) -> dict[str, list[str]]:
     return scenes
 
 
-def _digests(results: Results) -> dict[tuple[str, str], str]:
+def _digests(results: OpenResults) -> dict[tuple[str, str], str]:
     references = [scene.reference for scene in results.scenes.values()]
     return {(run.scene, name): _digest(run, name) for run in references if run is not None for name in run.names}
 

@@ -16,9 +16,9 @@ FORMAT = "rotor_mbs"
 FORMAT_VERSION = 1
 CONVENTIONS = "CF-1.11"
 
-# The attribute with the content hash of a run or a record; then its names in files of earlier versions.
-KEY = "run_hash"
-_KEY_NAMES = (KEY, "bench_hash", "record_hash")
+# The attribute with the key of a run or a record (`Case.key`); then its names in files of earlier versions.
+KEY_ATTRIBUTE = "run_hash"
+_KEY_NAMES = (KEY_ATTRIBUTE, "bench_hash", "record_hash")
 
 # The attribute, equal for all records of a scene that one case writes: older ones of the same study go when they come.
 TOGETHER = "written_together"
@@ -33,5 +33,5 @@ class Column(NamedTuple):
 
 
 def key_of(attributes: Mapping[str, Any]) -> str:
-    """The content hash of what decides a run or a record; "" where it has none."""
+    """The key of a stored run or record, the content hash of what decides it; "" where it has none."""
     return str(next((attributes[name] for name in _KEY_NAMES if name in attributes), ""))

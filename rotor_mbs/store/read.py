@@ -93,7 +93,7 @@ class StoredScene:
 
 
 @dataclass(frozen=True)
-class Results:
+class OpenResults:
     """An open results file: its attributes (versions, platform, created) and its scenes by name, in file order."""
 
     path: Path
@@ -103,7 +103,7 @@ class Results:
 
 
 @contextmanager
-def open_results(path: Path) -> Iterator[Results]:
+def open_results(path: Path) -> Iterator[OpenResults]:
     """Raises StoreError where `path` is not a results file of this program."""
     with hdf5.open_file(path) as file:
         try:
@@ -111,7 +111,7 @@ def open_results(path: Path) -> Iterator[Results]:
             attributes = hdf5.attributes_of(file)
         except (KeyError, OSError, RuntimeError) as exc:
             raise StoreError(f"{path}: damaged or incomplete ({exc})") from exc
-        yield Results(path, attributes, scenes, file)
+        yield OpenResults(path, attributes, scenes, file)
 
 
 def _scenes(group: Any, name: str) -> Iterator[StoredScene]:

@@ -83,7 +83,7 @@ class Record:
     kind : "bench", "steps", "limits", "conservation", "errata", "modes" or "claims".
     scene : "paper/fig05"; "" where the record belongs to no scene.
     name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
-    attributes : plain values; `run_hash` stands for all that decides the numbers.
+    attributes : plain values; the key of what decides the numbers among them.
     arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
     columns : what the arrays are, scales first, where they are not the ones of all studies; for writing alone.
     """
@@ -106,7 +106,7 @@ class Record:
 
     @property
     def key(self) -> str:
-        """The content hash of what decides the record; "" where it has none."""
+        """`Case.key` of what decides the record; "" where it has none."""
         return key_of(self.attributes)
 
     @property

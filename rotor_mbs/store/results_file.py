@@ -12,18 +12,18 @@ from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.layout import TOGETHER, key_of
-from rotor_mbs.store.read import Results, open_results
+from rotor_mbs.store.read import OpenResults, open_results
 from rotor_mbs.store.records import records_in
 
 
 @dataclass(frozen=True)
-class ResultsFile:
+class ResultsStore:
     """The results file at `path`, which need not be there yet."""
 
     path: Path
 
     def stored_keys(self) -> set[str]:
-        """Content hashes of all runs and records in the file. Raises StoreError."""
+        """Keys of all runs and records in the file. Raises StoreError."""
         refuse_other_kinds(self.path)
         if not self.path.exists():
             return set()
@@ -48,12 +48,12 @@ def merge(
     Parameters
     ----------
     versions : attributes of the new file, beside the time of its creation.
-    without : content hashes of what is left out.
+    without : keys of what is left out.
 
     Raises
     ------
     StoreError
-        Where a file cannot be read or written, or is not a batch's.
+        Where a file cannot be read or written, or is the dataset of a sweep.
     """
     for source in sources:
         refuse_other_kinds(source)
@@ -70,7 +70,7 @@ def merge(
 
 def refuse_other_kinds(path: Path) -> None:
     """Raises StoreError where `path` has what a merge would not carry over: a sweep's dataset, which has its arrays at
-    the root, where a batch has groups alone."""
+    the root, where a results file has groups alone."""
     if not path.exists():
         return
     with open_results(path) as results:
@@ -78,12 +78,12 @@ def refuse_other_kinds(path: Path) -> None:
             raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
 
 
-def _members(results: Results) -> Iterator[tuple[str, str, str, str]]:
-    """(group above, what it belongs to, group, content hash) of every run and record in an open file."""
+def _members(results: OpenResults) -> Iterator[tuple[str, str, str, str]]:
+    """(group above, what it belongs to, group, key) of every run and record in an open file."""
     for scene in results.scenes.values():
         for method, run in scene.runs.items():
-            number = str(scene.attributes["scene_hash"])
-            yield scene.name, number, f"{scene.name}/{method}", key_of(run.attributes)
+            owner = str(scene.attributes["scene_hash"])
+            yield scene.name, owner, f"{scene.name}/{method}", key_of(run.attributes)
     for name, group in records_in(results.root):
         above = "/".join(name.split("/")[:-2]) or name
         owner = group.attrs.get(TOGETHER, group.attrs.get("scene_hash", ""))
@@ -95,10 +95,10 @@ def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[s
     latest: dict[str, tuple[str, dict[str, Path]]] = {}
     for source in sources:
         with open_results(source) as results:
-            for above, number, name, key in _members(results):
+            for above, owner, name, key in _members(results):
                 if key not in without or not key:
-                    known, groups = latest.get(above, (number, {}))
-                    latest[above] = (number, {**(groups if known == number else {}), name: source})
+                    known, groups = latest.get(above, (owner, {}))
+                    latest[above] = (owner, {**(groups if known == owner else {}), name: source})
     return {above: groups for above, (_, groups) in latest.items()}
 
 

@@ -28,8 +28,9 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import Record, write_records
-from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench_worker import Judged, Point, PointScenes, Prepared, ask, prepared_scene, start_timer
 from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
 
@@ -90,7 +91,7 @@ def run_bench(
         able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
         cases += [_bench_case(scene, ladder, repeats, budget_s) for ladder in chosen if ladder.method in able]
         left_out += refused
-    made = execute(cases, _time_by_scene, ResultsFile(output), on_progress)
+    made = execute(cases, _time_by_scene, ResultsStore(output), on_progress)
     return BenchReport(len(scenes), made, left_out)
 
 
@@ -175,7 +176,7 @@ def _curve(case: Case, ladder: Ladder, rows: Sequence[Mapping[str, Any]], shared
         "method": ladder.method,
         "choices": json.dumps(dict(ladder.choices), sort_keys=True),
         "setting_kind": ladder.kind,
-        "run_hash": case.key,
+        KEY_ATTRIBUTE: case.key,
         "messages": [str(row["message"]) for row in rows],
     }
     if ladder.order is not None:

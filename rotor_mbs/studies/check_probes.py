@@ -20,8 +20,8 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.studies.check_known_runs import SCENE, known_runs, metrics_off, shares_off
 from rotor_mbs.studies.check_printed import differences
+from rotor_mbs.studies.check_status_rules import SCENE, known_runs, metrics_off, shares_off
 from rotor_mbs.studies.stored_references import load_frozen
 
 # Scenes of probes that need none of the shipped ones.

@@ -22,8 +22,9 @@ from rotor_mbs.methods.catalogue import methods as all_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import COST_SCALING, Record
-from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench import BENCH, SOURCES, arrays_of, measure_points, store_curve
 from rotor_mbs.studies.bench_worker import Point
 
@@ -91,7 +92,7 @@ def run_cost_scaling(
         for study in cost_studies()
         for method in chosen
     ]  # fmt: skip
-    return execute(cases, _time_by_study, ResultsFile(output), on_progress)
+    return execute(cases, _time_by_study, ResultsStore(output), on_progress)
 
 
 def _time_by_study(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
@@ -125,7 +126,7 @@ def _curve(study: CostStudy, case: Case, rows: Sequence[Mapping[str, Any]], star
         "messages": [str(row["message"]) for row in rows],
         "started": started,
         "scene_hash": case.scene_hash,
-        "run_hash": case.key,
+        KEY_ATTRIBUTE: case.key,
     }
     ok = arrays["status"] == STATUSES.index("ok")
     rate = arrays["run_time_s"] / arrays["simulated_s"]

@@ -72,9 +72,9 @@ def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
 
 def rebuilt_reference(scene: Scene) -> Trajectory:
     """The scene's reference: the shipped one, else computed. Raises StoreError where it does not reach the end."""
-    number = scene_hash(scene)
-    shipped = frozen_file(number) is not None
-    solution = frozen_solution(scene, number)[0] if shipped else solve(REFERENCE, scene, {})
+    scene_key = scene_hash(scene)
+    shipped = frozen_file(scene_key) is not None
+    solution = frozen_solution(scene, scene_key)[0] if shipped else solve(REFERENCE, scene, {})
     if not len(solution.trajectory.time):
         raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'no motion from its start'}")
     return solution.trajectory

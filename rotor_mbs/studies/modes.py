@@ -31,9 +31,9 @@ from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.store.layout import TOGETHER
+from rotor_mbs.store.layout import KEY_ATTRIBUTE, TOGETHER
 from rotor_mbs.store.records import write_records
-from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.store.results_file import ResultsStore
 
 if TYPE_CHECKING:
     from rotor_mbs.models.lagrange.turn import Turn
@@ -66,7 +66,7 @@ def modes_of_scenes(
     options = {"speeds": _increasing(speeds, "speeds"), "stiffnesses": _increasing(stiffnesses, "stiffnesses")}
     method = next(iter(linearizing_methods().values())).name  # a case names one; the study asks all of them
     cases = [Case(scene, method, study="modes", options=options, sources=_SOURCES) for scene in scenes]
-    return execute(cases, in_pool(perform_modes, workers, timeout_s), ResultsFile(output), on_progress)
+    return execute(cases, in_pool(perform_modes, workers, timeout_s), ResultsStore(output), on_progress)
 
 
 def perform_modes(job: Job) -> Result:
@@ -74,7 +74,7 @@ def perform_modes(job: Job) -> Result:
     case = job.case
     speeds, stiffnesses = (np.array(case.options[name], dtype=float) for name in ("speeds", "stiffnesses"))
     found = compute_modes(case.scene, speeds, stiffnesses)
-    facts = {"scene_hash": case.scene_hash, "run_hash": case.key, TOGETHER: case.key}
+    facts = {"scene_hash": case.scene_hash, KEY_ATTRIBUTE: case.key, TOGETHER: case.key}
     write_records(job.part, to_records(found, facts))
     if not found.agrees:
         return Result("inaccurate", f"frequencies of two models differ by {found.disagreement:.1e} of their size")

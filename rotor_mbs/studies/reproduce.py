@@ -12,7 +12,7 @@ from rotor_mbs.execution.provenance import numerics_fingerprint
 from rotor_mbs.methods.catalogue import default_methods, errata_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results
-from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.run import RunReport, able_methods, run_scenes
 
 
@@ -39,12 +39,12 @@ def _complete_errata(output: Path) -> None:
     ]
     part = output.with_name(f"{output.name}.errata.h5")
     write_errata(part, checks, numerics_fingerprint())
-    ResultsFile(output).merge([part])
+    ResultsStore(output).merge([part])
     part.unlink()
 
 
 def _complete_claims(output: Path) -> None:
     """The shipped study of claims and numbers, whose thousands of runs take too long to be repeated here."""
-    shipped, results = shipped_claims(), ResultsFile(output)
-    if shipped.exists() and not ResultsFile(shipped).stored_keys() <= results.stored_keys():
+    shipped, results = shipped_claims(), ResultsStore(output)
+    if shipped.exists() and not ResultsStore(shipped).stored_keys() <= results.stored_keys():
         results.merge([shipped])

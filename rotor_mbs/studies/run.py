@@ -21,8 +21,9 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.read import open_results
-from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.store.write import write_run
 from rotor_mbs.studies.stored_references import digest, frozen_file, frozen_solution, load_reference
 
@@ -86,7 +87,7 @@ def run_scenes(
     # Slowest first, so that no long run starts last and keeps one process busy while the others wait.
     cases.sort(key=lambda case: -find_method(case.method).relative_cost)
     run = in_pool(perform_run, workers, timeout_s)
-    made = execute(cases, run, ResultsFile(output), on_progress, partial(store_failure, "timed_out"))
+    made = execute(cases, run, ResultsStore(output), on_progress, partial(store_failure, "timed_out"))
     return RunReport(made, len(cases) - len(made))
 
 
@@ -113,9 +114,9 @@ def solve_judged(
     ('ok', True)
     """
     reference = None
-    number = scene_hash(scene)
-    if frozen_file(number) is not None:
-        reference = frozen_solution(scene, number)[0].trajectory
+    scene_key = scene_hash(scene)
+    if frozen_file(scene_key) is not None:
+        reference = frozen_solution(scene, scene_key)[0].trajectory
     elif compute_reference:
         reference = solve(REFERENCE, scene, {}).trajectory
     try:
@@ -165,7 +166,7 @@ def perform_run(job: Job) -> Result:
         "status": verdict.status,
         "message": verdict.message,
         "false_success": verdict.false_success,
-        "run_hash": case.key,
+        KEY_ATTRIBUTE: case.key,
         **verdict.metrics,
     }
     write_run(job.part, case.scene_hash, run, attributes)
@@ -176,7 +177,7 @@ def store_failure(status: str, job: Job, message: str) -> Result:
     """Stores a run that left no samples."""
     case = job.case
     run = _without_samples(case.scene, case.method, message, case.settings)
-    attributes = {"status": status, "message": message, "false_success": False, "run_hash": case.key}
+    attributes = {"status": status, "message": message, "false_success": False, KEY_ATTRIBUTE: case.key}
     write_run(job.part, case.scene_hash, run, attributes)
     return Result(status, message)
 

@@ -12,8 +12,9 @@ from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execut
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import read_records, write_records
-from rotor_mbs.store.results_file import ResultsFile
+from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.conservation import DRIFT, SYMMETRY, conservation_record
 from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
 from rotor_mbs.studies.step_limits import LIMIT, STEPS, has_limit, ladder_record, limit_record
@@ -74,7 +75,7 @@ def complete_records(
     """Step ladders, step limits and conservation of these scenes, where the runs in `output` call for them; those whose
     process died."""
     cases = [*_step_cases(scenes, suite_runs(output)), *_conservation_cases(scenes, methods)]
-    store = ResultsFile(output)
+    store = ResultsStore(output)
     made = execute(cases, in_pool(perform_record, workers, _RECORD_LIMIT_S), store, on_progress)
     names, wanted = {scene.name for scene in scenes}, {case.key for case in cases}
     records = read_records(output, "steps", "limits", "conservation")
@@ -89,7 +90,7 @@ def perform_record(job: Job) -> Result:
     case = job.case
     compute = {STEPS: ladder_record, LIMIT: limit_record, SYMMETRY: conservation_record, DRIFT: conservation_record}
     record = compute[case.study](job)
-    attributes = {**record.attributes, "scene_hash": case.scene_hash, "run_hash": case.key}
+    attributes = {**record.attributes, "scene_hash": case.scene_hash, KEY_ATTRIBUTE: case.key}
     write_records(job.part, [replace(record, attributes=attributes)])
     return Result("ok")
 

@@ -32,7 +32,7 @@ from rotor_mbs.store.sweep_layout import SweepLayout, lost_rows
 from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, perform
 
 # Runs handed to a worker at once by the fast path: an eighth of a second of work, fewer towards the end, so that all
-# workers end together. The least is a full batch on any processor.
+# workers end together. The least fills the lanes of any processor.
 _ENSEMBLE_RUNS = 128
 _LEAST_RUNS = 8
 _CHUNK_BYTES = 1 << 23
@@ -259,9 +259,9 @@ def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.i
 
 
 def _hard_limit(chunk: Chunk) -> float:
-    """When a worker is ended: runs of a batch go side by side, batches one after the other."""
-    batches = -(-len(chunk.values) // LEAST_LANES)
-    return chunk.time_limit_s * batches + _GRACE_S
+    """When a worker is ended: LEAST_LANES runs go side by side, one such group after the other."""
+    groups = -(-len(chunk.values) // LEAST_LANES)
+    return chunk.time_limit_s * groups + _GRACE_S
 
 
 def _is_ok(plan: SweepPlan, statuses: NDArray[np.int8]) -> bool:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.methods.base import RunBlock
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.models.lagrange.ensemble import Block
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
@@ -165,9 +165,9 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     return rows
 
 
-def _quantity(block: Block, scenes: Sequence[Scene], name: str) -> Array:
+def _quantity(block: RunBlock, scenes: Sequence[Scene], name: str) -> Array:
     """(runs, samples, ...) of a quantity: the block's own, or its producer's of each run; NaN after a run broke off."""
-    values: Array | None = getattr(block, name, None)
+    values: Array | None = block.quantities.get(name)
     if values is None:
         runs = enumerate(scenes)
         made = [Solution(scene, ENSEMBLE_METHOD, block.trajectory(i), block.integrations[i])[name] for i, scene in runs]

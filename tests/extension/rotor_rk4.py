@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import Look, Method, Settings, stability_polynomial
+from rotor_mbs.methods.base import BuiltItem, Look, Method, Settings, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder
 from rotor_mbs.methods.settings import number
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.solution.record import Integration, Item, Trajectory
+from rotor_mbs.solution.record import Integration, Trajectory
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def items(scene):
     pitches = all(b.has_pitch_inertia for b in scene.blades)
     if scene.has_damping or scene.has_torque or any(scene.bearing_stiffness) or not pitches:
         raise MethodRefusal("outside/rk4 has no springs, no dampers, no torque, no pitch without inertia")
-    return [Item("equation", label) for label in scene.coordinate_labels]
+    return [BuiltItem("equation", label) for label in scene.coordinate_labels]
 
 
 METHOD = Method(

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from rotor_mbs.methods.base import Look, Method, Settings
 from rotor_mbs.methods.settings import number
-from rotor_mbs.solution.record import Integration, Item, Trajectory
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.methods.base import BuiltItem
 
 @dataclass(frozen=True)
 class OwnSettings(Settings):
@@ -35,7 +36,7 @@ class OwnSolver:
         return Trajectory(time, rates * time[:, None] + self.scene.initial_angles, rates)
 
 METHOD = Method(name="made_up/turning", label="made up, turning", look=Look("#123456", "-", "o"),
-                build=OwnSolver, items=lambda scene: [Item("term", "turning")], settings=OwnSettings)
+                build=OwnSolver, items=lambda scene: [BuiltItem("term", "turning")], settings=OwnSettings)
 TAKEN = Method(name="lagrange/taylor", label="x", look=METHOD.look, build=OwnSolver, items=METHOD.items)
 """
 

@@ -14,7 +14,7 @@ from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples, running_growth
+from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of, running_growth
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution
 
@@ -62,7 +62,7 @@ def test_the_whole_of_fig08(method: str) -> None:
 def test_energy_less_work_is_kept(name: str, method: str) -> None:
     """Of the energy scale; 5e-14 is the worst that was seen, the rest is for another machine's rounding."""
     scene = paper(name)
-    assert compare(scene, run(scene, method).trajectory, None)["energy_drift_max"] <= 1e-12
+    assert metrics_of(scene, run(scene, method).trajectory, None)["energy_drift_max"] <= 1e-12
 
 
 def test_the_chain_on_fig08_up_to_its_horizon() -> None:

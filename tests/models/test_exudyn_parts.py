@@ -16,7 +16,7 @@ from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import energy, geometry, readings, timetable
+from rotor_mbs.models.exudyn import energy, geometry, sensor_samples, timetable
 
 KINDS = ("node", "object", "marker", "load", "sensor")
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
@@ -226,7 +226,7 @@ def test_unwrapping_follows_rates_over_turns_between_rows() -> None:
     angle, rate = 70.0 + 900.0 * t + 50.0 * np.sin(9 * t), 900.0 + 450.0 * np.cos(9 * t)
     wrapped = np.angle(np.exp(1j * angle))
     # predicted to h³/12 times the third derivative, 3e-3 rad, against the half turn that would mislead it
-    assert np.abs(readings.unwrap(t, wrapped, rate, 70.0) - angle).max() < 1e-11
+    assert np.abs(sensor_samples.unwrap(t, wrapped, rate, 70.0) - angle).max() < 1e-11
 
 
 def test_cumulative_integral_is_exact_for_quintics_on_uneven_rows() -> None:

@@ -30,7 +30,7 @@ from support.scenes import PAPER, paper
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.time_limit import time_limit
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples, running_growth
+from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of, running_growth
 from rotor_mbs.solution.record import Trajectory
 
 pytest.importorskip("mujoco")
@@ -68,7 +68,7 @@ def run(scene: Scene, integrator: str = "rk4", step: float = RK4_STEP) -> Trajec
 
 
 def energy_drift(scene: Scene, found: Trajectory) -> float:
-    return compare(scene, found, None)["energy_drift_max"]
+    return metrics_of(scene, found, None)["energy_drift_max"]
 
 
 def up_to_horizon(name: str) -> tuple[Scene, Trajectory]:
@@ -85,7 +85,7 @@ def up_to_horizon(name: str) -> tuple[Scene, Trajectory]:
 def test_the_scenes_of_the_paper_up_to_the_horizon(name: str) -> None:
     """Fourth order at four times the default step: seen 2e-11 per unit of error growth, 256 times the default's."""
     scene, exact = up_to_horizon(name)
-    metrics = compare(scene, run(scene, step=1e-3), exact)
+    metrics = metrics_of(scene, run(scene, step=1e-3), exact)
     assert metrics["angle_error_per_growth"] <= 1e-10
     assert metrics["energy_drift_max"] <= 1e-8
 
@@ -108,7 +108,7 @@ def test_the_order_on_every_scene_of_the_paper(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAPER)
 def test_the_scenes_of_the_paper_at_the_default_step(name: str) -> None:
-    metrics = compare(paper(name), run(paper(name)), references.reference(f"paper/{name}"))
+    metrics = metrics_of(paper(name), run(paper(name)), references.reference(f"paper/{name}"))
     assert metrics["angle_error_per_growth"] <= 1e-12
     assert metrics["energy_drift_max"] <= 1e-10
 
@@ -204,7 +204,7 @@ def test_point_masses_have_no_inertia_that_the_scene_does_not_give() -> None:
     assert not solver.engine.moments.any()
     assert solver.engine.masses.tolist() == [0.0, 15000.0, 15000.0, 15000.0]
     scene = references.scene("extreme/toy")
-    metrics = compare(scene, run(scene, step=1e-4), references.reference("extreme/toy"))
+    metrics = metrics_of(scene, run(scene, step=1e-4), references.reference("extreme/toy"))
     assert metrics["angle_error_per_growth"] < 1e-9
 
 

@@ -16,7 +16,7 @@ from support.scenes import paper
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
-from rotor_mbs.models.exudyn import adapter, chain, readings
+from rotor_mbs.models.exudyn import adapter, chain, sensor_samples
 from rotor_mbs.models.exudyn.methods import MultibodySolver
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.timetable import RotorTorque
@@ -167,7 +167,7 @@ def test_a_body_that_falls_free_of_its_joints() -> None:
     torque = RotorTorque(one)
     scheme = Scheme("RK44", 4, {"explicit.eliminateConstraints": False}, step=1e-3)
     parts = chain.parts(one, torque, "rotation_vector")
-    solver = MultibodySolver(one, parts, torque, scheme, readings.chain_trajectory, rows_between=True)
+    solver = MultibodySolver(one, parts, torque, scheme, sensor_samples.chain_trajectory, rows_between=True)
     integration = solver.integrate()
     found = Solution(one, "exudyn_chain/newmark_index2", solver.observe(), integration)
     verdict = caught(one, found)

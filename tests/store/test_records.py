@@ -15,7 +15,7 @@ from rotor_mbs.analysis.errata import CheckedEntry, entries, write_errata
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import Record, read_records, write_records
-from rotor_mbs.store.results_file import ResultsFile, merge
+from rotor_mbs.store.results_file import ResultsStore, merge
 
 CHECKS = [
     CheckedEntry("(8)", "row 1", "c", "0", 1.0, False, "E1"),
@@ -49,7 +49,7 @@ def test_merging_replaces_by_name_drops_other_numbers_and_leaves_out_what_is_sta
     write_records(tmp_path / "old.h5", [one, two, elsewhere])
     write_records(tmp_path / "new.h5", [ladder("stiff/x", "exudyn_tree/rk44", "d")])
     merge(tmp_path / "all.h5", [tmp_path / "old.h5", tmp_path / "new.h5"], {})
-    assert ResultsFile(tmp_path / "all.h5").stored_keys() == {"b", "c", "d"}
+    assert ResultsStore(tmp_path / "all.h5").stored_keys() == {"b", "c", "d"}
     merge(tmp_path / "all.h5", [tmp_path / "all.h5"], {}, without={"c"})
     assert named(tmp_path / "all.h5") == [f"stability/steps/stiff/x/exudyn_tree/{name}" for name in ("rk44", "rk67")]
     write_records(tmp_path / "new.h5", [ladder("stiff/x", "exudyn_tree/dopri5", "e", scene_hash="2")])
@@ -63,7 +63,7 @@ def test_runs_and_records_are_kept_side_by_side(tmp_path: Path) -> None:
     write_records(tmp_path / "record.h5", [ladder("paper/fig05", "lagrange/taylor", "record")])
     write_errata(tmp_path / "errata.h5", CHECKS, "f")
     merge(tmp_path / "all.h5", [tmp_path / f"{name}.h5" for name in ("runs", "record", "errata")], {})
-    assert ResultsFile(tmp_path / "all.h5").stored_keys() == {"run", "record"}
+    assert ResultsStore(tmp_path / "all.h5").stored_keys() == {"run", "record"}
     with open_results(tmp_path / "all.h5") as results:
         assert entries(results) == CHECKS
         assert list(results.scenes) == ["paper/fig05"]

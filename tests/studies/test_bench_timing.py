@@ -11,10 +11,10 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.execution.timing import Timings, Warm, allot, conduct, statistics
-from rotor_mbs.methods.base import Settings
+from rotor_mbs.methods.base import BuiltItem, Settings
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Integration, Item, Trajectory
+from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.studies import bench_worker
 from rotor_mbs.studies.bench_worker import Point, PointTimer, Prepared
 
@@ -44,7 +44,7 @@ class FakeMethod:
     is_corrected: bool = True
     bounds: tuple[Bound, ...] = ()
 
-    def items(self, _scene: Scene) -> list[Item]:
+    def items(self, _scene: Scene) -> list[BuiltItem]:
         return []
 
     def build(self, scene: Scene, _settings: Settings) -> FakeMethod:

@@ -19,7 +19,7 @@ from rotor_mbs.cli.arguments import EXPORT_FORMATS
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import angle_error, compare, horizon_samples
+from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.studies.export import FORMATS, export
 
@@ -96,7 +96,7 @@ def per_growth(scene: Scene, angles: np.ndarray, exact: Trajectory) -> float:
     whole = np.tile(np.array(scene.initial_angles), (len(angles), 1))
     whole[:, moving(scene)] = angles
     found = Trajectory(exact.time[: len(angles)], whole, np.zeros_like(whole))
-    return compare(replace(scene, outputs=("angles",)), found, exact)["angle_error_per_growth"]
+    return metrics_of(replace(scene, outputs=("angles",)), found, exact)["angle_error_per_growth"]
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -126,7 +126,7 @@ def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     assert header[1 : 1 + count] == [f"{label} [rad]" for label in scene.coordinate_labels]
     found = Trajectory(table[:, 0], table[:, 1 : 1 + count], table[:, 1 + count :])
     assert len(found.time) == scene.samples
-    assert compare(replace(scene, outputs=("angles",)), found, exact)["angle_error_per_growth"] < 1e-11
+    assert metrics_of(replace(scene, outputs=("angles",)), found, exact)["angle_error_per_growth"] < 1e-11
     ours = solve("exudyn_tree/rk67", scene, {}).trajectory
     until = min(100, scene.samples)
     assert np.abs(found.angles[:until] - ours.angles[:until]).max() < 1e-12
@@ -181,7 +181,7 @@ def test_the_benchmark_folder_accepts_what_is_right_and_nothing_else(tmp_path: P
     run = solve("exudyn_tree/rk44", scene, {"step": 5e-3}).trajectory
     status, line = evaluated(results_of(run))
     assert status == 0
-    error = compare(scene, run, references.reference("check/general"))["angle_error_per_growth"]
+    error = metrics_of(scene, run, references.reference("check/general"))["angle_error_per_growth"]
     assert float(line.split()[1].rstrip(",")) == pytest.approx(error, rel=1e-3)
     lighter = replace(scene, blades=(replace(scene.blades[0], mass=792.0), *scene.blades[1:]))
     assert evaluated(results_of(solve("exudyn_tree/rk67", lighter, {}).trajectory))[0] == 1

@@ -37,12 +37,12 @@ EQUIVALENT = {
     r"energy\.work .*last - first scaled": "whole numbers: rows counted",
     r"energy\.cumulative_integral .*sign in .*abscissae": "the points stand alike on both sides of the middle",
     r"chain\._rotor_torque .*0\.0 -> ": "a torque across the shaft: its bearing takes it",
-    r"readings\._joint_motion .*_dot\(hub_omega, z\)": "the hub turns about y, a pitch axis has no y: always zero",
-    r"readings\._dot ": (
+    r"sensor_samples\._joint_motion .*_dot\(hub_omega, z\)": "the hub turns about y, a pitch axis has no y: zero",
+    r"sensor_samples\._dot ": (
         "a pitch is read off twice, across and along the shaft: a term lost shrinks both sides of the arctangent alike"
     ),
-    r"readings\.unwrap .*right side of start - wrapped\[0\] lost": "rounded to turns, and less than half of one",
-    r"readings\.unwrap .*scaled": "rounded to whole turns: 1 % of the way between two rows is no half turn",
+    r"sensor_samples\.unwrap .*right side of start - wrapped\[0\] lost": "rounded to turns, and less than half of one",
+    r"sensor_samples\.unwrap .*scaled": "rounded to whole turns: 1 % of the way between two rows is no half turn",
     r"timetable\.integration_intervals .*(0\.5 \* \(t0 \+ t1\)|right side of t0 \+ t1) scaled": (
         "any instant inside the interval determines its segment"
     ),

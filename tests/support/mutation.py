@@ -99,7 +99,7 @@ _TARGETS = (
     Target("multibody", f"{_M}.tree", ("_node", "_tree", "_rotor_torque", "_tip_sensor")),
     Target("multibody", f"{_M}.energy", ("*",)),
     Target("multibody", f"{_M}.timetable", ("at", "torque_segments", "integration_intervals")),
-    Target("multibody", f"{_M}.readings", ("_fields", "_add_energies")),
+    Target("multibody", f"{_M}.sensor_samples", ("_fields", "_add_energies")),
     Target("chain", f"{_M}.geometry", ("quaternion", "quaternion_rate"), 1e-2),
     Target(
         "chain",
@@ -117,7 +117,7 @@ _TARGETS = (
         ),
         1e-2,
     ),
-    Target("chain", f"{_M}.readings", ("_joint_motion", "_dot", "unwrap"), 1e-2),
+    Target("chain", f"{_M}.sensor_samples", ("_joint_motion", "_dot", "unwrap"), 1e-2),
     # A thousandth: of fourth order, this model is bound to 1e-8.
     Target(
         "mujoco", f"{_J}.mjcf", ("moving", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
@@ -185,7 +185,7 @@ _PARTS = "models/test_exudyn_parts.py::test_"
 _MUJOCO = "models/test_mujoco.py::test_"
 _TESTS = {
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
-    f"{_M}.readings": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
+    f"{_M}.sensor_samples": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
     f"{_M}.timetable": (f"{_PARTS}integration_intervals_meet_samples_and_kinks",),
     f"{_M}.tree": ("solution/test_judgement_messages.py",),
     f"{_J}.mjcf": (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.metrics import compare
+from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.results_file import merge
@@ -73,7 +73,7 @@ def store(path: Path, runs: Sequence[Made]) -> Path:
     pieces = []
     for number, made in enumerate(runs):
         run = made.run()
-        metrics = compare(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
+        metrics = metrics_of(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
         piece = path.with_name(f"{path.stem}-{number}.piece")
         attributes = {"status": "ok", "message": "", **metrics, **made.attributes}
         write_run(piece, scene_hash(made.scene), run, attributes)

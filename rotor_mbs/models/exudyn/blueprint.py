@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rotor_mbs.solution.record import Item
+from rotor_mbs.methods.base import BuiltItem
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ def sensor(name: str, type_: str, quantity: str, detail: str = "", **where: obje
     return Part("sensor", name, type_, stored, detail or quantity)
 
 
-def items(parts: Sequence[Part]) -> list[Item]:
+def items(parts: Sequence[Part]) -> list[BuiltItem]:
     """The parts as a reader wants them listed."""
-    return [Item(part.kind, part.name, f"{part.type}: {part.detail}" if part.detail else part.type) for part in parts]
+    return [
+        BuiltItem(part.kind, part.name, f"{part.type}: {part.detail}" if part.detail else part.type) for part in parts
+    ]

@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import Look, Method, Solver, stability_polynomial
+from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice
-from rotor_mbs.models.exudyn import blueprint, chain, readings, schemes, tree
+from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
 from rotor_mbs.models.exudyn.energy import work_needs_rows
 from rotor_mbs.models.exudyn.timetable import RotorTorque, TorqueSegment, integration_intervals
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8
@@ -77,14 +77,14 @@ class MultibodySolver:
 def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
     scheme, torque = _scheme(scene, settings), RotorTorque(scene)
     between = scene.wants("energy") and work_needs_rows(scene)
-    return MultibodySolver(scene, tree.parts(scene, torque), torque, scheme, readings.tree_trajectory, between)
+    return MultibodySolver(scene, tree.parts(scene, torque), torque, scheme, sensor_samples.tree_trajectory, between)
 
 
 def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
     scheme, torque = _scheme(scene, settings), RotorTorque(scene)
     parts = chain.parts(scene, torque, settings.node)
     # Its angles are unwrapped from row to row, so rows are kept between samples.
-    return MultibodySolver(scene, parts, torque, scheme, readings.chain_trajectory, rows_between=True)
+    return MultibodySolver(scene, parts, torque, scheme, sensor_samples.chain_trajectory, rows_between=True)
 
 
 def _linearize_tree(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
@@ -115,7 +115,7 @@ def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
     """What all six have in common."""
     in_tree = model == "exudyn_tree"
 
-    def items(scene: Scene) -> list[Item]:
+    def items(scene: Scene) -> list[BuiltItem]:
         return blueprint.items((tree if in_tree else chain).parts(scene, RotorTorque(scene)))
 
     return Method(

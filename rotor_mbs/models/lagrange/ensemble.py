@@ -131,7 +131,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
 
 
 def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
-    """A torque that changes is integrated segment by segment, which runs in one batch would do at different times."""
+    """A torque that changes is integrated segment by segment, which runs side by side would do at different times."""
     run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
     n = len(run.trajectory.time)
     for name, values in block.quantities.items():

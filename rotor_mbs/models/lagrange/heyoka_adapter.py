@@ -12,7 +12,7 @@ import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 
-# Of any processor that the engine runs on. A time limit for a batch counts on no more.
+# Of any processor that the engine runs on. A time limit for a chunk counts on no more.
 LEAST_LANES = 2
 
 HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge elsewhere"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.methods.base import Look, Method
+from rotor_mbs.methods.base import Look, Method, RunBlock
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.lagrange import heyoka_adapter, reference, samples, system
@@ -54,7 +54,7 @@ class RadauSettings(Settings):
     absolute_tolerance: float = _absolute(1e-11)
 
 
-def _taylor_many(scenes: Sequence[Scene], settings: TaylorSettings) -> Any:
+def _taylor_many(scenes: Sequence[Scene], settings: TaylorSettings) -> RunBlock:
     from rotor_mbs.models.lagrange.ensemble import solve_many
 
     return solve_many(scenes, settings.tolerance)

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
+from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.parameters import TorqueSegment, rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 
 class Advance(NamedTuple):
@@ -93,12 +94,12 @@ def _constant_work(scene: Scene, angles: Array) -> Array:
     return scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
 
 
-def items(scene: Scene) -> list[Item]:
+def items(scene: Scene) -> list[BuiltItem]:
     """The equations and terms the closed form has for this scene."""
     moving = scene.moving_coordinates
-    built = [Item("equation", scene.coordinate_labels[i]) for i in moving]
+    built = [BuiltItem("equation", scene.coordinate_labels[i]) for i in moving]
     built += [
-        Item("term", f"blade {i} fixed", "its pitch has no inertia")
+        BuiltItem("term", f"blade {i} fixed", "its pitch has no inertia")
         for i in range(1, 1 + len(scene.blades))
         if i not in moving
     ]
@@ -110,6 +111,6 @@ def items(scene: Scene) -> list[Item]:
         "bearing damping": any(scene.bearing_damping),
         "shaft damping": scene.shaft_damping != 0.0,
     }
-    built += [Item("term", name) for name, there in optional.items() if there]
-    built += [Item("output", name) for name in scene.outputs]
+    built += [BuiltItem("term", name) for name, there in optional.items() if there]
+    built += [BuiltItem("output", name) for name in scene.outputs]
     return built

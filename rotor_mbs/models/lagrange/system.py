@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
+from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import (
@@ -22,7 +23,7 @@ from rotor_mbs.models.lagrange.parameters import (
 )
 from rotor_mbs.models.lagrange.samples import Advance, over_segments
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 # Unrolled code is twice as fast as compact code, but its compile time grows with the number of blades.
 _UNROLLED_BLADES = 4
@@ -166,7 +167,7 @@ class TaylorSolver:
         return samples.trajectory(self._scene, self._propagation.times, self._propagation.states)
 
 
-def items(scene: Scene) -> list[Item]:
+def items(scene: Scene) -> list[BuiltItem]:
     """Raises MethodRefusal where heyoka is not installed, before anything is built."""
     heyoka()
     return samples.items(scene)

@@ -8,13 +8,12 @@ from importlib import import_module
 from typing import Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import Look, Method, Solver, stability_polynomial
+from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, stability_polynomial
 from rotor_mbs.methods.ladders import STEP, Ladder, step_ladder
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.record import Item
 
 _HINT = "pip install 'rotor_mbs[mujoco]'"
 _MOST_STEPS = 1e10
@@ -35,7 +34,7 @@ class ImplicitFastSettings(Settings):
     step: float = _step(5e-5)
 
 
-def _items(scene: Scene) -> list[Item]:
+def _items(scene: Scene) -> list[BuiltItem]:
     """Raises MethodRefusal, with the way to get it, where MuJoCo is not installed."""
     if not METHODS[0].is_installed:
         raise MethodRefusal(f"MuJoCo is not installed: {_HINT}")

@@ -24,9 +24,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.mujoco.loads import loaded
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Item
 
 LEAST = 2e-15  # kg, kg m²
 
@@ -80,12 +80,12 @@ def text(root: ET.Element) -> str:
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
-def items(scene: Scene) -> list[Item]:
+def items(scene: Scene) -> list[BuiltItem]:
     """What is built for the scene, in order."""
     return list(_items(model(scene, "rk4", 1.0)))
 
 
-def _items(root: ET.Element) -> Iterator[Item]:
+def _items(root: ET.Element) -> Iterator[BuiltItem]:
     for element in root.iter():
         kind = _KINDS.get(element.tag)
         if kind:
@@ -93,7 +93,7 @@ def _items(root: ET.Element) -> Iterator[Item]:
             detail = (
                 f"{element.get('type', element.tag)}: {', '.join(shown)}" if len(element.attrib) > 1 else element.tag
             )
-            yield Item(kind, element.get("name", element.tag), detail)
+            yield BuiltItem(kind, element.get("name", element.tag), detail)
 
 
 _KINDS = {"body": "object", "joint": "node", "site": "marker", "general": "load"}

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import Look, Method
+from rotor_mbs.methods.base import BuiltItem, Look, Method
 from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.ode45 import Ode45Result, Ode45Settings, RightHandSide, ode45
 from rotor_mbs.models.printed import literal
@@ -18,7 +18,7 @@ from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.observables import PointMassRotor, torque_work
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Item, Trajectory
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 
 @dataclass(frozen=True)
@@ -91,20 +91,20 @@ class PrintedModel:
         self._name = name
         self._errata = errata
 
-    def items(self, scene: Scene) -> list[Item]:
+    def items(self, scene: Scene) -> list[BuiltItem]:
         rotor = self._rotor(scene)
         sources = self._sources(len(scene.blades))
-        built = [Item("equation", "rotor", sources[0])]
+        built = [BuiltItem("equation", "rotor", sources[0])]
         for i in range(1, 1 + len(scene.blades)):
             if rotor.pitches_move:
-                built.append(Item("equation", f"pitch {i}", sources[1]))
+                built.append(BuiltItem("equation", f"pitch {i}", sources[1]))
             else:
-                built.append(Item("term", f"blade {i} fixed", "its pitch has no inertia"))
+                built.append(BuiltItem("term", f"blade {i} fixed", "its pitch has no inertia"))
         if scene.gravity != 0.0:
-            built.append(Item("term", "gravity"))
+            built.append(BuiltItem("term", "gravity"))
         if scene.has_torque:
-            built.append(Item("term", "rotor torque"))
-        return built + [Item("output", name) for name in scene.outputs]
+            built.append(BuiltItem("term", "rotor torque"))
+        return built + [BuiltItem("output", name) for name in scene.outputs]
 
     def _sources(self, blades: int) -> tuple[str, str]:
         """Where in the paper the rotor's row and a pitch's stand, in the form that is run."""

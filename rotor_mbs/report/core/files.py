@@ -85,7 +85,7 @@ def _environment() -> jinja2.Environment:
     scripts = {path.stem: _script(path) for path in sorted(_TEMPLATES.glob("*.js"))}
     hashes = {name: _hash(text) for name, text in scripts.items()}
     environment.globals.update(generator=GENERATOR, style=Markup(style), scripts=scripts, hashes=hashes)
-    environment.filters.update(number=numbers.number, quantity=numbers.quantity)
+    environment.filters.update(number=numbers.number, with_unit=numbers.with_unit)
     return environment
 
 

@@ -37,7 +37,7 @@ def fixed(value: float | None, decimals: int) -> str:
     return minus(text if float(text) else text.lstrip("-"))
 
 
-def quantity(value: float | None, unit: str, digits: int = 2) -> str:
+def with_unit(value: float | None, unit: str, digits: int = 2) -> str:
     """A number with its unit, without a line break between them."""
     return number(value, digits) if value is None else f"{number(value, digits)}{SPACE}{unit}"
 
@@ -45,10 +45,10 @@ def quantity(value: float | None, unit: str, digits: int = 2) -> str:
 def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
     """With an SI prefix: 1.12 MJ, 687 J, 4.1 mJ; powers of ten beyond tera and below nano."""
     if value is None or not math.isfinite(value) or value == 0.0:
-        return quantity(value, unit, digits)
+        return with_unit(value, unit, digits)
     rounded = float(f"{value:.{digits - 1}e}")
     if not 1e-9 <= abs(rounded) < 1e15:
-        return quantity(value, unit, min(digits, 2))
+        return with_unit(value, unit, min(digits, 2))
     scale, prefix = next((s, p) for s, p in _PREFIXES if abs(rounded) >= s)
     scaled = rounded / scale
     decimals = max(digits - 1 - math.floor(math.log10(abs(scaled))), 0)

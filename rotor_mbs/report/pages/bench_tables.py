@@ -21,7 +21,7 @@ from rotor_mbs.analysis.work_precision import (
 )
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
-from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, quantity
+from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.store.records import Record
 
@@ -77,7 +77,7 @@ def _reach_cell(curve: Record, reach: Reach | None) -> TableCell:
     if count:
         return TableCell("not measured", note=f"{count} finer {'setting' if count == 1 else 'settings'} left out")
     errors = curve.arrays["angle_error_max"][succeeded(curve)]
-    best = f"{quantity(float(errors.min()), 'rad')} at best" if len(errors) else "no run is ok"
+    best = f"{with_unit(float(errors.min()), 'rad')} at best" if len(errors) else "no run is ok"
     return TableCell(NOTHING, note=best)
 
 

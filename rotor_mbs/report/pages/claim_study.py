@@ -8,7 +8,7 @@ from rotor_mbs.analysis.claim_shares import FAILS, HOLDS, RULE, UNDECIDED, Claim
 from rotor_mbs.analysis.number_trials import Conditions, NumberTrials, count_of_rows
 from rotor_mbs.analysis.published import Published, published
 from rotor_mbs.report.core.elements import PageTable, TableCell
-from rotor_mbs.report.core.numbers import fixed, number, power, quantity
+from rotor_mbs.report.core.numbers import fixed, number, power, with_unit
 
 _TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
 
@@ -56,7 +56,7 @@ def numbers_headline(trials: NumberTrials) -> str:
         return ""
     count, of = count_of_rows(trials, usual.duration)
     return (
-        f"All {len(trials.numbers)} come out under one set of conditions, over {quantity(usual.duration, 's')}, for "
+        f"All {len(trials.numbers)} come out under one set of conditions, over {with_unit(usual.duration, 's')}, for "
         f"{count} of {of} ways of writing one row of (56): the likelier reading of what the authors ran, not a proof."
     )
 
@@ -73,11 +73,11 @@ def trial_tables(trials: NumberTrials) -> list[PageTable]:
         PageTable(
             "The published numbers by the duration of the run",
             ("Duration", *heads),
-            [[TableCell(quantity(one.duration, "s")), *_cells(trials, one, items)] for one in by_duration],
+            [[TableCell(with_unit(one.duration, "s")), *_cells(trials, one, items)] for one in by_duration],
             numeric=range(1, 1 + len(heads)),
         ),
         PageTable(
-            f"The published numbers by the tolerances of ode45, over {quantity(trials.usual.duration, 's')}",
+            f"The published numbers by the tolerances of ode45, over {with_unit(trials.usual.duration, 's')}",
             ("RelTol", "AbsTol", *heads),
             [
                 [_power(one.relative_tolerance), _power(one.absolute_tolerance), *_cells(trials, one, items)]
@@ -97,7 +97,7 @@ def trial_note(trials: NumberTrials) -> str:
     others = sum(count_of_rows(trials, one)[0] for one in elsewhere)
     return (
         f"{count} of {of} ways of writing the printed row give all {len(trials.numbers)} numbers over "
-        f"{quantity(duration, 's')}, {others or 'none'} over {_durations(elsewhere)}. Where the row is exactly zero "
+        f"{with_unit(duration, 's')}, {others or 'none'} over {_durations(elsewhere)}. Where the row is exactly zero "
         "at the start of Fig. 5, nothing moves."
     )
 
@@ -110,7 +110,7 @@ def _row_table(trials: NumberTrials, items: Mapping[str, Published], heads: Sequ
         if usual is not None:
             remainder = next(iter(trials.under(usual).values())).remainder
             rows.append([TableCell(row.formula), TableCell(number(remainder)), *_cells(trials, usual, items)])
-    caption = f"By the way of writing the first row of (56), over {quantity(trials.usual.duration, 's')}"
+    caption = f"By the way of writing the first row of (56), over {with_unit(trials.usual.duration, 's')}"
     return PageTable(caption, ("Row", "At the start (N m)", *heads), rows, numeric=range(1, 2 + len(heads)))
 
 

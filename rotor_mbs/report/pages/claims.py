@@ -9,7 +9,7 @@ from rotor_mbs.analysis.claim_shares import ClaimShares
 from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
 from rotor_mbs.analysis.published import TrajectoryNumber
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
-from rotor_mbs.report.core.numbers import fixed, number, quantity
+from rotor_mbs.report.core.numbers import fixed, number, with_unit
 from rotor_mbs.report.pages import claim_study
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
@@ -127,4 +127,4 @@ def _reading(reading: Reading) -> str:
 def _measured(value: float | None, asked: TrajectoryNumber) -> str:
     if value is None:
         return "undefined (no motion)"
-    return quantity(value, unit_of(asked), 3) if unit_of(asked) else number(value, 3)
+    return with_unit(value, unit_of(asked), 3) if unit_of(asked) else number(value, 3)

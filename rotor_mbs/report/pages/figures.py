@@ -15,7 +15,7 @@ from rotor_mbs.report import paper_figures
 from rotor_mbs.report.core import canvas, svg
 from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import label_of, with_capital
-from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, quantity
+from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, with_unit
 from rotor_mbs.report.pages.claims import description_of, unit_of
 from rotor_mbs.report.pages.error_pictures import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric
@@ -85,7 +85,7 @@ def _torques(
     """What is the same and what is not in a figure of torques."""
     gaps = [gap for name in figure.scenes if (gap := comparison(scenes[name]).exudyn) is not None]
     same = "The same: every torque accelerates the rotor from rest"
-    same += f"; Exudyn and the corrected model differ by {quantity(max(gaps), 'rad')} at most." if gaps else "."
+    same += f"; Exudyn and the corrected model differ by {with_unit(max(gaps), 'rad')} at most." if gaps else "."
     turned = [
         f"{HEADINGS[key]}: {', '.join(_turned(run, at) for at, run in runs.items())}" for key, runs in row.items()
     ]
@@ -154,12 +154,12 @@ def _same_and_different(scene: StoredScene) -> tuple[str, str]:
 def _same(found: ModelComparison) -> str:
     parts = []
     if found.visible_from is not None and found.visible_from > 0.0:
-        until = "throughout" if found.visible_from == math.inf else f"up to {quantity(found.visible_from, 's', 3)}"
+        until = "throughout" if found.visible_from == math.inf else f"up to {with_unit(found.visible_from, 's', 3)}"
         parts.append(f"the printed model moves as the corrected one {until}")
     if found.exudyn is not None:
         parts.append(
-            f"Exudyn and the corrected model differ by no more than {quantity(found.exudyn, 'rad')} up to "
-            f"{quantity(found.until, 's', 3)}"
+            f"Exudyn and the corrected model differ by no more than {with_unit(found.exudyn, 'rad')} up to "
+            f"{with_unit(found.until, 's', 3)}"
         )
     return f"The same: {'; '.join(parts)}." if parts else ""
 
@@ -167,14 +167,14 @@ def _same(found: ModelComparison) -> str:
 def _different(found: ModelComparison) -> str:
     parts = []
     if found.corrected_still and found.printed_pitch is not None and found.printed_pitch > 1e-3:
-        pitch = quantity(found.printed_pitch, "rad")
+        pitch = with_unit(found.printed_pitch, "rad")
         parts.append(f"no blade pitches in the corrected model; in print the pitches reach {pitch}")
     if found.largest is not None and found.visible_from != math.inf:
-        parts.append(f"the printed angles differ from the corrected ones by up to {quantity(found.largest, 'rad')}")
+        parts.append(f"the printed angles differ from the corrected ones by up to {with_unit(found.largest, 'rad')}")
     if found.gain is not None and found.gain > 1e3:
         parts.append(f"the energy of the printed model rises by {prefixed(found.gain, 'J')} without work done")
     if found.ended is not None:
-        parts.append(f"it diverges, and ode45 stops at {quantity(found.ended, 's', 3)}")
+        parts.append(f"it diverges, and ode45 stops at {with_unit(found.ended, 's', 3)}")
     return f"Not the same: {'; '.join(parts)}." if parts else "Not the same: nothing visible."
 
 
@@ -189,7 +189,7 @@ def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:
         parts.append("a torque that changes over time")
     elif with_torque and scene.torque_at(0.0):
         parts.append(f"rotor torque {prefixed(scene.torque_at(0.0), 'N·m')}")
-    return f"{', '.join(parts)}, g = {number(scene.gravity, 3)} m/s², {quantity(scene.duration, 's', 4)}."
+    return f"{', '.join(parts)}, g = {number(scene.gravity, 3)} m/s², {with_unit(scene.duration, 's', 4)}."
 
 
 def in_pi(value: float) -> str:

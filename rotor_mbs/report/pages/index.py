@@ -12,18 +12,18 @@ from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally, finding
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import label_of, with_capital
-from rotor_mbs.report.core.numbers import number, prefixed, quantity
+from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.pages import claim_study
 from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
-from rotor_mbs.store.read import Results, StoredRun, StoredScene
+from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 
 # Attributes of a results file that say what made it.
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
 
 
 def index_page(
-    results: Results, scenes: Mapping[str, StoredScene], files: Mapping[str, str], claims: Sequence[Claim],
+    results: OpenResults, scenes: Mapping[str, StoredScene], files: Mapping[str, str], claims: Sequence[Claim],
     conditions: Mapping[str, str], errata: Sequence[Erratum], *, has_walk: bool, study: ClaimStudy | None = None,
 ) -> dict[str, object]:  # fmt: skip
     """scenes: in order; files: the file name of each scene's page; errata: empty where there is no such page.
@@ -51,7 +51,7 @@ def _has_all(claims: Sequence[Claim], shares: ClaimShares | None) -> bool:
     return shares is not None and {claim.published.id for claim in claims} >= set(shares.claims)
 
 
-def versions(results: Results) -> list[tuple[str, str]]:
+def versions(results: OpenResults) -> list[tuple[str, str]]:
     """(what, version) of the programs and the computer that made a file."""
     return [(name, str(results.attributes[name])) for name in _VERSIONS if results.attributes.get(name)]
 
@@ -69,7 +69,7 @@ def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> 
         cells = [
             TableCell(name, href=files[name], note=scene.title),
             str(scene.attributes.get("figures", "")),
-            quantity(horizon(scene), "s", 3),
+            with_unit(horizon(scene), "s", 3),
             *_printed_cells(scene.methods.get(run_selection.PRINTED)),
         ]
         rows.append([*cells, *(cell for method in corrected for cell in _corrected_cells(scene.methods.get(method)))])
@@ -144,7 +144,7 @@ def _condition(one: Reproduced) -> str:
     what = f"{'that' if one.count == 1 else f'the {one.count}'} of Fig. {one.figure}"
     gravity = "" if one.gravity is None else f"g = {number(one.gravity)} m/s² and "
     note = f" ({claim_tables.ROUNDING})" if one.rounding else ""
-    return f"{what} with {gravity}{quantity(one.duration, 's')}{note}"
+    return f"{what} with {gravity}{with_unit(one.duration, 's')}{note}"
 
 
 def _printed_energy(energy: PrintedEnergy | None) -> str:
@@ -170,7 +170,7 @@ def _agreement(found: Sequence[Agreement]) -> str:
         return ""
     models = len({agreement.method.partition("/")[0] for agreement in known})
     counts = {1: "One corrected model agrees", 2: "Two corrected models agree", 3: "Three corrected models agree"}
-    errors = [f"{quantity(a.angle_error, 'rad')} ({label_of(a.method)})" for a in known]
+    errors = [f"{with_unit(a.angle_error, 'rad')} ({label_of(a.method)})" for a in known]
     listed = errors[0] if len(errors) == 1 else f"{', '.join(errors[:-1])} and {errors[-1]}"
     text = counts.get(models, f"{models} corrected models agree")
     if models > 1:

@@ -14,7 +14,7 @@ from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
-from rotor_mbs.report.core.numbers import number, prefixed, quantity
+from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import claim_study, error_pictures, scene_tables
 from rotor_mbs.report.pages import claims as claim_tables
@@ -118,18 +118,18 @@ def _lead(drawn: DrawnRuns) -> list[str]:
     printed, found = drawn.printed, []
     departure = None if printed is None else metric(printed, "angle_error_whole")
     if printed is not None and printed.status not in ("ok", "inaccurate"):
-        end = quantity(float(printed.array("time")[-1]), "s", 3)
+        end = with_unit(float(printed.array("time")[-1]), "s", 3)
         found.append(f"The printed model diverges: ode45 stops at {end}.")
     elif printed is not None and departure is not None:
         gain = metric(printed, "energy_gain_J")
         energy = "" if gain is None else f"; its energy rises by up to {prefixed(gain, 'J')}"
-        found.append(f"The printed model departs from the reference by up to {quantity(departure, 'rad')}{energy}.")
+        found.append(f"The printed model departs from the reference by up to {with_unit(departure, 'rad')}{energy}.")
     runs = [run for run in run_selection.corrected_runs(drawn.scene).values() if run.status == "ok"]
     errors = [error for run in runs if (error := metric(run, "angle_error_max")) is not None]
     if errors and drawn.horizon is not None:
         found.append(
-            f"Up to the horizon, {quantity(drawn.horizon, 's', 3)}, the corrected models agree with the reference to "
-            f"within {quantity(max(errors), 'rad')}."
+            f"Up to the horizon, {with_unit(drawn.horizon, 's', 3)}, the corrected models agree with the reference to "
+            f"within {with_unit(max(errors), 'rad')}."
         )
     return found
 
@@ -182,7 +182,7 @@ def _motion_picture(name: str, run: StoredRun, marked: Mapping[str, StoredRun], 
     notes = []
     for values, what, unit in ((motion.angles, "Angles", "rad"), (motion.rates, "Rates", "rad/s")):
         if values is not None and histories.is_cut(values):
-            largest = quantity(float(np.abs(values).max()), unit)
+            largest = with_unit(float(np.abs(values).max()), unit)
             notes.append(f"{what} beyond the axis are cut off; the largest is {largest}.")
     label = label_of(run.method)
     caption = with_capital(label)
@@ -235,7 +235,7 @@ def difference_section(drawn: DrawnRuns) -> Section:
             others.append(Series(time, reference.array("angle_uncertainty"), Look(GREY, "-", "")))
             legend.append(line_entry("uncertainty of the reference"))
         elif uncertainty:
-            notes.append(f"The uncertainty of the reference, {quantity(uncertainty, 'rad')}, is far below the axis.")
+            notes.append(f"The uncertainty of the reference, {with_unit(uncertainty, 'rad')}, is far below the axis.")
         else:
             notes.append("Two quad-precision runs of the reference do not differ at all.")
     shown = error_pictures.error_picture(
@@ -281,7 +281,7 @@ def _horizon_entry(drawn: DrawnRuns) -> list[LegendEntry]:
     ends = [float(run.array("time")[-1]) for run in drawn.sides.values()]
     if drawn.horizon is None or not any(drawn.horizon < end for end in ends):
         return []
-    return [line_entry(f"horizon {quantity(drawn.horizon, 's', 3)}", line="--")]
+    return [line_entry(f"horizon {with_unit(drawn.horizon, 's', 3)}", line="--")]
 
 
 def opening_comment(scene: StoredScene) -> str:

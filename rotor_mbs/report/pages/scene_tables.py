@@ -12,7 +12,7 @@ from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
-from rotor_mbs.report.core.numbers import number, prefixed, quantity
+from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 
@@ -69,7 +69,7 @@ def _zero_pitch(run: StoredRun) -> str:
     left, rate = metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s")
     if left is None:
         return "kept"
-    return f"left at {quantity(left, 's', 3)}" + ("" if rate is None else f", growing {quantity(rate, '/s', 3)}")
+    return f"left at {with_unit(left, 's', 3)}" + ("" if rate is None else f", growing {with_unit(rate, '/s', 3)}")
 
 
 def metrics_notes(scene: StoredScene) -> list[str]:
@@ -87,7 +87,7 @@ def metrics_notes(scene: StoredScene) -> list[str]:
         if rate is not None:
             text += (
                 " A pitch below the shaft is an inverted pendulum: rounding errors grow at up to √(g/c) = "
-                f"{quantity(rate, '/s', 3)}."
+                f"{with_unit(rate, '/s', 3)}."
             )
         notes.append(text)
     return notes
@@ -101,7 +101,7 @@ def failures(scene: StoredScene) -> list[str]:
             message = str(run.attributes.get("message", ""))
             reached = float(run.array("time")[-1]) if run_selection.has_samples(run) else 0.0
             parts = [f"{label_of(run.method)}: {status_text(run.status)}", *([message] if message else [])]
-            found.append(f"{'. '.join(parts)} (samples up to {quantity(reached, 's', 4)})")
+            found.append(f"{'. '.join(parts)} (samples up to {with_unit(reached, 's', 4)})")
     return found
 
 

@@ -15,7 +15,7 @@ from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.judgement import judge, rotor_inertia_shares
-from rotor_mbs.solution.metrics import compare
+from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 
@@ -89,7 +89,7 @@ def metrics_off() -> Iterator[tuple[str, float]]:
     wrong.tip = np.zeros((11, 3, 3))
     wrong.tip[1, 2] = (3.0, 0.0, 4.0)
     wrong.tip[8, 1] = (30.0, 0.0, 40.0)
-    whole = compare(SCENE, wrong, exact)
+    whole = metrics_of(SCENE, wrong, exact)
     known = {
         "horizon_s": 0.3,
         "angle_error_max": 0.1,
@@ -107,7 +107,7 @@ def metrics_off() -> Iterator[tuple[str, float]]:
         ("stopped at the start", _cut(wrong, 1), exact, set()),
         ("past the horizon at once", wrong, at_once, {"angle_error_whole", "angle_error_end"}),
     ):
-        found = compare(SCENE, run, reference).keys() & (errors | {"angle_error_whole", "angle_error_end"})
+        found = metrics_of(SCENE, run, reference).keys() & (errors | {"angle_error_whole", "angle_error_end"})
         yield f"metrics of a run {name}", float(len(found ^ expected))
 
 
