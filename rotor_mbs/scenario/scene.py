@@ -16,7 +16,8 @@ from dataclasses import Field, dataclass, field, fields
 from operator import attrgetter, itemgetter
 from typing import Any, Literal
 
-OUTPUTS = ("angles", "rates", "tip", "energy")  # built in
+DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
+OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
 ENTRY_POINT_GROUP = "rotor_mbs.quantities"  # a package adds the output that its entry point in this group is called
 
 Part = Literal["label", "run", "start", "rotor"]

@@ -58,9 +58,11 @@ def wrong_times(rows: Sequence[Sequence[float]]) -> str | None:
 
 
 def values_per_sample(blades: int, outputs: Collection[str]) -> int:
-    """Doubles that a run holds per sample: time, angles and rates always, tip paths and energies where asked for."""
+    """Doubles that a run holds per sample: time, angles and rates always; tips, energies and loads where asked for."""
     energies = 4  # kinetic, potential, work, energy error
-    return 1 + 2 * (1 + blades) + 3 * blades * ("tip" in outputs) + energies * ("energy" in outputs)
+    loads = 6 * (1 + blades) + blades  # force and moment at every root and at the shaft, moments of the pitch actuators
+    asked = 3 * blades * ("tip" in outputs) + energies * ("energy" in outputs) + loads * ("loads" in outputs)
+    return 1 + 2 * (1 + blades) + asked
 
 
 def _output(name: str) -> str:
@@ -78,7 +80,7 @@ def _each_once(outputs: list[str]) -> list[str]:
 
 
 Outputs = Annotated[list[Annotated[str, AfterValidator(_output)]], AfterValidator(_each_once)]
-OUTPUTS_ALLOWED = 'some of "angles", "rates", "tip", "energy" and the outputs of installed packages, each once'
+OUTPUTS_ALLOWED = 'some of "angles", "rates", "tip", "energy", "loads" and the outputs of installed packages, each once'
 
 
 def counted(count: int, noun: str) -> str:
@@ -226,7 +228,9 @@ class SceneTable(Table):
     blades: int = Field(ge=1, le=MAX_BLADES, description=f"a whole number from 1 to {MAX_BLADES}")
     gravity: NotNegative = Field(description="a number of at least 0 (m/s², along -z)")
     duration: Number = Field(gt=0, description="a number above 0 (s)")
-    outputs: Outputs = Field(list(scene.OUTPUTS), min_length=1, validate_default=True, description=OUTPUTS_ALLOWED)
+    outputs: Outputs = Field(
+        list(scene.DEFAULT_OUTPUTS), min_length=1, validate_default=True, description=OUTPUTS_ALLOWED
+    )
     samples: int = Field(ge=2, le=MAX_SAMPLES, description=f"a whole number from 2 to {MAX_SAMPLES}")
     blade: list[BladeTable] = Field(description="one [blade] table for all blades, or a [[blade]] table for each")
     hub: HubTable | None = Field(None, description="a table with inertia")

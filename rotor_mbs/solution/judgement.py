@@ -122,7 +122,7 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
     if status != "inaccurate":
         return status == "ok"
     errors = [metrics.get(name, 0.0) for name in ("energy_drift_max", "angle_error_per_growth")]
-    errors += [error for _, rule, error in quantity_errors(scene, metrics) if rule.relative_to]
+    errors += [error for _, rule, error in quantity_errors(scene, metrics) if rule.relative_to or rule.per_growth_of]
     return all(error <= _RESEMBLES for error in errors)
 
 

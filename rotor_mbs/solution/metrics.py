@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.quantities import Array, deviation, energy_error, known_quantities
+from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.record import Trajectory
 
 HORIZON_GROWTH = 1e5  # a scene's horizon: when an error of the initial state may have grown this many times
@@ -76,21 +76,40 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
         metrics["energy_gain_J"] = float(energy.max())
     if reference is not None:
         metrics |= _angle_errors(run, reference)
-    return metrics | _of_quantities(scene, run, reference)
+    return metrics | _of_quantities(scene, run, reference) | _peaks(scene, run)
 
 
 def _of_quantities(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
     """The metric of every quantity that is judged by a rule of its declaration."""
     metrics: Metrics = {}
     for quantity in known_quantities(scene.outputs):
-        sizes = deviation(quantity, scene, run, reference)
-        if sizes is None or quantity.judgement is None:
+        errors = deviation(quantity, scene, run, reference)
+        if errors is None or quantity.judgement is None:
             continue
         if quantity.judgement.with_reference and reference is not None:
-            until = min(horizon_samples(reference), len(sizes))
-            sizes = sizes[: until if until > 1 else 0]  # the first sample is given, and equal in every run
-        if len(sizes):
-            metrics[quantity.judgement.metric] = float(sizes.max())
+            until = min(horizon_samples(reference), len(errors))
+            errors = errors[: until if until > 1 else 0]  # the first sample is given, and equal in every run
+            if quantity.judgement.per_growth_of is not None:
+                scale = quantity.judgement.per_growth_of(scene, reference, until)
+                errors = errors / (scale * _carried_error(reference)[: len(errors)])
+        if len(errors):
+            metrics[quantity.judgement.metric] = float(errors.max())
+    return metrics
+
+
+def _peaks(scene: Scene, run: Trajectory) -> Metrics:
+    """The largest size of each quantity that has one among its metrics, its time in s, and its blade, from 1."""
+    metrics: Metrics = {}
+    for quantity in known_quantities(scene.outputs):
+        values = array_of(quantity, scene, run) if quantity.has_peak else None
+        if values is None:
+            continue
+        found = sizes(quantity, values)
+        place = np.unravel_index(int(found.argmax()), found.shape)
+        metrics[f"{quantity.name}_max"] = float(found[place])
+        metrics[f"{quantity.name}_max_time_s"] = float(run.time[place[0]])
+        if quantity.dimensions[1:2] == ("blade",):
+            metrics[f"{quantity.name}_max_blade"] = float(place[1] + 1)
     return metrics
 
 

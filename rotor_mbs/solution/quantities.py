@@ -44,6 +44,8 @@ class QuantityMetric:
     metric : name of the number among the run's attributes.
     with_reference : the size is that of the difference from the reference's array, up to the horizon.
     relative_to : from the scene to what the number is divided by before it is judged; None for 1.
+    per_growth_of : from (scene, reference, number of samples up to the horizon) to a scale; the number is then the
+        error of each sample divided by it and by the error growth up to there, which is not the method's fault.
     check : name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here.
     bound : largest value that passes where no check has one; None where the number is not judged.
     channel, unit : what the judged number is called in a verdict, and its unit in words.
@@ -54,6 +56,7 @@ class QuantityMetric:
     metric: str
     with_reference: bool = True
     relative_to: Callable[[Scene], float] | None = None
+    per_growth_of: Callable[[Scene, Samples, int], float] | None = None
     check: str = ""
     bound: float | None = None
     channel: str = ""
@@ -89,6 +92,7 @@ class Quantity:
     required : whether every run has it whose scene asks for it; else some methods alone have it.
     judgement : how a run's array is judged; None where it is not, or where `metrics` has a rule of its own for it.
     plot : how it is drawn; None where it is not drawn by itself.
+    has_peak : whether its largest size, and the time of it, are among a run's metrics.
 
     Examples
     --------
@@ -109,6 +113,7 @@ class Quantity:
     required: bool = True
     judgement: QuantityMetric | None = None
     plot: Plot | None = None
+    has_peak: bool = False
 
     @property
     def is_over_time(self) -> bool:
@@ -123,7 +128,7 @@ SCALES = {
         Quantity("time", ("time",), "s", "time"),
         Quantity("coordinate", ("coordinate",), "1", "joint coordinate: 0 rotor, i pitch of blade i"),
         Quantity("blade", ("blade",), "1", "blade number, from 1"),
-        Quantity("axis", ("axis",), "1", "axis of the base frame: 0 x, 1 y (shaft), 2 z (up)"),
+        Quantity("axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z (in the base frame: y shaft, z up)"),
         Quantity("refined_time", ("refined_time",), "s", "time of the integrator's own output points"),
     )
 }
@@ -161,6 +166,58 @@ _JOINT_GAP = QuantityMetric(
     look_at="a joint of the chain that is not constrained, or its marker",
 )
 
+
+def _largest_root_force(_scene: Scene, run: Samples, until: int) -> float:
+    """N, over the blades and the first samples; 1 where there is none."""
+    forces = run.get("blade_root_force")
+    return 1.0 if forces is None else float(np.linalg.norm(forces[:until], axis=-1).max(initial=0.0)) or 1.0
+
+
+def _largest_root_force_at_arm(scene: Scene, run: Samples, until: int) -> float:
+    """N m, that force at the longest arm: a scale for moments, which may all be next to nothing."""
+    return _largest_root_force(scene, run, until) * (longest_arm(scene) or 1.0)
+
+
+def _load(name: str, dimensions: tuple[str, ...], long_name: str, title: str, look_at: str) -> Quantity:
+    is_force = name.endswith("force")
+    rule = QuantityMetric(
+        f"{name}_error",
+        per_growth_of=_largest_root_force if is_force else _largest_root_force_at_arm,
+        check="loads",
+        channel=name.replace("_", " "),
+        unit="of the largest, per growth",
+        fault=f"{name.replace('_', ' ')} off by {{value}} of the largest load per unit of error growth",
+        look_at=look_at,
+    )
+    plot = Plot(title, "force (N)" if is_force else "moment (N m)")
+    units = "N" if is_force else "N m"
+    return Quantity(name, ("time", *dimensions), units, long_name, "loads", judgement=rule, plot=plot, has_peak=True)
+
+
+# The root of a blade is the origin of its frame, on the shaft. Where a torque jumps, the value is the one before it.
+LOADS = (
+    _load(
+        "blade_root_force", ("blade", "axis"), "force of the hub on each blade at its root, in the blade's frame",
+        "Forces at the blade roots", "an acceleration of a centre of mass, or a weight",
+    ),
+    _load(
+        "blade_root_moment", ("blade", "axis"), "moment of the hub on each blade about its root, in the blade's frame",
+        "Moments at the blade roots", "a lever, a gyroscopic moment, or a weight",
+    ),
+    _load(
+        "shaft_force", ("axis",), "force of the shaft's bearing on the rotor, in the base frame",
+        "Force of the shaft's bearing", "the sum of the forces at the roots",
+    ),
+    _load(
+        "shaft_moment", ("axis",), "moment of the shaft's bearing on the rotor about the hub centre, in the base frame",
+        "Moment of the shaft's bearing", "the sum of the moments at the roots, the hub, or the torque",
+    ),
+    _load(
+        "pitch_actuator_moment", ("blade",), "moment of each pitch actuator (spring, damper) on its blade",
+        "Moments of the pitch actuators", "a spring or a damper of a pitch bearing",
+    ),
+)  # fmt: skip
+
 BUILT_IN = (
     Quantity("angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"),
     Quantity("rates", ("time", "coordinate"), "rad/s", "rotor rate and pitch rates", "rates"),
@@ -181,6 +238,7 @@ BUILT_IN = (
         "constraint_error", ("time",), "m", "largest position gap in a joint", required=False, judgement=_JOINT_GAP,
         plot=Plot("Largest gap in a joint", "gap (m)", logarithmic=True),
     ),
+    *LOADS,
     Quantity(
         "angle_uncertainty", ("time",), "rad", "difference of two quad precision runs, largest over the angles",
         required=False,
@@ -314,6 +372,12 @@ def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples
             return None
         n = min(len(values), len(exact))
         values = values[:n] - exact[:n]
-    sizes = np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
-    largest: Array = sizes.max(axis=tuple(range(1, sizes.ndim)))
+    found = sizes(quantity, values)
+    largest: Array = found.max(axis=tuple(range(1, found.ndim)))
     return largest
+
+
+def sizes(quantity: Quantity, values: Array) -> Array:
+    """Magnitudes of an array of this quantity: with the last dimension `axis`, lengths of the vectors."""
+    found: Array = np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
+    return found

@@ -20,7 +20,7 @@ from hypothesis.extra.numpy import arrays
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, reference_folder, scenarios_folder
-from rotor_mbs.scenario.scene import OUTPUTS, Scene, scene_hash
+from rotor_mbs.scenario.scene import DEFAULT_OUTPUTS, OUTPUTS, Scene, scene_hash
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.scenario.schema import is_rigid_body_inertia, values_per_sample
 from rotor_mbs.scenario.toml_file import find_lines, line_of
@@ -99,7 +99,7 @@ def test_shipped_scene_has_the_numbers_of_its_caption(paper: dict[str, Scene], n
         assert blade.is_point_mass
     assert scene.gravity == 9.8
     assert (scene.duration, scene.samples) == ((12.0, 1201) if name == "paper/fig05" else (10.0, 1001))
-    assert scene.outputs == OUTPUTS
+    assert scene.outputs == DEFAULT_OUTPUTS
     assert not scene.has_damping
     assert scene.hub_inertia == 0.0
     assert scene.bearing_stiffness == ()
@@ -199,9 +199,10 @@ def test_a_broken_triangle_inequality_is_found_in_any_frame(axis: int, random: n
 
 
 def test_values_per_sample_by_hand() -> None:
-    # Three blades: time, 4 angles, 4 rates; 3 tips of 3; 4 energies.
+    # Three blades: time, 4 angles, 4 rates; 3 tips of 3; 4 energies; force and moment at 3 roots and the shaft, 3 pitch
+    # moments.
     assert values_per_sample(3, ("angles",)) == 9
-    assert values_per_sample(3, OUTPUTS) == 9 + 9 + 4
+    assert values_per_sample(3, OUTPUTS) == 9 + 9 + 4 + 24 + 3
 
 
 # Every value is the number of its line.

@@ -94,7 +94,7 @@ def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
     fixed: list[tuple[Number, Number, Number]] = []
     inertia = Fraction(scene.hub_inertia)
     for i, blade in enumerate(scene.blades):
-        phase = [_cosine_of_turn(Fraction(i, count)), _cosine_of_turn(Fraction(i, count) - Fraction(1, 4))]
+        phase = phase_of(i, count)
         if blade.has_pitch_inertia:
             bearing = (Fraction(value) for value in scene.bearing(i))
             values = [*phase, *_coefficients(blade, gravity), *bearing, *_rotor_inertia(blade)]
@@ -104,6 +104,11 @@ def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
             weight = Fraction(blade.mass) * gravity * Fraction(blade.centre_of_mass[2])
             fixed.append((convert(weight), convert(phase[0]), convert(phase[1])))
     return RotorForm(tuple(forms), tuple(fixed), convert(inertia), convert(Fraction(scene.shaft_damping)))
+
+
+def phase_of(blade: int, count: int) -> tuple[Fraction, Fraction]:
+    """Cosine and sine of the mounting angle of a blade, counted from 0, of `count`."""
+    return _cosine_of_turn(Fraction(blade, count)), _cosine_of_turn(Fraction(blade, count) - Fraction(1, 4))
 
 
 def _inertia_about_hub(blade: Blade) -> tuple[Fraction, Fraction, Fraction, Fraction, Fraction, Fraction]:
@@ -179,6 +184,15 @@ def torque_segments(scene: Scene) -> list[TorqueSegment]:
             slope = (torque1 - torque0) / (t1 - t0)
             segments.append(TorqueSegment(float(t0), float(min(t1, end)), torque0 - slope * t0, slope))
     return segments
+
+
+def torque_before(scene: Scene, times: Array) -> Array:
+    """(n,) N m on the rotor at `times` (s); at a jump the value before it, at 0 the one after."""
+    segments = torque_segments(scene)
+    which = np.searchsorted([segment.end for segment in segments[:-1]], times)
+    offsets, slopes = (np.array([float(segment[k]) for segment in segments]) for k in (2, 3))
+    torque: Array = offsets[which] + slopes[which] * times
+    return torque
 
 
 def work_is_integrated(scene: Scene) -> bool:

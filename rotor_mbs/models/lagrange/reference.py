@@ -10,6 +10,7 @@ import numpy as np
 
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
+from rotor_mbs.models.lagrange.loads import quad_loads
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import rate_units
 from rotor_mbs.models.lagrange.system import Propagation, build_system
@@ -39,6 +40,8 @@ class ReferenceSolver:
         rows = min(len(run.states) for run in self._runs)
         best, check = (run.states[:rows] for run in self._runs)
         result = samples.trajectory(self._scene, self._runs[0].times, best.astype(float))
+        if self._scene.wants("loads"):
+            result.quantities |= quad_loads(self._scene, result.time, best)
         difference = np.abs((best - check)[:, : len(self._scene.moving_coordinates)]).astype(float)
         result.angle_uncertainty = difference.max(axis=1)
         result.error_growth = error_growth(self._scene)[:rows]

@@ -10,6 +10,7 @@ import numpy as np
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.loads import sampled_loads
 from rotor_mbs.models.lagrange.parameters import TorqueSegment, rotor_form
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
@@ -86,6 +87,8 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
                 list(angles[:, columns].T), list(rates[:, columns].T), form, np.sin, np.cos
             )
         result.work = states[:, 2 * count] if states.shape[1] > 2 * count else _constant_work(scene, angles)
+    if scene.wants("loads"):
+        result.quantities |= sampled_loads(scene, time, angles, rates)
     return result
 
 
