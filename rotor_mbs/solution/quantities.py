@@ -240,7 +240,8 @@ BUILT_IN = (
     ),
     *LOADS,
     Quantity(
-        "angle_uncertainty", ("time",), "rad", "difference of two quad precision runs, largest over the angles",
+        "angle_uncertainty", ("time",), "rad",
+        "bound on the error of the angles, before they are rounded to double precision (half a unit in the last place)",
         required=False,
     ),
     Quantity("error_growth", ("time",), "1", "largest growth of a small error of the initial state", required=False),

@@ -140,7 +140,7 @@ def _reference(case: Case) -> list[Verdict]:
     if len(found.time) != scene.samples or found.angle_uncertainty is None or found.error_growth is None:
         return [measured(case, "recomputed", math.nan, "rad", look)]
     off = np.abs(found.angles - frozen.angles).max(axis=1)
-    beyond = float(np.maximum(off - 10.0 * found.angle_uncertainty, 0.0).max())
+    beyond = float(np.maximum(off - found.angle_uncertainty, 0.0).max())
     if found.angle_uncertainty.max() > 1e-12:
         worst = found.angle_uncertainty.max()
         look += f"; a fallback in double precision, uncertain to {worst:.0e} rad, which is allowed for"

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from support import multiprecision
+from support.references import reference as frozen_reference
+from support.references import scene as shipped_scene
 from support.scenes import PAPER, paper
 
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange.system import Propagation, build_system
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.store.read import open_results
@@ -43,3 +49,47 @@ def test_recomputed_is_frozen(name: str) -> None:
         assert reference.array("angle_uncertainty").max() >= found.angle_uncertainty.max() * 0.1
         # The growth is in double precision and grows its own errors: a hundredth decides no horizon.
         np.testing.assert_allclose(found.error_growth, reference.array("error_growth"), rtol=1e-2)
+
+
+def _propagated(name: str, tolerance: float) -> Any:
+    """(samples, coordinates that move) rad, quad precision."""
+    scene = shipped_scene(name)
+    run = Propagation(scene, build_system(scene), quad=True, tol=tolerance, compact_mode=True)
+    run.run()
+    return run.states[:, : len(scene.moving_coordinates)]
+
+
+# Of each kind: rest, a pendulum, uniform rotation, constant torque, coordinates at exact zero, general rigid blades.
+@pytest.mark.parametrize(
+    "name",
+    ["paper/fig05", "paper/fig04b", "paper/fig06", "paper/fig15-100kNm", "paper/fig08", "check/general"],
+)
+def test_uncertainty_bounds_the_true_error_at_every_sample(name: str) -> None:
+    """Of the quad run; of the doubles that are stored, together with half a unit in the last place."""
+    pytest.importorskip("heyoka")
+    _assert_bounded(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [f"paper/{name}" for name in PAPER])
+def test_uncertainty_bounds_the_true_error_in_the_paper(name: str) -> None:
+    pytest.importorskip("heyoka")
+    _assert_bounded(name)
+
+
+def _assert_bounded(name: str) -> None:
+    exact, frozen = multiprecision.moving_angles(shipped_scene(name)), frozen_reference(name)
+    rows = min(len(exact), len(frozen.time))
+    assert rows == len(frozen.time)
+    stored = frozen.angles[:, shipped_scene(name).moving_coordinates]
+    uncertainty, rounding = frozen.angle_uncertainty, 0.5 * np.spacing(np.abs(stored)).max(axis=1)
+    assert (multiprecision.distance(_propagated(name, 1e-33)[:rows], exact[:rows]) <= uncertainty).all()
+    assert (multiprecision.distance(stored, exact[:rows]) <= uncertainty + rounding).all()
+
+
+@pytest.mark.parametrize(("name", "tolerance"), [("paper/fig09", 1e-32), ("paper/fig12", 1e-31)])
+def test_a_third_tolerance_lies_within_the_uncertainty(name: str, tolerance: float) -> None:
+    """Tighter than the check's own tolerance: the two tolerances that the bound follows from were not a lucky pair."""
+    pytest.importorskip("heyoka")
+    off = np.abs(_propagated(name, tolerance) - _propagated(name, 1e-33)).astype(float).max(axis=1)
+    assert (off <= frozen_reference(name).angle_uncertainty).all()

@@ -30,7 +30,7 @@ class TaylorSettings(Settings):
 @dataclass(frozen=True)
 class ReferenceSettings(Settings):
     tolerance: float = number(1e-33, above=0.0, doc="of the run that is kept")
-    check_tolerance: float = number(1e-30, above=0.0, doc="of the run whose distance is the uncertainty")
+    check_tolerance: float = number(1e-30, above=0.0, doc="of the run whose distance the uncertainty follows from")
 
 
 def _relative(default: float) -> Any:

@@ -234,10 +234,12 @@ def difference_section(drawn: DrawnRuns) -> Section:
         if uncertainty > LOWEST:
             others.append(Series(time, reference.array("angle_uncertainty"), Look(GREY, "-", "")))
             legend.append(line_entry("uncertainty of the reference"))
-        elif uncertainty:
-            notes.append(f"The uncertainty of the reference, {with_unit(uncertainty, 'rad')}, is far below the axis.")
         else:
-            notes.append("Two quad-precision runs of the reference do not differ at all.")
+            size = with_unit(uncertainty, "rad")
+            notes.append(
+                f"The uncertainty of the reference, {size}, is far below the axis; its angles are stored in double "
+                "precision, rounded by at most half a unit in the last place."
+            )
     shown = error_pictures.error_picture(
         curves, "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", drawn.horizon, others,
