@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 
 
@@ -26,3 +27,15 @@ class MethodRefusal(RotorError):
 
 class StoreError(RotorError):
     """A results file that cannot be read or written; names the file and the reason."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """ ", perhaps NAME" with the one of `known` that a misspelt `name` may mean, or "" where none is near.
+
+    >>> nearest("tailor", ["lagrange/taylor", "lagrange/radau"]), nearest("euler", ["lagrange/taylor"])
+    (', perhaps lagrange/taylor', '')
+    """
+    by_text = {one: one for one in known}
+    by_text |= {one.rpartition("/")[2]: one for one in reversed(by_text)}  # "rk67" may mean "exudyn_tree/rk67"
+    near = difflib.get_close_matches(name[:80], by_text, n=1)
+    return f", perhaps {by_text[near[0]]}" if near else ""

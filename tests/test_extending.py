@@ -81,6 +81,8 @@ def test_a_package_is_small(name: str) -> None:
 def test_show_and_a_wrong_name_know_the_method(installed: Installed) -> None:
     shown = json.loads(installed.command("show", installed.scene("one"), "--json"))
     assert shown["models"]["outside"]["methods"] == ["outside/rk4"]
+    assert "outside/rk4" in installed.command("list")
+    assert "step" in installed.command("show", "outside/rk4")
     assert "outside/rk4" in installed.command("run", installed.scene("one"), "-m", "outside/rk5", status=2)
     refused = installed.command("run", "stiff/bearing-1e4", "-m", "outside/rk4", status=2)
     assert "no springs" in refused

@@ -1,4 +1,4 @@
-"""The arguments of all commands. Loads the code of none, so that `rotor-mbs list` takes at most 0.3 s."""
+"""The arguments of all commands. Loads the code of none, so that the others do not wait for it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn, TypeAlias
 
 import rotor_mbs
+from rotor_mbs.errors import nearest
 
 _SCENE, _SCENES = "a name (paper/fig05) or a TOML file", "a name (paper/fig05), a folder (paper), a TOML file"
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv", "sympy", "iftomm")
@@ -34,14 +35,21 @@ _Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """The arguments, with `command` set to the function that carries them out. Ends with status 2 on bad usage."""
-    return _parser().parse_args(argv)
+    parser, commands = _parser()
+    if argv and not argv[0].startswith("-") and argv[0] not in commands.choices:
+        known = ", ".join(commands.choices)
+        parser.error(f"no command {argv[0]!r}{nearest(argv[0], commands.choices)}; allowed: {known}")
+    return parser.parse_args(argv or ["--help"])
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> tuple[_Parser, _Commands]:
     parser = _Parser(
         prog="rotor-mbs",
         description="Scenes of a rotor by independent models, compared with each other and with a published paper.",
-        epilog="exit status: 0 all well; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
+        epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run paper/fig11\n"
+        "rotor-mbs COMMAND --help tells the options of a command and has an example.\n"
+        "exit status: 0 all well; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"rotor-mbs {rotor_mbs.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -59,30 +67,41 @@ def _parser() -> argparse.ArgumentParser:
         _add_export,
     ):
         add(commands)
-    return parser
+    return parser, commands
 
 
 def _add_list_and_show(commands: _Commands) -> None:
-    listing = _command(commands, "list", "the scenes, a line each", "scenes:list_all")
+    listing = _command(commands, "list", "scenes, sweeps and methods, a line each", "scenes:list_all", "", "--json")
     listing.add_argument("--json", action="store_true", help="as JSON, for a script")
 
-    show = _command(commands, "show", "one scene: its data and its methods", "scenes:show")
-    show.add_argument("scene", metavar="SCENE", help=_SCENE)
+    show = _command(
+        commands, "show", "one scene: its data and its methods; or one method: its settings", "scenes:show",
+        "paper/fig11", "paper/fig11 --build",
+    )  # fmt: skip
+    show.add_argument("scene", metavar="SCENE", help=f"{_SCENE}; or a method (lagrange/taylor)")
     show.add_argument("--build", action="store_true", help="also the items that each model builds")
     show.add_argument("--json", action="store_true", help="as JSON, for a script")
 
-    new = _command(commands, "new", "a commented scene file to start from", "scenes:new")
+    new = _command(commands, "new", "a commented scene file to start from", "scenes:new", "my.toml")
     new.add_argument("file", type=_file, metavar="FILE", help="a TOML file that does not exist yet")
 
 
 def _add_runs(commands: _Commands) -> None:
     reproduce = _command(
-        commands, "reproduce", "every scene of the paper by every model, and the report", "runs:reproduce"
+        commands,
+        "reproduce",
+        "every scene of the paper by every model, and the report",
+        "runs:reproduce",
+        "",
+        "-o out -j 4",
     )
     reproduce.add_argument("-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help=_default("DIR"))
     _add_pool_options(reproduce)
 
-    run = _command(commands, "run", "scenes by methods, into one results file", "runs:run")
+    run = _command(
+        commands, "run", "scenes by methods, into one results file", "runs:run",
+        "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
+    )  # fmt: skip
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     _add_methods(run)
     run.add_argument(
@@ -94,7 +113,10 @@ def _add_runs(commands: _Commands) -> None:
 
 
 def _add_bench(commands: _Commands) -> None:
-    bench = _command(commands, "bench", "error against run time, method by method", "bench:bench")
+    bench = _command(
+        commands, "bench", "error against run time, method by method", "bench:bench",
+        "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
+    )  # fmt: skip
     bench.add_argument("scenes", nargs="*", metavar="SCENE", help=_SCENES)
     _add_methods(bench)
     bench.add_argument("-o", "--output", type=_file, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
@@ -111,7 +133,11 @@ def _add_bench(commands: _Commands) -> None:
 
 def _add_reference(commands: _Commands) -> None:
     reference = _command(
-        commands, "reference", "quad precision references, computed anew, as they are frozen", "runs:reference"
+        commands,
+        "reference",
+        "quad precision references, computed anew, as they are frozen",
+        "runs:reference",
+        "paper/fig08 -o reference.h5",
     )
     reference.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     reference.add_argument("-o", "--output", type=_file, required=True, metavar="FILE")
@@ -119,7 +145,10 @@ def _add_reference(commands: _Commands) -> None:
 
 
 def _add_check(commands: _Commands) -> None:
-    check = _command(commands, "check", "accuracy verdicts; exit status 1 where one fails", "check:check")
+    check = _command(
+        commands, "check", "accuracy verdicts; exit status 1 where one fails", "check:check",
+        "", "rotor-mbs-out/results.h5 --junit check.xml",
+    )  # fmt: skip
     check.add_argument(
         "file", nargs="?", type=Path, metavar="FILE", help="a results file (default: a quick set, computed)"
     )
@@ -139,7 +168,7 @@ def _add_check(commands: _Commands) -> None:
 def _add_stability(commands: _Commands) -> None:
     stability = _command(
         commands, "stability", "stiff and extreme scenes by every method: where each holds, and the map of it",
-        "stability:stability",
+        "stability:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
     stability.add_argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)")
     stability.add_argument(
@@ -152,7 +181,7 @@ def _add_stability(commands: _Commands) -> None:
 def _add_modes(commands: _Commands) -> None:
     modes = _command(
         commands, "modes", "natural frequencies at rest and over rotor speed, multipliers of a turn under gravity",
-        "modes:modes",
+        "modes:modes", "stiff/nrel-5mw --speeds 0:3:31",
     )  # fmt: skip
     modes.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     modes.add_argument(
@@ -172,7 +201,7 @@ def _add_modes(commands: _Commands) -> None:
 def _add_claims(commands: _Commands) -> None:
     claims = _command(
         commands, "claims", "the paper's claims in words as shares of many runs, its numbers under other conditions",
-        "claims:claims",
+        "claims:claims", "--runs 20",
     )  # fmt: skip
     claims.add_argument("-o", "--output", type=_file, default=Path("claims.h5"), metavar="FILE", help=_default("FILE"))
     claims.add_argument(
@@ -190,19 +219,26 @@ def _add_claims(commands: _Commands) -> None:
 
 
 def _add_report(commands: _Commands) -> None:
-    report = _command(commands, "report", "HTML pages from a results file", "reports:report")
+    report = _command(commands, "report", "HTML pages from a results file", "reports:report", "my.h5")
     report.add_argument("file", type=Path, metavar="FILE", help="a results file")
     report.add_argument("-o", "--output", type=Path, default=Path("report"), metavar="DIR", help=_default("DIR"))
 
     figures = _command(
-        commands, "figures", "the paper's figures as files for a manuscript, from a results file", "reports:figures"
+        commands,
+        "figures",
+        "the paper's figures as files for a manuscript, from a results file",
+        "reports:figures",
+        "--format svg --figure 11",
     )
     figures.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help=_default("DIR"))
     figures.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
     figures.add_argument("--figure", action="append", metavar="N", help="this one alone; may be repeated")
     _add_results(figures)
 
-    animate = _command(commands, "animate", "a scene moving, from a results file", "reports:animate")
+    animate = _command(
+        commands, "animate", "a scene moving, from a results file", "reports:animate",
+        "paper/fig11 -o fig11.webp",
+    )  # fmt: skip
     animate.add_argument("scene", metavar="SCENE", help="its name in the results file")
     animate.add_argument(
         "-o", "--output", type=_file, required=True, metavar="FILE",
@@ -227,7 +263,10 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_sweep(commands: _Commands) -> None:
-    sweep = _command(commands, "sweep", "a parameter study into one dataset", "sweep:sweep")
+    sweep = _command(
+        commands, "sweep", "a parameter study into one dataset", "sweep:sweep",
+        "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
+    )  # fmt: skip
     sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
     _add_methods(sweep, "in place of the file's")
     sweep.add_argument("-o", "--output", type=_file, metavar="FILE", help="(default: the sweep's name with .h5)")
@@ -274,7 +313,10 @@ def _setting(text: str) -> tuple[str, object]:
 
 
 def _add_export(commands: _Commands) -> None:
-    export = _command(commands, "export", "a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark", "export:write")
+    export = _command(
+        commands, "export", "a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark", "export:write",
+        "paper/fig11 --to mjcf", "my.toml --to csv -o my.csv",
+    )  # fmt: skip
     export.add_argument("scene", metavar="SCENE", help=_SCENE)
     export.add_argument(
         "--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT",
@@ -298,8 +340,12 @@ def _default(metavar: str) -> str:
     return f"{metavar} (default: %(default)s)"
 
 
-def _command(commands: _Commands, name: str, text: str, target: str) -> argparse.ArgumentParser:
-    parser = commands.add_parser(name, help=text, description=text)
+def _command(commands: _Commands, name: str, text: str, target: str, *examples: str) -> argparse.ArgumentParser:
+    shown = "".join(f"\n  rotor-mbs {name} {one}".rstrip() for one in examples)
+    parser = commands.add_parser(
+        name, help=text, description=text, epilog=f"example:{shown}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
     parser.set_defaults(command=_late(target))
     return parser
 

@@ -1,4 +1,4 @@
-"""`list`, `show` and `new`: the scenes, what each model would build for one, and a file for one of your own."""
+"""`list`, `show` and `new`: what there is, what each model would build for a scene, and a file for one of your own."""
 
 from __future__ import annotations
 
@@ -8,22 +8,34 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps
 from rotor_mbs.scenario.scene import Scene, scene_fields
 
 if TYPE_CHECKING:  # numpy behind it is too heavy for `list`
-    from rotor_mbs.methods.base import BuiltItem
+    from rotor_mbs.methods.base import BuiltItem, Method
 
 
 def list_all(arguments: argparse.Namespace) -> int:
-    """Name and title of every shipped scene."""
-    scenes = list_scenes()
+    """Name and title of every shipped scene and sweep, name and label of every method."""
+    from rotor_mbs.methods.catalogue import methods
+
+    found: dict[str, list[tuple[str, str]]] = {}
+    for name, title in list_scenes():
+        found.setdefault(f"scenes: {name.partition('/')[0]}", []).append((name, title))
+    found["sweeps"] = list_sweeps()
+    found["methods"] = [(method.name, method.label) for method in methods()]
     if arguments.json:
-        print(json.dumps([{"name": name, "title": title} for name, title in scenes], ensure_ascii=False))
+        rows = [
+            {"name": name, "title": title, "kind": heading.partition(":")[0].removesuffix("s")}
+            for heading, entries in found.items()
+            for name, title in entries
+        ]
+        print(json.dumps(rows, ensure_ascii=False))
         return 0
-    width = max((len(name) for name, _ in scenes), default=0)
-    for name, title in scenes:
-        print(f"{name:{width}}  {title}")
+    width = max(len(name) for entries in found.values() for name, _ in entries)
+    for heading, entries in found.items():
+        print(heading, *(f"  {name:{width}}  {title}" for name, title in entries), "", sep="\n")
+    print("next: rotor-mbs show NAME; rotor-mbs run SCENE [-m METHOD]; rotor-mbs sweep SWEEP; rotor-mbs new FILE.toml")
     return 0
 
 
@@ -41,7 +53,13 @@ def new(arguments: argparse.Namespace) -> int:
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """One scene's data and the methods of each model; with --build its items."""
+    """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
+    from rotor_mbs.methods.catalogue import look_up
+
+    method = look_up(arguments.scene)
+    if method is not None:
+        print(f"{method.name}: {method.label}\n", *_settings_lines(method), sep="\n")
+        return 0
     found = find_scenes([arguments.scene])
     if len(found) != 1:
         raise InputError(f"{arguments.scene}: {len(found)} scenes; allowed: one scene's name or file")
@@ -53,16 +71,23 @@ def show(arguments: argparse.Namespace) -> int:
         return 0
     print(f"{scene.name}: {scene.title}\n")
     for key, value in _data(scene).items():
-        print(f"  {key:26} {_readable(value)}")
+        if isinstance(value, dict):
+            print(f"  {key}", *(f"    {part:24} {_readable(number)}" for part, number in value.items()), sep="\n")
+        else:
+            print(f"  {key:26} {_readable(value)}")
+    print("\nmethods" + (", and the items that each model builds" if arguments.build else ""))
     for model in models:
-        print(f"\n{model.name}  ({', '.join(model.methods)})")
-        if model.refused:
-            print(f"  cannot represent this scene: {model.refused}")
-        if model.is_linearized:
-            print("  linearized by rotor-mbs modes")
+        print(f"  {model.line}")
         for item in model.items if arguments.build else ():
-            print(f"  {item.kind:9} {item.name:28} {item.detail}".rstrip())
+            print(f"    {item.kind:9} {item.name:28} {item.detail}".rstrip())
     return 0
+
+
+def _settings_lines(method: Method) -> list[str]:
+    """A line for each setting: name, default, what is allowed, what it does."""
+    allowed, defaults = method.settings.allowed(), method.defaults
+    lines = [f"  {name:26} {defaults[name]!s:>16}  {one}; {one.doc}".rstrip("; ") for name, one in allowed.items()]
+    return [*lines, "", f"set one: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE"] if lines else ["no settings"]
 
 
 def _data(scene: Scene) -> dict[str, object]:
@@ -98,6 +123,15 @@ class _Model:
     items: list[BuiltItem] = field(default_factory=list)
     refused: str = ""
     is_linearized: bool = False
+
+    @property
+    def line(self) -> str:
+        """ "lagrange/taylor, /ode45, ...", and what else there is to know."""
+        first, *others = self.methods
+        names = ", ".join([first, *(name.removeprefix(self.name) for name in others)])
+        if self.refused:
+            return f"{names}  (cannot represent this scene: {self.refused})"
+        return names + ("  (linearized by `rotor-mbs modes`)" if self.is_linearized else "")
 
 
 def _models(scene: Scene) -> list[_Model]:

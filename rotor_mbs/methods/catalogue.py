@@ -5,14 +5,13 @@ A model's code is imported when one of its methods is first asked for; its engin
 
 from __future__ import annotations
 
-import difflib
 import functools
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module, metadata
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.ladders import Ladder, Look
 
@@ -71,8 +70,7 @@ def check_names(names: Sequence[str]) -> tuple[str, ...]:
 
 def _unknown(name: str) -> str:
     known = method_names()
-    near = difflib.get_close_matches(name, known, 1, 0.0)
-    return f"unknown method {name!r}; nearest: {', '.join(near)}; allowed: {', '.join(known)}"
+    return f"unknown method {name!r}{nearest(name, known)}; allowed: {', '.join(known)}"
 
 
 def is_corrected(name: str) -> bool:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from numbers import Real
 from typing import Any, Self
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, nearest
 
 
 @dataclass(frozen=True)
@@ -105,8 +104,7 @@ class Settings:
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
             if name not in known:
-                near = difflib.get_close_matches(name, known, 1, 0.3)
-                problems.append(f"no setting {name!r}" + (f" (nearest: {near[0]})" if near else ""))
+                problems.append(f"no setting {name!r}{nearest(name, known)}")
                 continue
             try:
                 values[name] = known[name].convert(value)

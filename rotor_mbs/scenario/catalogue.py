@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rotor_mbs.errors import InputError, RotorError
+from rotor_mbs.errors import InputError, RotorError, nearest
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
@@ -71,6 +70,12 @@ class _File(NamedTuple):
 def list_scenes() -> list[tuple[str, str]]:
     """(name, title) of every shipped scene; the title of a broken file says that it is broken."""
     return [(name, _title(path)) for name, path in _shipped().items()]
+
+
+def list_sweeps() -> list[tuple[str, str]]:
+    """The same of every shipped sweep."""
+    paths = sorted(sweeps_folder().glob("*.toml"), key=lambda path: natural_key(path.name))
+    return [(f"{sweeps_folder().name}/{path.stem}", _title(path)) for path in paths]
 
 
 def find_scenes(arguments: Sequence[str]) -> list[Scene]:
@@ -144,8 +149,7 @@ def _unknown_argument(argument: str, is_there: bool, shipped: Iterable[str]) -> 
     if not _NAME.fullmatch(argument):
         return f"is neither a scene's name nor a TOML file; allowed: pieces {_NAME_RULE}, joined by /"
     names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
-    near = difflib.get_close_matches(argument, sorted(names), n=3, cutoff=0.5)
-    return "no such scene; " + (f"near: {', '.join(near)}" if near else "allowed: what `rotor-mbs list` names")
+    return f"no such scene{nearest(argument, natural_order(names))}; allowed: what `rotor-mbs list` names, or FILE.toml"
 
 
 def _file(path: Path) -> _File:

@@ -11,9 +11,10 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
+from rotor_mbs.errors import nearest
 from rotor_mbs.scenario import scene
 from rotor_mbs.scenario.accuracy_bounds import CHECKS
-from rotor_mbs.scenario.validation import Line, NotNegative, Number, PerBlade, Table, Text, Vector, invalid, nearest
+from rotor_mbs.scenario.validation import Line, NotNegative, Number, PerBlade, Table, Text, Vector, invalid
 
 MAX_BLADES = 10_000
 MAX_SAMPLES = 10_000_000

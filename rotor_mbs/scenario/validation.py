@@ -6,7 +6,6 @@ Importing this module costs 0.1 s (pydantic): it is imported only when a file is
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 import unicodedata
@@ -16,7 +15,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.scenario.expression import ALLOWED, ExpressionError, evaluate
 from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError, find_lines, line_of
 
@@ -73,12 +72,6 @@ def validate_file(model: type[M], tables: Mapping[str, Any], text: str, source: 
 def invalid(wrong: str, allowed: str | None = None) -> PydanticCustomError:
     """An error of a validator: `{shown}` stands for the value; `allowed` defaults to the field's description."""
     return PydanticCustomError("invalid", "{wrong}", {"wrong": wrong, "allowed": allowed})
-
-
-def nearest(name: str, names: list[str]) -> str:
-    """', perhaps NAME' with the most similar one of `names`, or ''."""
-    near = difflib.get_close_matches(name[:40], names, n=1)
-    return f", perhaps {near[0]}" if near else ""
 
 
 def _double(value: object) -> float:

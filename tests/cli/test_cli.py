@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from rotor_mbs.cli.arguments import parse
 from rotor_mbs.store.read import open_results
 
 RUN = [sys.executable, "-m", "rotor_mbs"]
@@ -61,7 +66,38 @@ def test_list_and_show(tmp_path: Path) -> None:
     assert "rotor torque" in shown.stdout
     assert "exudyn_chain" in shown.stdout
     assert "rotor torque" not in rotor_mbs("show", "paper/fig05", "--build", cwd=tmp_path).stdout
-    assert "(exudyn_chain/generalized_alpha" in rotor_mbs("show", "paper/fig05", cwd=tmp_path).stdout
+
+
+def test_list_has_headings_for_scenes_sweeps_and_methods(tmp_path: Path) -> None:
+    text = rotor_mbs("list", cwd=tmp_path).stdout
+    headings = [line for line in text.splitlines() if line and not line.startswith(" ")]
+    assert headings[:-1] == ["scenes: check", "scenes: extreme", "scenes: paper", "scenes: stiff", "sweeps", "methods"]
+    assert "  sweeps/fig11-spread" in text
+    assert "  lagrange/taylor" in text
+    rows = json.loads(rotor_mbs("list", "--json", cwd=tmp_path).stdout)
+    assert {row["kind"] for row in rows} == {"scene", "sweep", "method"}
+
+
+@pytest.mark.parametrize("scene", ["paper/fig11", "paper/fig15-1kNm", "stiff/nrel-5mw-damped"])
+def test_what_show_prints_fits_a_screen(scene: str, tmp_path: Path) -> None:
+    assert len(rotor_mbs("show", scene, cwd=tmp_path).stdout.splitlines()) <= 30
+
+
+def test_show_tells_the_settings_of_a_method(tmp_path: Path) -> None:
+    text = rotor_mbs("show", "exudyn_tree/rk67", cwd=tmp_path).stdout
+    assert "step" in text
+    assert "a number above 0, in s" in text
+
+
+def test_every_help_has_an_example(tmp_path: Path) -> None:
+    text = rotor_mbs(cwd=tmp_path).stdout  # without a command: the help
+    assert "start with:" in text
+    commands = re.findall(r"^    ([a-z]+)  ", text, re.MULTILINE)
+    assert len(commands) > 10
+    for command in commands:
+        with contextlib.redirect_stdout(io.StringIO()) as printed, pytest.raises(SystemExit):
+            parse([command, "--help"])
+        assert f"example:\n  rotor-mbs {command}" in printed.getvalue()
 
 
 def test_a_new_scene_file_runs_and_replaces_no_other(tmp_path: Path) -> None:
@@ -186,10 +222,10 @@ def test_a_run_without_a_single_finite_sample_is_stored_as_what_it_is(tmp_path: 
         (["show", "paper"], "one scene"),
         (["report", "missing.h5"], "no such file"),
         (["report", "."], "is a folder"),
-        (["frobnicate"], "invalid choice"),
+        (["frobnicate"], "no command 'frobnicate'; allowed: list"),
+        (["reprodcue"], "perhaps reproduce"),
         (["bench", "--budget", "0"], "allowed: seconds, more than 0"),
         (["bench", "--no-such-option"], "--no-such-option"),
-        ([], "required"),
     ],
 )
 def test_bad_usage_ends_with_2_and_one_clear_line(arguments: list[str], says: str, tmp_path: Path) -> None:

@@ -60,13 +60,19 @@ def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    ("name", "nearest"), [("lagrange/tailor", "lagrange/taylor"), ("exudyn/rk67", "exudyn_tree/rk67"), ("foo/bar", "")]
+    ("name", "nearest"),
+    [
+        ("lagrange/tailor", ", perhaps lagrange/taylor;"),
+        ("exudyn/rk67", ", perhaps exudyn_tree/rk67;"),
+        ("rk67", ", perhaps exudyn_tree/rk67;"),
+        ("foo/bar", ";"),  # none is near
+    ],
 )
 def test_an_unknown_name_is_refused_with_the_nearest_one(name: str, nearest: str) -> None:
     with pytest.raises(InputError) as caught:
         find_method(name)
     (line,) = caught.value.problems
-    assert line.startswith(f"unknown method {name!r}; nearest: {nearest}")
+    assert line.startswith(f"unknown method {name!r}{nearest} allowed: ")
     assert line.endswith("allowed: " + ", ".join(method.name for method in methods()))
     with pytest.raises(InputError, match="unknown method 'reference'"):
         catalogue.check_names(["reference"])  # it is computed for every scene, and not asked for by name

@@ -65,7 +65,7 @@ def test_the_range_of_scipys_tolerance_starts_where_scipy_would_change_it() -> N
 
 def test_nothing_runs_with_a_refused_setting() -> None:
     (scene,) = find_scenes(["paper/fig03"])
-    with pytest.raises(InputError, match="nearest: tolerance"):
+    with pytest.raises(InputError, match="perhaps tolerance"):
         solve("lagrange/taylor", scene, {"tolerence": 1e-3})
 
 
@@ -84,7 +84,7 @@ def test_numbers_are_converted_to_the_declared_type() -> None:
     with pytest.raises(InputError) as caught:
         Own.of("own", {"stages": 3.5, "scheme": "c", "steps": 1.0})
     assert str(caught.value) == (
-        "own: stages = 3.5 is not allowed; scheme = 'c' is not allowed; no setting 'steps' (nearest: step); allowed: "
+        "own: stages = 3.5 is not allowed; scheme = 'c' is not allowed; no setting 'steps', perhaps step; allowed: "
         "stages (a whole number at least 1 and at most 8; default 4), step (a number above 0, in s; default 0.1), "
         "scheme (a or b; default a)"
     )

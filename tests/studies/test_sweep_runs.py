@@ -308,7 +308,7 @@ def test_bad_usage_is_one_line_and_status_2_within_ten_seconds(tmp_path: Path, m
     [
         (
             'methods = ["lagrange/tailor"]',
-            "s.toml:1: methods: unknown method 'lagrange/tailor'; nearest: lagrange/taylor; allowed: printed/ode45, ",
+            "s.toml:1: methods: unknown method 'lagrange/tailor', perhaps lagrange/taylor; allowed: printed/ode45, ",
         ),
         (
             'methods = ["lagrange/taylor"]\nsettings = { tolerence = 1e-15 }',
