@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.rotors import make_scene
-from support.scenes import general
+from support.scenes import general, paper
 
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import loads as closed_form_loads
+from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.quantities import longest_arm
 
 LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment")
 OUTPUTS = ("angles", "rates", "energy", "loads")
-METHODS = ("lagrange/dop853", "reference")
+# What a load may be off by, N or N m, where the largest are some 1e4: round-off; the chain's steps beside.
+METHODS = {
+    "lagrange/dop853": 1e-9,
+    "reference": 1e-9,
+    "exudyn_tree/rk67": 1e-8,
+    "mujoco/rk4": 1e-8,
+    "exudyn_chain/newmark_index2": 5e-2,
+}
 
 # Of full inertia about principal axes, the centre of mass on the pitch axis: what it weighs and how it turns is plain.
 MASS, ARM, GRAVITY = 200.0, 6.0, 9.81
@@ -30,23 +44,29 @@ def beam(angles: tuple[float, ...], rates: tuple[float, ...], **changes) -> Scen
 
 @pytest.fixture(params=METHODS)
 def method(request: pytest.FixtureRequest) -> str:
+    if request.param == "mujoco/rk4":
+        pytest.importorskip("mujoco")
     return request.param
 
 
-def loads(method: str, scene: Scene):
-    run = solve(method, scene, {}).trajectory
+def loads(method: str, scene: Scene, **settings: object):
+    run = solve(method, scene, settings).trajectory
     assert len(run.time) == scene.samples
     return run
+
+
+def off(found, expected) -> float:
+    return float(np.abs(found - np.asarray(expected)).max())
 
 
 def test_hanging_blade_pulls_with_its_weight(method: str) -> None:
     """Straight down its own z axis points down: the hub pulls it up, along -z, and no moment acts."""
     run = loads(method, beam((math.pi, 0.0), (0.0, 0.0)))
     weight = MASS * GRAVITY
-    assert np.abs(run.blade_root_force[:, 0] - [0.0, 0.0, -weight]).max() < 1e-9
-    assert np.abs(run.blade_root_moment).max() < 1e-9
-    assert np.abs(run.shaft_force - [0.0, 0.0, weight]).max() < 1e-9
-    assert np.abs(run.shaft_moment).max() < 1e-9
+    assert off(run.blade_root_force[:, 0], [0.0, 0.0, -weight]) < METHODS[method]
+    assert off(run.blade_root_moment, 0.0) < METHODS[method]
+    assert off(run.shaft_force, [0.0, 0.0, weight]) < METHODS[method]
+    assert off(run.shaft_moment, 0.0) < METHODS[method]
 
 
 def test_horizontal_blade_at_the_moment_of_its_release(method: str) -> None:
@@ -54,23 +74,23 @@ def test_horizontal_blade_at_the_moment_of_its_release(method: str) -> None:
     run = loads(method, beam((math.pi / 2, 0.0), (0.0, 0.0)))
     about_shaft = MOMENTS[1] + MASS * ARM**2
     rest = MASS * GRAVITY * (1.0 - MASS * ARM**2 / about_shaft)
-    assert np.abs(run.shaft_force[0] - [0.0, 0.0, rest]).max() < 1e-9
+    assert off(run.shaft_force[0], [0.0, 0.0, rest]) < METHODS[method]
     # The blade's x axis points down there.
-    assert np.abs(run.blade_root_force[0, 0] - [-rest, 0.0, 0.0]).max() < 1e-9
-    assert np.abs(run.shaft_moment).max() < 1e-8
+    assert off(run.blade_root_force[0, 0], [-rest, 0.0, 0.0]) < METHODS[method]
+    assert off(run.shaft_moment, 0.0) < METHODS[method]
 
 
 def test_centrifugal_force_of_a_turning_rotor(method: str) -> None:
     """Without gravity every root pulls inwards with m l Ω²; two blades that balance leave nothing for the shaft."""
     speed = 3.0
     run = loads(method, beam((0.3, 0.0, 0.0), (speed, 0.0, 0.0), gravity=0.0))
-    assert np.abs(run.blade_root_force - [0.0, 0.0, -MASS * ARM * speed**2]).max() < 1e-9
-    assert np.abs(run.blade_root_moment).max() < 1e-9
-    assert np.abs(run.shaft_force).max() < 1e-9
+    assert off(run.blade_root_force, [0.0, 0.0, -MASS * ARM * speed**2]) < METHODS[method]
+    assert off(run.blade_root_moment, 0.0) < METHODS[method]
+    assert off(run.shaft_force, 0.0) < METHODS[method]
     one = loads(method, beam((0.3, 0.0), (speed, 0.0), gravity=0.0))
     angle = one.angles[:, 0]
     inwards = -np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=1)
-    assert np.abs(one.shaft_force - MASS * ARM * speed**2 * inwards).max() < 1e-9
+    assert off(one.shaft_force, MASS * ARM * speed**2 * inwards) < METHODS[method]
 
 
 def test_gyroscopic_moment_of_a_pitching_blade(method: str) -> None:
@@ -85,11 +105,22 @@ def test_gyroscopic_moment_of_a_pitching_blade(method: str) -> None:
     scene = make_scene((0.0, 0.4), (speed, rate), (blade,), gravity=0.0, duration=0.2, samples=21, outputs=OUTPUTS)
     run = loads(method, scene)
     pitch, azimuth = run.angles[:, 1], run.angles[:, 0]
-    assert np.abs(run.rates - [speed, rate]).max() < 1e-12
+    assert off(run.rates, [speed, rate]) < 1e-6
     in_blade = C * speed * rate * np.stack([np.cos(pitch), -np.sin(pitch), np.zeros_like(pitch)], axis=1)
     in_base = C * speed * rate * np.stack([np.cos(azimuth), np.zeros_like(pitch), -np.sin(azimuth)], axis=1)
-    assert np.abs(run.blade_root_moment[:, 0] - in_blade).max() < 1e-9
-    assert np.abs(run.shaft_moment - in_base).max() < 1e-9
+    assert off(run.blade_root_moment[:, 0], in_blade) < METHODS[method]
+    assert off(run.shaft_moment, in_base) < METHODS[method]
+
+
+# Three unlike blades of full inertia on springs and dampers, and a torque that grows.
+DRIVEN = general(
+    outputs=OUTPUTS,
+    duration=0.4,
+    samples=401,
+    bearing_damping=(200.0, 300.0, 100.0),
+    shaft_damping=4000.0,
+    rotor_torque=((0.0, 20000.0), (1.0, 30000.0)),
+)
 
 
 def test_roots_and_hub_add_up_to_the_shaft(method: str) -> None:
@@ -97,30 +128,35 @@ def test_roots_and_hub_add_up_to_the_shaft(method: str) -> None:
 
     dΩ/dt from the stored rates, by differences of the sixth order.
     """
-    scene = general(outputs=OUTPUTS, duration=0.5, samples=501)
+    scene = DRIVEN
     run = loads(method, scene)
     force, moment = np.zeros((2, scene.samples, 3))
     for i, phase in enumerate(scene.phases):
         frames = rotations(run.angles[:, 0] + phase, run.angles[:, 1 + i])
         force += np.einsum("nij,nj->ni", frames, run.blade_root_force[:, i])
         moment += np.einsum("nij,nj->ni", frames, run.blade_root_moment[:, i])
-    assert np.abs(run.shaft_force - force).max() < 1e-12 * np.abs(force).max()
+    # The chain's joints gape and its rates are those of its steps: of second order.
+    allowed = 1e-5 if method.startswith("exudyn_chain") else 1e-9
+    assert off(run.shaft_force, force) < max(1e-2 * allowed, 1e-12) * np.abs(force).max()
     weights = (-1 / 60, 3 / 20, -3 / 4, 0.0, 3 / 4, -3 / 20, 1 / 60)
     spin = run.rates[:, 0]
     change = sum(w * spin[k : len(spin) - 6 + k] for k, w in enumerate(weights)) / (run.time[1] - run.time[0])
     torque = np.array([scene.torque_at(t) for t in run.time])
     moment[3:-3, 1] += scene.hub_inertia * change - torque[3:-3]
-    off = np.abs(run.shaft_moment - moment)[3:-3].max()
-    assert off < 1e-9 * np.abs(moment).max()
-    assert np.abs(run.shaft_moment[:, 1] + scene.shaft_damping * spin).max() < 1e-12 * np.abs(moment).max()
+    assert off(run.shaft_moment[3:-3], moment[3:-3]) < allowed * np.abs(moment).max()
+    assert off(run.shaft_moment[:, 1], -scene.shaft_damping * spin) < max(1e-2 * allowed, 1e-12) * np.abs(moment).max()
 
 
 def test_actuator_moment_is_the_moment_about_the_pitch_axis(method: str) -> None:
     """Spring and damper are all that turns a blade about its own axis: Euler's law must give their moment."""
-    run = loads(method, general(outputs=OUTPUTS, duration=0.5, samples=51))
+    scene = DRIVEN
+    run = loads(method, scene)
     scale = np.abs(run.blade_root_moment).max()
-    assert np.abs(run.pitch_actuator_moment).max() > 1e-3 * scale
-    assert np.abs(run.blade_root_moment[:, :, 2] - run.pitch_actuator_moment).max() < 1e-12 * scale
+    law = -run.angles[:, 1:] * scene.bearing_stiffness - run.rates[:, 1:] * scene.bearing_damping
+    assert np.abs(law).max() > 1e-2 * scale
+    allowed = 1e-7 if method.startswith("exudyn_chain") else 1e-12
+    assert off(run.pitch_actuator_moment, law) < allowed * scale
+    assert off(run.blade_root_moment[:, :, 2], law) < allowed * scale
 
 
 def rotations(azimuth, pitch):
@@ -131,11 +167,136 @@ def rotations(azimuth, pitch):
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def test_asking_for_loads_changes_nothing_else() -> None:
-    scene = general(duration=0.5, samples=51)
-    plain = solve("lagrange/taylor", scene, {}).trajectory
-    asked = solve("lagrange/taylor", replace(scene, outputs=(*scene.outputs, "loads")), {}).trajectory
+# The chain against the closed form.
+
+STEPS = (2e-3, 1e-3, 5e-4)  # s
+TIGHT = {"newton_relative_tolerance": 1e-12, "newton_absolute_tolerance": 1e-12}
+SHORT = {"duration": 0.4, "samples": 21, "outputs": ("angles", "rates", "loads")}
+NREL = replace(
+    find_scenes(["stiff/nrel-5mw-damped"])[0],
+    **SHORT,
+    rotor_torque=((0.0, 2e5), (1.0, 4e6)),
+    bearing_stiffness=(1e7,) * 3,
+    bearing_damping=(1e5,) * 3,
+)
+AGREEING = {
+    "fig08": paper("fig08", **{**SHORT, "duration": 1.6}),
+    "fig09": paper("fig09", **SHORT),
+    "full inertia": replace(DRIVEN, **SHORT),
+    "NREL 5 MW": NREL,
+}
+
+
+@functools.cache
+def chain_loads(name: str, step: float) -> dict[str, np.ndarray]:
+    run = loads("exudyn_chain/newmark_index2", AGREEING[name], step=step, **TIGHT)
+    return {load: run.get(load) for load in LOADS}
+
+
+def load_error(scene: Scene, found: dict[str, np.ndarray], exact) -> float:
+    """Of the largest force at a root; moments of that force at the longest arm."""
+    force = np.linalg.norm(exact.blade_root_force, axis=-1).max()
+    return max(
+        off(found[name], exact.get(name)) / (force * (1.0 if "force" in name else longest_arm(scene))) for name in LOADS
+    )
+
+
+@pytest.mark.parametrize("name", AGREEING)
+def test_chain_and_closed_form_agree_at_second_order_and_after_extrapolation(name: str) -> None:
+    """Multipliers against Newton and Euler: errors a quarter at half the step; 1e-6 of the largest load extrapolated.
+
+    Seen: ratios 3.94 to 4.01, extrapolated 2e-14 to 1.3e-7.
+    """
+    scene = AGREEING[name]
+    exact = loads("lagrange/dop853", scene)
+    # fig08 moves slowly: at the shorter steps its errors, 1e-11, are those of Newton's iteration.
+    coarse, middle, fine = (chain_loads(name, step * (4.0 if name == "fig08" else 1.0)) for step in STEPS)
+    errors = [load_error(scene, found, exact) for found in (coarse, middle, fine)]
+    for larger, smaller in itertools.pairwise(errors):
+        assert larger / smaller == pytest.approx(4.0, abs=0.2)
+    twice = {
+        load: (64.0 * fine[load] - 20.0 * middle[load] + coarse[load]) / 45.0  # Richardson, error terms h² and h⁴
+        for load in LOADS
+    }
+    assert load_error(scene, twice, exact) < 1e-6
+
+
+@pytest.mark.parametrize("fault", ["missing Coriolis", "wrong lever"])
+def test_a_planted_error_is_noticed(monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
+    """The agreement is no accident: without the Coriolis acceleration, or with a lever off by 1e-5, it is lost."""
+    scene, right = AGREEING["full inertia"], closed_form_loads.root_load
+
+    def wrong(body, azimuth, pitch, turning, gravity):
+        spin, rate, spin_rate, rate_rate = turning
+        if fault == "wrong lever":
+            x, y, z = body.centre
+            return right(replace(body, centre=(x, y, z * (1.0 + 1e-5))), azimuth, pitch, turning, gravity)
+        # The terms in Ω θ̇: half the difference of the loads at θ̇ and at -θ̇.
+        force, moment = right(body, azimuth, pitch, turning, gravity)
+        back = right(body, azimuth, pitch, (spin, -rate, spin_rate, rate_rate), gravity)
+        return tuple(
+            tuple(0.5 * (a + b) for a, b in zip(*pair, strict=True)) for pair in zip((force, moment), back, strict=True)
+        )
+
+    monkeypatch.setattr(closed_form_loads, "root_load", wrong)
+    exact = loads("lagrange/dop853", scene)
+    extrapolated = {
+        load: (4.0 * chain_loads("full inertia", STEPS[2])[load] - chain_loads("full inertia", STEPS[1])[load]) / 3.0
+        for load in LOADS
+    }
+    assert load_error(scene, extrapolated, exact) > 1e-6
+
+
+# The printed model.
+
+
+def test_printed_loads_are_what_its_own_motion_needs() -> None:
+    """m (a + g e_z) of every mass, a by differences of its places; moments about the shaft and the pitch axes remain.
+
+    No part of the rotor can transmit those: they are what the errata add to the equations.
+    """
+    scene = paper("fig11", duration=1.0, samples=201, outputs=OUTPUTS)
+    run = loads("printed/ode45", scene, relative_tolerance=1e-12, absolute_tolerance=1e-14)
+    blade, h = scene.blades[0], run.time[1] - run.time[0]
+    weights = np.array([2, -27, 270, -490, 270, -27, 2]) / 180.0  # of a second derivative, sixth order
+    for i, phase in enumerate(scene.phases):
+        frames = rotations(run.angles[:, 0] + phase, run.angles[:, 1 + i])
+        place = frames @ np.array(blade.centre_of_mass)
+        acceleration = sum(w * place[k : len(place) - 6 + k] for k, w in enumerate(weights)) / h**2
+        force = blade.mass * (acceleration + np.array([0.0, 0.0, scene.gravity]))
+        found = np.einsum("nij,nj->ni", frames, run.blade_root_force[:, i])[3:-3]
+        assert off(found, force) < 1e-6 * np.abs(force).max()
+        assert off(np.cross(blade.centre_of_mass, run.blade_root_force[:, i]), run.blade_root_moment[:, i]) < 1e-6
+    assert np.abs(run.pitch_actuator_moment).max() > 100.0
+    assert np.abs(run.shaft_moment[:, 1]).max() > 1e4
+
+
+# Loads are computed where they are asked for, and change nothing else.
+
+
+@pytest.mark.parametrize("name", [*(name for name in METHODS if name != "reference"), "exudyn_tree/dopri5"])
+def test_asking_for_loads_changes_nothing_else(name: str) -> None:
+    scene = replace(DRIVEN, duration=0.1, samples=11, outputs=("angles", "rates", "tip", "energy"))
+    plain = solve(name, scene, {}).trajectory
+    asked = solve(name, replace(scene, outputs=(*scene.outputs, "loads")), {}).trajectory
     assert not set(LOADS) & set(plain.quantities)
     for name, values in {"angles": plain.angles, "rates": plain.rates, **plain.quantities}.items():
         assert values.tobytes() == asked.get(name).tobytes(), name
     assert all(asked.get(name) is not None for name in LOADS)
+
+
+@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+def test_no_sensor_for_loads_that_are_not_asked_for(name: str) -> None:
+    """Counted in the engine: with loads there are more sensors, of nothing else more."""
+    method, plain = find_method(name), replace(DRIVEN, outputs=("angles", "rates"))
+    asked = replace(plain, outputs=("angles", "rates", "loads"))
+    few, many = (method.build(scene, method.settings()).system.counts() for scene in (plain, asked))
+    assert many["sensor"] > few["sensor"]
+    assert {kind: n for kind, n in many.items() if kind != "sensor"} == {k: n for k, n in few.items() if k != "sensor"}
+    assert len(method.items(plain)) == sum(few.values())
+    assert len(method.items(asked)) == sum(many.values())
+
+
+def test_multipliers_of_rotation_vectors_are_refused() -> None:
+    with pytest.raises(MethodRefusal, match="euler_parameters"):
+        solve("exudyn_chain/generalized_alpha", DRIVEN, {"node": "rotation_vector"})

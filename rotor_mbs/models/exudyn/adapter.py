@@ -56,6 +56,8 @@ class System:
         self._container = _engine.SystemContainer()
         self._mbs = self._container.AddSystem()
         self._numbers: dict[Ref, object] = {}
+        self._of_accelerations = [part.name for part in parts if _reads_accelerations(part)]
+        self._initial_values: dict[str, Array] = {}  # by sensor, where the solver does not know them
         try:
             for part in parts:
                 self._add(part)
@@ -86,8 +88,10 @@ class System:
 
     def rows(self, sensor: str) -> Array:
         """(n, 1 + k) rows a sensor kept in the last integration: time in s, then its k values."""
-        stored = self._mbs.GetSensorStoredData(self._numbers[Ref("sensor", sensor)])
-        return np.array(stored, dtype=float, ndmin=2)
+        stored = np.array(self._mbs.GetSensorStoredData(self._numbers[Ref("sensor", sensor)]), dtype=float, ndmin=2)
+        if sensor in self._initial_values:
+            stored[0, 1:] = self._initial_values[sensor]
+        return stored
 
     def linearized(self, step: float) -> Linearized:
         """The engine's own linearization at the initial state, its difference quotients taken with `step` (rad, m).
@@ -139,6 +143,8 @@ class System:
         total = Integration(True, "", 0.0, 0, 0)
         for interval in intervals:
             before_interval(interval)
+            if interval is intervals[0] and scheme.lacks_initial_accelerations:
+                self._find_initial_accelerations()
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
             _schedule(settings, scheme, interval, rows_between)
@@ -150,6 +156,17 @@ class System:
             self._keep_state()
             settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, interval.end - interval.start)
         return total
+
+    def _find_initial_accelerations(self) -> None:
+        """What sensors of accelerations read at the initial state: only an implicit solver computes it."""
+        settings, solver = _engine.SimulationSettings(), _engine.MainSolverImplicitSecondOrder()
+        settings.solution.file.write = False
+        with contextlib.suppress(_engine.ExudynError, RuntimeError):  # of a singular start: the run itself will fail
+            solver.InitializeSolver(self._mbs, settings)
+            for name in self._of_accelerations:
+                values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
+                self._initial_values[name] = np.array(values, dtype=float, ndmin=1)
+            solver.FinalizeSolver(self._mbs, settings)
 
     def _solve(self, solver: Any, settings: Any) -> str:
         """Why the engine says it failed; empty where it says it did not."""
@@ -180,6 +197,10 @@ class System:
 
         self._mbs.SetPreStepUserFunction(before_trial)
         return trials
+
+
+def _reads_accelerations(part: Part) -> bool:
+    return part.kind == "sensor" and "Acceleration" in str(part.parameters["outputVariableType"])
 
 
 def _settings(scheme: Scheme) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 
 from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref, sensor
 from rotor_mbs.models.exudyn.geometry import (
+    ALONG_SHAFT,
     Body,
     blade_body,
     fixed_blade_rotation,
@@ -25,14 +26,12 @@ from rotor_mbs.models.exudyn.geometry import (
     rotation_y,
     rotation_z,
 )
+from rotor_mbs.models.exudyn.loads import chain_sensors
 from rotor_mbs.models.exudyn.timetable import RotorTorque
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
 
 NODES = ("euler_parameters", "rotation_vector")
-
-# Columns are the joint frame's x, y, z: its z is the shaft.
-_ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ def parts(scene: Scene, torque: RotorTorque, node: str = NODES[0]) -> list[Part]
         built += _body(placed, node)
         if scene.gravity != 0.0 and placed.body.mass:
             built += _gravity(placed, scene.gravity)
-    built += _bearing("shaft bearing", _on_ground(), _on_body(hub, "at shaft", _ALONG_SHAFT))
+    built += _bearing("shaft bearing", _on_ground(), _on_body(hub, "at shaft", ALONG_SHAFT))
     for i, blade in zip(pitching(scene), blades, strict=True):
         seat = _on_body(hub, f"at bearing {i + 1}", mounting(i, len(scene.blades)))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
@@ -119,7 +118,7 @@ def _gravity(placed: Placed, gravity: float) -> list[Part]:
 
 
 def _on_ground() -> Part:
-    parameters = {"bodyNumber": Ref("object", "ground"), "localHT": Frame(_ALONG_SHAFT, np.zeros(3))}
+    parameters = {"bodyNumber": Ref("object", "ground"), "localHT": Frame(ALONG_SHAFT, np.zeros(3))}
     return Part("marker", "ground at shaft", "MarkerBodyRigid", parameters)
 
 
@@ -176,6 +175,8 @@ def _sensors(scene: Scene, placed: list[Placed]) -> list[Part]:
             out.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=node))
     if scene.wants("tip"):
         out += [_tip_sensor(scene, blade, placed[0].body) for blade in range(len(scene.blades))]
+    if scene.wants("loads"):
+        out += chain_sensors(scene, placed[0].body)
     return out
 
 

@@ -14,6 +14,9 @@ import numpy as np
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.record import Array
 
+# (3, 3) frame whose z axis is the shaft: columns are its x, y, z.
+ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
 
 @dataclass(frozen=True)
 class Body:

@@ -76,12 +76,19 @@ class MultibodySolver:
 
 def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
     scheme, torque = _scheme(scene, settings), RotorTorque(scene)
+    if scene.wants("loads"):
+        scheme = scheme.with_accelerations()
     between = scene.wants("energy") and work_needs_rows(scene)
     return MultibodySolver(scene, tree.parts(scene, torque), torque, scheme, sensor_samples.tree_trajectory, between)
 
 
 def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
     scheme, torque = _scheme(scene, settings), RotorTorque(scene)
+    if scene.wants("loads") and settings.node == "rotation_vector":
+        raise MethodRefusal(
+            "exudyn_chain: loads need the setting node = euler_parameters: with rotation_vector the engine's "
+            "multipliers start wrong, and those of newmark_index2 stay so"
+        )
     parts = chain.parts(scene, torque, settings.node)
     # Its angles are unwrapped from row to row, so rows are kept between samples.
     return MultibodySolver(scene, parts, torque, scheme, sensor_samples.chain_trajectory, rows_between=True)

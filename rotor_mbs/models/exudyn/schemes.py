@@ -6,10 +6,12 @@ Knows no engine and no model.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rotor_mbs.methods.settings import Settings, number
+
+_END_ACCELERATIONS = "explicit.computeEndOfStepAccelerations"
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,15 @@ class Scheme:
     step: float | None = None
     trial_steps: int = 0
 
+    def with_accelerations(self) -> Scheme:
+        """The same, with accelerations at the end of every step; an implicit scheme has them anyway."""
+        return replace(self, options={**self.options, _END_ACCELERATIONS: True}) if self.stages else self
+
+    @property
+    def lacks_initial_accelerations(self) -> bool:
+        """Whether accelerations are wanted of a solver that knows none before its first step."""
+        return bool(self.options.get(_END_ACCELERATIONS))
+
 
 def step(default: float) -> Any:
     """The setting `step`, s."""
@@ -39,8 +50,8 @@ class SchemeSettings(Settings):
         raise NotImplementedError
 
 
-# Stage evaluations are all that is needed: one more at the end of a step would only serve to print accelerations.
-_EXPLICIT = {"explicit.computeEndOfStepAccelerations": False, "explicit.useLieGroupIntegration": False}
+# Stage evaluations are all that a state needs: one more at the end of a step would only serve to know accelerations.
+_EXPLICIT = {_END_ACCELERATIONS: False, "explicit.useLieGroupIntegration": False}
 
 
 @dataclass(frozen=True)

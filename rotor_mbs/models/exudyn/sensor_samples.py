@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.models.exudyn import chain, energy, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
+from rotor_mbs.models.exudyn.loads import chain_loads, tree_loads
 from rotor_mbs.models.exudyn.timetable import TorqueSegment, sample_times
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Trajectory
@@ -46,7 +47,10 @@ def tree_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: C
     angles = _all_blades(scene, read.all("angles"), scene.initial_angles)
     rates = _all_blades(scene, read.all("rates"), (0.0,) * len(scene.initial_rates))
     bodies = [(tree.link_name(link), body) for link, body in enumerate(tree.bodies(scene))]
-    return _cut(scene, _fields(scene, segments, read, angles, rates, bodies))
+    fields = _fields(scene, segments, read, angles, rates, bodies)
+    if scene.wants("loads"):
+        fields |= tree_loads(scene, segments, read.time[read.samples], read.sampled)
+    return _cut(scene, fields)
 
 
 def chain_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: Callable[[str], Array]) -> Trajectory:
@@ -58,6 +62,8 @@ def chain_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: 
     angles, rates = _joint_motion(scene, read)
     fields = _fields(scene, segments, read, angles, rates, bodies)
     fields["constraint_error"] = _largest_gap(read, bodies)
+    if scene.wants("loads"):
+        fields |= chain_loads(scene, read.sampled)
     return _cut(scene, fields)
 
 

@@ -16,6 +16,7 @@ from rotor_mbs.models.exudyn.geometry import (
     mounting,
     pitching,
 )
+from rotor_mbs.models.exudyn.loads import tree_sensors
 from rotor_mbs.models.exudyn.timetable import RotorTorque
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
@@ -38,6 +39,8 @@ def parts(scene: Scene, torque: RotorTorque) -> list[Part]:
     if scene.wants("energy"):
         for link, body in enumerate(bodies(scene)):
             built += _energy_sensors(link, body)
+    if scene.wants("loads"):
+        built += tree_sensors(scene, _link_sensor)
     return built
 
 

@@ -108,7 +108,7 @@ def loads(
         )
         pitch = sin(motion.angles[i]), cos(motion.angles[i])
         turning = motion.rates[0], motion.rates[i], motion.accelerations[0], motion.accelerations[i]
-        force, moment = _root_load(body, azimuth, pitch, turning, gravity)
+        force, moment = root_load(body, azimuth, pitch, turning, gravity)
         forces.append(force)
         moments.append(moment)
         actuators.append(-(body.stiffness * motion.angles[i]) - body.damping * motion.rates[i])
@@ -117,7 +117,7 @@ def loads(
     return Loads(forces, moments, shaft_force, shaft_moment, actuators)
 
 
-def _root_load(
+def root_load(
     body: BladeBody,
     azimuth: tuple[Number, Number],
     pitch: tuple[Number, Number],

@@ -33,6 +33,8 @@ class Poses:
     spin      (n, bodies, 3) rad/s, along the principal axes
     site      (n, sites, 3) m
     acceleration  (n, coordinates) rad/s²
+    frame     (n, bodies, 3, 3) body's frame to world frame
+    wrench    (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
     """
 
     centre: Array
@@ -40,6 +42,8 @@ class Poses:
     spin: Array
     site: Array
     acceleration: Array
+    frame: Array
+    wrench: Array
 
 
 class Engine:
@@ -102,7 +106,9 @@ class Engine:
         model, data = self._model, self._data
         n, bodies = len(angles), model.nbody - 1
         centre, velocity, spin = np.empty((3, n, bodies, 3))
-        out = Poses(centre, velocity, spin, np.empty((n, model.nsite, 3)), np.empty((n, model.nv)))
+        site, acceleration = np.empty((n, model.nsite, 3)), np.empty((n, model.nv))
+        frame, wrench = np.empty((n, bodies, 3, 3)), np.empty((n, bodies, 6))
+        out = Poses(centre, velocity, spin, site, acceleration, frame, wrench)
         six = np.empty(6)
         for k in range(n):
             data.qpos[:], data.qvel[:] = angles[k], rates[k]
@@ -112,4 +118,14 @@ class Engine:
             for body in range(bodies):
                 _engine.mj_objectVelocity(model, data, _engine.mjtObj.mjOBJ_BODY, 1 + body, six, 1)
                 out.spin[k, body], out.velocity[k, body] = six[:3], six[3:]
+            out.frame[k] = data.xmat[1:].reshape(bodies, 3, 3)
+            out.wrench[k] = self._wrench()
         return out
+
+    def _wrench(self) -> Array:
+        """(bodies, 6) as in `Poses`; the engine gives moments about the centre of mass of a body's whole tree."""
+        _engine.mj_rnePostConstraint(self._model, self._data)
+        found = np.array(self._data.cfrc_int[1:])
+        centres = self._data.subtree_com[self._model.body_rootid[1:]]
+        found[:, :3] += np.cross(centres, found[:, 3:])
+        return found

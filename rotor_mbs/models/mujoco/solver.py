@@ -109,7 +109,7 @@ class MujocoSolver:
             "rates": _all_coordinates(rates[at], self._moving, (0.0,) * len(scene.initial_rates)),
         }
         with np.errstate(over="ignore", invalid="ignore"):
-            if scene.wants("tip") or scene.wants("energy"):
+            if {"tip", "energy", "loads"} & set(scene.outputs):
                 torques = np.array([segment.at(t) for segment, t in zip(rows.segments, rows.times, strict=True)])
                 poses = self.engine.poses(angles, rates, torques)
             if scene.wants("tip"):
@@ -118,6 +118,8 @@ class MujocoSolver:
                 fields["kinetic_energy"] = self._kinetic_energy(poses)[at]
                 fields["potential_energy"] = self._potential_energy(poses)[at] + _spring_energy(scene, fields["angles"])
                 fields["work"] = self._work(angles, rates, poses.acceleration, torques)[at]
+            if scene.wants("loads"):
+                fields |= {name: values[at] for name, values in self._loads(poses, torques).items()}
         finite = np.all([np.isfinite(table.reshape(len(at), -1)).all(axis=1) for table in fields.values()], axis=0)
         n = len(at) if finite.all() else int(np.argmin(finite))
         return Trajectory(time=sample_times(scene)[:n], **{name: table[:n] for name, table in fields.items()})
@@ -131,6 +133,22 @@ class MujocoSolver:
     def _potential_energy(self, poses: Poses) -> Array:
         """(n,) J of the weights; zero at the height of the shaft."""
         return np.asarray(self._scene.gravity * (poses.centre[:, :, 2] @ self.engine.masses))
+
+    def _loads(self, poses: Poses, torques: Array) -> dict[str, Array]:
+        """Of what each body's parent does to it: the moment of an actuator is its part about the pitch axis."""
+        moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
+        in_frame = [np.einsum("nbij,nbi->nbj", poses.frame, vectors)[:, 1:] for vectors in (force, moment)]
+        shaft_moment = moment[:, 0].copy()
+        if 0 in loaded(self._scene):
+            shaft_moment[:, 1] -= torques[:, list(loaded(self._scene)).index(0)]
+        pitching = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
+        return {
+            "blade_root_force": in_frame[0],
+            "blade_root_moment": in_frame[1],
+            "shaft_force": force[:, 0],
+            "shaft_moment": shaft_moment,
+            "pitch_actuator_moment": np.where(pitching, in_frame[1][:, :, 2], 0.0),
+        }
 
     def _work(self, angles: Array, rates: Array, accelerations: Array, torques: Array) -> Array:
         """(n,) J of the torques, less what the dampers took; from rows of rad, rad/s, rad/s², (n, loads) N m.

@@ -73,7 +73,19 @@ class PrintedSolver:
             trajectory.work = np.zeros(len(time))
             if scene.has_torque:
                 trajectory.work = torque_work(scene.rotor_torque, lambda t: result.at(t)[:, 0], result.time, time)
+        if scene.wants("loads"):
+            before = np.nextafter(time, 0.0)  # where a torque jumps, the value before it
+            torque = np.array([scene.torque_at(t) for t in before.tolist()])
+            accelerations = self._accelerations(before, result.at(time))
+            trajectory.quantities |= rotor.loads(angles, rates, accelerations, torque)
         return trajectory
+
+    def _accelerations(self, time: Array, states: Array) -> Array:
+        """(n, 1 + blades) rad/s² by the equations that are run; zero of a fixed pitch."""
+        found = np.zeros((len(time), len(self._scene.initial_angles)))
+        for k, (t, state) in enumerate(zip(time.tolist(), states.tolist(), strict=True)):
+            found[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
+        return found
 
     def _coordinates(self, states: Array) -> tuple[Array, Array]:
         """Angles and rates, (n, 1 + blades) each, of states of what moves; a fixed pitch stays where it started."""

@@ -1,7 +1,9 @@
-"""Tip path, energies and work of the printed model's motion, from the paper's matrix (3). Knows no equation of motion.
+"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3). Knows no equation of
+motion.
 
-The energies are the physical ones, with the velocities that (3) implies, whatever equations made the motion: their
-sum less the work of the torque tells how much energy those equations make.
+Energies and loads are the physical ones, with the velocities and accelerations that (3) implies, whatever equations
+made the motion. The sum of the energies less the work of the torque tells how much energy those equations make; the
+moments about the pitch axes and the shaft, which nothing transmits there, how large their fictitious moments are.
 """
 
 from __future__ import annotations
@@ -67,6 +69,45 @@ class PointMassRotor:
         for sines in self._sines(angles):
             total += self.m * self.g * matrices.a3(*sines, self.c, self.d)[2][3]
         return total
+
+    def loads(self, angles: Array, rates: Array, accelerations: Array, torque: Array) -> dict[str, Array]:
+        """What the motion needs at roots and shaft, by quantity; from rad, rad/s, rad/s² and (n,) N m on the rotor."""
+        forces, moments = [], []
+        shaft_force, shaft_moment = np.zeros((2, len(angles), 3))
+        for pitch, sines in enumerate(self._sines(angles), start=1):
+            place = np.stack(np.broadcast_arrays(*(row[3] for row in matrices.a3(*sines, self.c, self.d)[:3])), axis=1)
+            force = self._acceleration(sines, rates[:, [0, pitch]], accelerations[:, [0, pitch]])
+            force[:, 2] += self.g
+            force *= self.m
+            axes = np.array(
+                [np.broadcast_arrays(*row[:3], angles[:, 0])[:3] for row in matrices.a3(*sines, 0.0, 0.0)[:3]]
+            )
+            forces.append(np.einsum("ijn,ni->nj", axes, force))
+            moments.append(np.cross([self.c, 0.0, self.d], forces[-1]))
+            shaft_force += force
+            shaft_moment += np.cross(place, force)
+        shaft_moment[:, 1] -= torque
+        return {
+            "blade_root_force": np.stack(forces, axis=1),
+            "blade_root_moment": np.stack(moments, axis=1),
+            "shaft_force": shaft_force,
+            "shaft_moment": shaft_moment,
+            "pitch_actuator_moment": np.stack([moment[:, 2] for moment in moments], axis=1),
+        }
+
+    def _acceleration(self, sines: tuple[Array, Array, Array, Array], rates: Array, accelerations: Array) -> Array:
+        """(n, 3) m/s² of the mass: the last columns of (8), (9), (16)-(19), E1 and E2 corrected."""
+        c, d = self.c, self.d
+        w2, w3 = rates.T
+        terms = (
+            (matrices.u32(*sines, c, d, CORRECTED), accelerations[:, 0]),
+            (matrices.u33(*sines, c), accelerations[:, 1]),
+            (matrices.u32_2(*sines, c, d), w2 * w2),
+            (matrices.u32_3(*sines, c, CORRECTED), w2 * w3),
+            (matrices.u33_2(*sines, c), w2 * w3),
+            (matrices.u33_3(*sines, c, CORRECTED), w3 * w3),
+        )
+        return np.stack([sum((u[row][3] * rate for u, rate in terms), np.zeros(len(w2))) for row in range(3)], axis=1)
 
     def _sines(self, angles: Array) -> list[tuple[Array, Array, Array, Array]]:
         """s2, c2, s3, c3 of every blade, each (n,)."""

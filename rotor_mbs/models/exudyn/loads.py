@@ -1,0 +1,188 @@
+"""Loads from what the engine records. The chain: multipliers of its joints, moments of its connectors. The tree, and a
+blade that is part of the hub: Newton's and Euler's laws on the engine's accelerations. Knows no equations of motion.
+
+Forces in N and moments in N m act on the blade at its root (hub on blade) and on the hub (bearing on rotor).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
+from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, blade_body, fixed_blade_rotation, mounting, pitching
+from rotor_mbs.models.exudyn.timetable import TorqueSegment
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Array
+
+# (name of a sensor) -> (samples, k) values
+Sampled = Callable[[str], Array]
+
+
+@dataclass(frozen=True)
+class BladeOnBody:
+    """A blade in the engine's body that it is, or that it is part of.
+
+    index     of the blade, from 0
+    rotation  (3, 3) blade's frame to the engine's body
+    """
+
+    index: int
+    body: Body
+    rotation: Array
+
+    def name(self, what: str) -> str:
+        """Of the sensor that keeps `what` of it."""
+        return f"blade {self.index + 1} {what}"
+
+
+def blade_on_body(scene: Scene, index: int) -> BladeOnBody:
+    """The blade as its own body, or as part of the hub where it cannot pitch."""
+    rotation = np.eye(3) if index in pitching(scene) else fixed_blade_rotation(scene, index)
+    return BladeOnBody(index, blade_body(scene.blades[index]), rotation)
+
+
+def motion_quantities(blade: BladeOnBody) -> dict[str, str]:
+    """What Newton's and Euler's laws need of a blade: the engine's names of outputs by those of sensors."""
+    outputs = {"root acceleration": "Acceleration", "root rotation": "RotationMatrix"}
+    if np.any(blade.body.inertia):
+        outputs |= {"root spin": "AngularVelocityLocal", "root spin rate": "AngularAccelerationLocal"}
+    return {blade.name(what): output for what, output in outputs.items()}
+
+
+def newton_euler(scene: Scene, blade: BladeOnBody, sampled: Sampled) -> tuple[Array, Array, Array]:
+    """(n, 3) force, (n, 3) moment about the root in the blade's frame; (n, 3, 3) blade's frame to base frame.
+
+    F = m (a + g e_z),  M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it.
+    """
+    body, turned = blade.body, blade.rotation
+    frames = _matrices(sampled(blade.name("root rotation"))) @ turned
+    lifted = sampled(blade.name("root acceleration")) + np.array([0.0, 0.0, scene.gravity])
+    force = body.mass * _in_frames(frames, lifted)
+    moment = np.cross(body.com, force)
+    if np.any(body.inertia):
+        omega, alpha = (sampled(blade.name(what)) @ turned for what in ("root spin", "root spin rate"))
+        moment += alpha @ body.inertia + np.cross(omega, omega @ body.inertia)
+    return force, moment, frames
+
+
+def tree_loads(scene: Scene, segments: Sequence[TorqueSegment], time: Array, sampled: Sampled) -> dict[str, Array]:
+    """Of the kinematic tree: every blade by Newton and Euler, and their sum with the hub's share at the shaft.
+
+    The moment of a pitch actuator is what they leave about the pitch axis.
+    """
+    blades = [newton_euler(scene, blade_on_body(scene, i), sampled) for i in range(len(scene.blades))]
+    shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
+    shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
+    assert isinstance(shaft_moment, np.ndarray)
+    shaft_moment[:, 1] -= torque_before(segments, time)
+    if scene.hub_inertia:
+        shaft_moment[:, 1] += scene.hub_inertia * sampled("hub spin rate")[:, 1]
+    actuators = np.zeros((len(time), len(blades)))
+    for i in pitching(scene):
+        actuators[:, i] = blades[i][1][:, 2]
+    return {
+        "blade_root_force": np.stack([force for force, _, _ in blades], axis=1),
+        "blade_root_moment": np.stack([moment for _, moment, _ in blades], axis=1),
+        "shaft_force": np.asarray(shaft_force),
+        "shaft_moment": shaft_moment,
+        "pitch_actuator_moment": actuators,
+    }
+
+
+def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
+    """What `tree_loads` reads; on_link: (name, output, link, point) -> sensor."""
+    links = pitching(scene)
+    found = []
+    for i in range(len(scene.blades)):
+        blade, link = blade_on_body(scene, i), 1 + links.index(i) if i in links else 0
+        point = blade.rotation @ blade.body.com
+        found += [on_link(name, output, link, point) for name, output in motion_quantities(blade).items()]
+    if scene.hub_inertia:
+        found.append(on_link("hub spin rate", "AngularAccelerationLocal", 0, np.zeros(3)))
+    return found
+
+
+def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
+    """What `chain_loads` reads beside the rotations: joints, connectors, and blades that are part of the hub."""
+    found = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
+    for i in range(len(scene.blades)):
+        if i in pitching(scene):
+            found += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if any(scene.bearing(i)) else "")
+            continue
+        blade = blade_on_body(scene, i)
+        point, body = list(blade.rotation @ blade.body.com - hub.com), Ref("object", "hub")
+        for name, output in motion_quantities(blade).items():
+            found.append(sensor(name, "SensorBody", output, bodyNumber=body, localPosition=point))
+    return found
+
+
+def _joint_sensors(joint: str, connector: str) -> list[Part]:
+    outputs = {f"{joint} force": ("ForceLocal", joint), f"{joint} torque": ("TorqueLocal", joint)}
+    if connector:
+        outputs[f"{connector} torque"] = ("TorqueLocal", connector)
+    return [
+        sensor(name, "SensorObject", output, objectNumber=Ref("object", item))
+        for name, (output, item) in outputs.items()
+    ]
+
+
+def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
+    """Of the chain: what its joints and its connectors transmit."""
+    hub = _matrices(sampled("hub rotation"))
+    roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
+    for i in range(len(scene.blades)):
+        if i not in pitching(scene):
+            roots.append(newton_euler(scene, blade_on_body(scene, i), sampled)[:2])
+            continue
+        frames = _matrices(sampled(f"blade {i + 1} rotation"))
+        force, moment = _joint_reaction(f"pitch bearing {i + 1}", hub @ mounting(i, len(scene.blades)), frames, sampled)
+        if any(scene.bearing(i)):
+            actuators[:, i] = -sampled(f"pitch spring {i + 1} torque")[:, 0]
+        along = actuators[:, i, None] * [0.0, 0.0, 1.0]
+        roots.append((_in_frames(frames, force), _in_frames(frames, moment) + along))
+    ground = np.broadcast_to(ALONG_SHAFT, hub.shape)
+    force, moment = _joint_reaction("shaft bearing", ground, hub @ ALONG_SHAFT, sampled)
+    if scene.shaft_damping:
+        moment[:, 1] -= sampled("shaft damper torque")[:, 0]
+    return {
+        "blade_root_force": np.stack([force for force, _ in roots], axis=1),
+        "blade_root_moment": np.stack([moment for _, moment in roots], axis=1),
+        "shaft_force": force,
+        "shaft_moment": moment,
+        "pitch_actuator_moment": actuators,
+    }
+
+
+def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> tuple[Array, Array]:
+    """(n, 3) force and moment of a joint on its second body, in the base frame.
+
+    seat, root   (n, 3, 3) frames of the joint on its first and its second body, to the base frame
+
+    The engine gives the force on the first body in its frame, and as torque the multipliers λ of the conditions
+    x₁·z₀ = 0 and y₁·z₀ = 0; on the second body they are the moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
+    """
+    force = -_in_base(seat, sampled(f"{joint} force"))
+    multipliers = sampled(f"{joint} torque")
+    x, y, z = root[:, :, 0], root[:, :, 1], seat[:, :, 2]
+    return force, multipliers[:, :1] * np.cross(z, x) + multipliers[:, 1:2] * np.cross(z, y)
+
+
+def torque_before(segments: Sequence[TorqueSegment], time: Array) -> Array:
+    """(n,) N m on the rotor; at a jump the value before it, at 0 the one after."""
+    which = np.searchsorted([segment.end for segment in segments[:-1]], time * (1.0 - 1e-12))
+    return np.array([segments[k].at(float(t)) for k, t in zip(which, time, strict=True)])
+
+
+def _matrices(rows: Array) -> Array:
+    return rows.reshape(-1, 3, 3)
+
+
+def _in_base(frames: Array, vectors: Array) -> Array:
+    return np.asarray((frames @ vectors[:, :, None])[:, :, 0])
+
+
+def _in_frames(frames: Array, vectors: Array) -> Array:
+    return np.asarray((vectors[:, None, :] @ frames)[:, 0, :])
