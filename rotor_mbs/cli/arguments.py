@@ -157,9 +157,21 @@ def _add_check(commands: _Commands) -> None:
         "--require", action="append", metavar="METHOD",
         help="fail where a scene of FILE has no run of it; may be repeated",
     )  # fmt: skip
+    check.add_argument(
+        "--against", type=Path, metavar="OLD",
+        help="also fail where a verdict on this earlier results file passed by more, or its run is gone",
+    )  # fmt: skip
+    check.add_argument(
+        "--shrink", type=_positive(float, "a number, more than 0"), default=10.0, metavar="FACTOR",
+        help="with --against: by how much a margin may shrink (default: %(default)g)",
+    )  # fmt: skip
     check.add_argument("--junit", type=_file, metavar="XML", help="verdicts as JUnit XML")
     check.add_argument("--json", type=_file, metavar="FILE", help="verdicts as JSON; - for standard output")
-    check.add_argument("--github", action="store_true", help="failures as GitHub annotations")
+    check.add_argument("--trend", type=_file, metavar="FILE", help="shares of the bounds as JSON, for charts over time")
+    check.add_argument("--badge", type=_file, metavar="FILE", help="the outcome as JSON for shields.io")
+    check.add_argument(
+        "--github", action="store_true", help="the ten worst failures as annotations, a table as job summary"
+    )
     check.add_argument("--speed", action="store_true", help="run times too, against a calibration run")
     check.add_argument("-v", "--verbose", action="store_true", help="print verdicts that pass, too")
     _add_jobs(check)

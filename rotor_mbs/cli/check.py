@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
+from typing import TextIO
 
+from rotor_mbs.analysis.regressions import regressions
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli.terminal import ProgressLine
+from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.studies.check import check_default_set, check_file, check_speed, default_set, judged_runs
+from rotor_mbs.studies.check import (
+    check_default_set,
+    check_file,
+    check_speed,
+    default_set,
+    judge_file,
+    judged_runs,
+)
 
 _STANDARD_OUTPUT = Path("-")
 
@@ -21,6 +32,7 @@ def check(arguments: argparse.Namespace) -> int:
     """Of the file given, or of a default set that is computed."""
     bounds = load_bounds(arguments.bounds)
     required = check_names(arguments.require or ())
+    earlier = None if arguments.against is None else judge_file(arguments.against, bounds)
     if arguments.file is not None:
         found = check_file(arguments.file, bounds, required)
     else:
@@ -28,6 +40,8 @@ def check(arguments: argparse.Namespace) -> int:
             found = check_default_set(default_set(), bounds, arguments.jobs, progress)
     if arguments.speed:
         found += check_speed(bounds)
+    if found and earlier is not None:
+        found += regressions(found, earlier, arguments.shrink)
     _write(arguments, found)
     # With --json - the standard output is the JSON's alone.
     stream = sys.stderr if arguments.json == _STANDARD_OUTPUT else sys.stdout
@@ -35,20 +49,38 @@ def check(arguments: argparse.Namespace) -> int:
     for verdict in found if arguments.verbose else failed:
         print(verdict_formats.line(verdict), file=stream)
     if arguments.github:
-        for verdict in failed:
-            print(verdict_formats.github(verdict), file=stream)
+        _tell_github(found, stream)
     runs = ", ".join(f"{count} {method}" for method, count in judged_runs(found).items())
     print(f"runs judged: {runs or 'none'}", file=stream)
     print(f"{len(found) - len(failed)} passed, {len(failed)} failed", file=stream)
     return 1 if failed or not found else 0
 
 
+def _tell_github(found: list[Verdict], stream: TextIO) -> None:
+    """The worst failures as annotations; a table into the job's summary, where a job has one."""
+    failed = [verdict for verdict in verdict_formats.worst_first(found) if not verdict.passed]
+    for verdict in failed[: verdict_formats.WORST]:
+        print(verdict_formats.github(verdict), file=stream)
+    place = os.environ.get("GITHUB_STEP_SUMMARY")
+    if place:
+        try:
+            with Path(place).open("a", encoding="utf-8") as file:
+                file.write(verdict_formats.summary(found))
+        except OSError as exc:
+            raise StoreError(f"{place} (GITHUB_STEP_SUMMARY): cannot be written: {exc.strerror}") from exc
+
+
 def _write(arguments: argparse.Namespace, found: list[Verdict]) -> None:
     if arguments.junit is not None:
         replace_file(arguments.junit, verdict_formats.junit(found))
-    if arguments.json == _STANDARD_OUTPUT:
-        print(verdict_formats.as_json(found))
-    elif arguments.json is not None:
-        replace_file(arguments.json, verdict_formats.as_json(found).encode())
+    for path, text in (
+        (arguments.json, verdict_formats.as_json),
+        (arguments.trend, verdict_formats.trend),
+        (arguments.badge, verdict_formats.badge),
+    ):
+        if path == _STANDARD_OUTPUT:
+            print(text(found))
+        elif path is not None:
+            replace_file(path, text(found).encode())
     if not found:
         print("nothing to check: the file has no run", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Verdicts as lines of text, JSON, JUnit XML, and annotations of GitHub.
+"""Verdicts as lines of text, JSON, JUnit XML, annotations and job summaries of GitHub, trends and a badge.
 
 Names and messages come from files of any origin: what is not printable is written as an escape.
 """
@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from rotor_mbs.analysis.verdicts import Verdict
+
+WORST = 10  # annotations: GitHub shows as many of a step and drops the others silently
 
 
 def line(verdict: Verdict) -> str:
@@ -29,6 +32,56 @@ def github(verdict: Verdict) -> str:
     """A workflow command that GitHub shows as an error annotation."""
     title = f"rotor-mbs {verdict.check} {verdict.scene} {verdict.method}"
     return f"::error title={_property(title)}::{_data(line(verdict))}"
+
+
+def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """By share of the bound, the largest first; not a number before all others."""
+    return sorted(verdicts, key=lambda verdict: verdict.margin)
+
+
+def summary(verdicts: Sequence[Verdict]) -> str:
+    """A job summary in Markdown: a row per check, then the ten verdicts nearest to their bounds or beyond."""
+    rows = ["### rotor-mbs check", "", "| check | verdicts | failed | smallest margin |", "|---|---:|---:|---:|"]
+    for check in dict.fromkeys(verdict.check for verdict in verdicts):
+        mine = [verdict for verdict in verdicts if verdict.check == check]
+        failed = sum(not verdict.passed for verdict in mine)
+        rows.append(f"| {_cell(check)} | {len(mine)} | {failed} | {min(v.margin for v in mine):.3g} |")
+    rows += ["", "| | check | scene | method | channel | value | bound | unit |", "|---|---|---|---|---|---:|---:|---|"]
+    for one in worst_first(verdicts)[:WORST]:
+        texts = [_cell(text) for text in (one.check, one.scene, one.method, one.channel)]
+        outcome = "pass" if one.passed else "**FAIL**"
+        numbers = [f"{one.value:.2e}", f"{one.bound:.2e}", _cell(one.unit)]
+        rows.append("| " + " | ".join([outcome, *texts, *numbers]) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def _cell(text: str) -> str:
+    """As text in a cell of a Markdown table: nothing of it is markup."""
+    return re.sub(r"([\\`*_{}\[\]<>()#!|~&])", r"\\\1", printable(text))
+
+
+def trend(verdicts: Sequence[Verdict]) -> str:
+    """JSON of benchmark charts where smaller is better: of every check and method the largest share of a bound.
+
+    Shares that are no finite numbers are left out: JSON has none, and their verdicts fail.
+    """
+    largest: dict[str, float] = {}
+    for verdict in verdicts:
+        share = 1.0 / verdict.margin if verdict.margin else math.inf
+        name = f"{verdict.check} {verdict.method}"
+        largest[name] = max(largest.get(name, 0.0), share)
+    rows = [
+        {"name": name, "unit": "of bound", "value": share} for name, share in largest.items() if math.isfinite(share)
+    ]
+    return json.dumps(rows, indent=1)
+
+
+def badge(verdicts: Sequence[Verdict]) -> str:
+    """JSON that shields.io draws as a badge (its endpoint schema)."""
+    failed = sum(not verdict.passed for verdict in verdicts)
+    message = f"{failed} of {len(verdicts)} failed" if failed or not verdicts else f"{len(verdicts)} passed"
+    colour = "red" if failed or not verdicts else "brightgreen"
+    return json.dumps({"schemaVersion": 1, "label": "accuracy", "message": message, "color": colour})
 
 
 def _data(text: str) -> str:
@@ -72,6 +125,9 @@ def _add_suite(root: ElementTree.Element, scene: str, mine: Sequence[Verdict]) -
     for v in mine:
         name, group = printable(f"{v.check} {v.method} {v.channel}"), printable(f"rotor_mbs.{scene}")
         case = ElementTree.SubElement(suite, "testcase", classname=group, name=name, time="0")
+        properties = ElementTree.SubElement(case, "properties")
+        for key, value in (("value", v.value), ("bound", v.bound), ("margin", v.margin), ("unit", v.unit)):
+            ElementTree.SubElement(properties, "property", name=key, value=printable(str(value)))
         if not v.passed:
             failure = ElementTree.SubElement(case, "failure", message=line(v), type=v.check)
             failure.text = line(v)
