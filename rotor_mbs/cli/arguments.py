@@ -281,7 +281,14 @@ def _add_sweep(commands: _Commands) -> None:
     )  # fmt: skip
     sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
     _add_methods(sweep, "in place of the file's")
-    sweep.add_argument("-o", "--output", type=_file, metavar="FILE", help="(default: the sweep's name with .h5)")
+    sweep.add_argument("-o", "--output", type=_file, metavar="FILE", help="(default: the sweep's name with its ending)")
+    sweep.add_argument(
+        "--format", choices=("h5", "nc"), default="h5", help="ending of the default FILE (default: h5); one content"
+    )
+    sweep.add_argument(
+        "--metadata", action="store_true",
+        help="RO-Crate, Croissant and statistics for normalization beside FILE, as JSON",
+    )  # fmt: skip
     sweep.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
     sweep.add_argument("--part", type=_part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
     sweep.add_argument("--dry-run", action="store_true", help="how many runs, about how long, how much")

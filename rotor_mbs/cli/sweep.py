@@ -42,7 +42,7 @@ def sweep(arguments: argparse.Namespace) -> int:
 def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies.sweep import run_sweep
 
-    output = arguments.output or Path(f"{study.name}.h5")
+    output = arguments.output or Path(f"{study.name}.{arguments.format}")
     try:
         with SweepProgress(as_json=arguments.json) as progress:
             result = run_sweep(
@@ -61,6 +61,11 @@ def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
     if study.table.picture and arguments.part == (1, 1):
         line = draw(study, result.path, output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)
+    if arguments.metadata:
+        from rotor_mbs.studies.describe import describe
+
+        names = ", ".join(place.name for place in describe(result.path))
+        print(f"{result.path}: described in {names}", file=sys.stderr if arguments.json else sys.stdout)
     return 0 if result.is_ok else 1
 
 

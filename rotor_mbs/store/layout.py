@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 
 FORMAT = "rotor_mbs"
 FORMAT_VERSION = 1
-CONVENTIONS = "CF-1.11"
+CONVENTIONS = "CF-1.11, ACDD-1.3"
+# What every file is about: the attribute `keywords` of the ACDD conventions.
+KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
 
 # The attribute with the key of a run or a record (`Case.key`); then its names in files of earlier versions.
 KEY_ATTRIBUTE = "run_hash"

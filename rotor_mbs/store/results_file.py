@@ -11,9 +11,10 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.layout import TOGETHER, key_of
+from rotor_mbs.store.layout import KEYWORDS, TOGETHER, key_of
 from rotor_mbs.store.read import OpenResults, open_results
 from rotor_mbs.store.records import records_in
+from rotor_mbs.store.summary import put_summary
 
 
 @dataclass(frozen=True)
@@ -59,13 +60,15 @@ def merge(
         refuse_other_kinds(source)
     plan = _plan(sources, without)
     with hdf5.new_file(path) as file:
-        hdf5.put_attributes(file, {**versions, "created": datetime.now(UTC).isoformat(timespec="seconds")})
+        created = datetime.now(UTC).isoformat(timespec="seconds")
+        hdf5.put_attributes(file, {**_description(plan), **versions, "created": created, "date_created": created})
         for owner in sorted(plan, key=lambda name: (name.split("/")[0] in RESERVED_GROUPS, name)):
             for source, names in _by_source(plan[owner]).items():
                 with open_results(source) as results:
                     hdf5.new_group(file, owner).attrs.update(results.root[owner].attrs)
                     for name in names:
                         hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
+        put_summary(file, [(owner, name.removeprefix(f"{owner}/")) for owner, name in _runs_in(plan)])
 
 
 def refuse_other_kinds(path: Path) -> None:
@@ -100,6 +103,24 @@ def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[s
                     known, groups = latest.get(above, (owner, {}))
                     latest[above] = (owner, {**(groups if known == owner else {}), name: source})
     return {above: groups for above, (_, groups) in latest.items()}
+
+
+def _description(plan: Mapping[str, Mapping[str, Path]]) -> dict[str, object]:
+    """Title, summary and keywords as the ACDD conventions ask for them."""
+    runs = list(_runs_in(plan))
+    scenes = len({scene for scene, _ in runs})
+    summary = f"{len(runs)} runs of {scenes} scenes: trajectories, energies, status and errors of each"
+    records = sorted({owner.split("/")[0] for owner in plan} & set(RESERVED_GROUPS))
+    if records:
+        summary += f"; records of {', '.join(records)}"
+    return {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}
+
+
+def _runs_in(plan: Mapping[str, Mapping[str, Path]]) -> Iterator[tuple[str, str]]:
+    """(scene, group) of every run, in the order of the file."""
+    for owner in sorted(plan):
+        if owner.split("/")[0] not in RESERVED_GROUPS:
+            yield from ((owner, name) for names in _by_source(plan[owner]).values() for name in names)
 
 
 def _by_source(groups: Mapping[str, Path]) -> dict[Path, list[str]]:

@@ -13,7 +13,7 @@ import os
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -186,6 +186,17 @@ def _put_result_columns(file: Any, layout: SweepLayout) -> None:
     hdf5.put_flags(file["status"], STATUSES)
 
 
+class Variable(NamedTuple):
+    """A dataset of a sweep; `kind` is "f" for floating point numbers, "i" or "u" for integers."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    shape: tuple[int, ...]
+    kind: str
+    units: str
+    long_name: str
+
+
 class StoredSweep:
     """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none.
 
@@ -206,6 +217,20 @@ class StoredSweep:
     def shape(self) -> tuple[int, ...]:
         """Values along every axis of its grid, slowest first."""
         return tuple(json.loads(self.attributes["shape"]))
+
+    @property
+    def title(self) -> str:
+        return str(self.attributes["title"])
+
+    @property
+    def summary(self) -> str:
+        """One sentence: how many runs of what, over which parameters."""
+        return str(self.attributes.get("summary", self.title))
+
+    def variables(self) -> list[Variable]:
+        """Every dataset, scales included, in the order of the file."""
+        with hdf5.open_file(self._path) as file:
+            return [_variable(name, item) for name, item in file.items() if not hdf5.is_group(item)]
 
     def parameter(self, key: str) -> NDArray[np.float64]:
         """(runs,) the values of a varied parameter. Raises StoreError."""
@@ -228,3 +253,9 @@ class StoredSweep:
         if name not in file:
             raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")
         return file[name]
+
+
+def _variable(name: str, item: Any) -> Variable:
+    facts = hdf5.attributes_of(item)
+    dimensions = tuple(dim.keys()[0] if len(dim) else name for dim in item.dims)
+    return Variable(name, dimensions, item.shape, item.dtype.kind, str(facts["units"]), str(facts["long_name"]))

@@ -26,6 +26,7 @@ from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.status import STATUSES, code_of
+from rotor_mbs.store.layout import KEYWORDS
 from rotor_mbs.store.sweep_columns import Rows
 from rotor_mbs.store.sweep_dataset import SweepDataset
 from rotor_mbs.store.sweep_layout import SweepLayout, lost_rows
@@ -128,6 +129,8 @@ class SweepPlan:
         sweep, table = self.sweep, self.sweep.table
         return {
             "title": table.title,
+            "summary": f"{self.runs} runs of {sweep.base.name} by {', '.join(self.methods)}; varied: {', '.join(sweep.keys)}",
+            "keywords": KEYWORDS,
             "sweep_toml": sweep.text,
             "base_scene": sweep.base.name,
             "scene_toml": sweep.base.text,

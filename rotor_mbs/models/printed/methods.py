@@ -36,7 +36,14 @@ class PrintedSolver:
     """One scene's printed equations under ode45."""
 
     def __init__(
-        self, scene: Scene, rotor: PointMassRotor, accelerations: Accelerations, rel_tol: float, abs_tol: float
+        self,
+        scene: Scene,
+        rotor: PointMassRotor,
+        accelerations: Accelerations,
+        rel_tol: float,
+        abs_tol: float,
+        *,
+        keeps_refined: bool,
     ) -> None:
         self._scene = scene
         self._rotor = rotor
@@ -45,6 +52,7 @@ class PrintedSolver:
         self._initial = [*scene.initial_angles[:moving], *scene.initial_rates[:moving]]
         self._right_hand_side = right_hand_side(scene, accelerations, moving)
         self._tolerances = rel_tol, abs_tol
+        self._keeps_refined = keeps_refined
         self._result: Ode45Result | None = None
 
     def integrate(self) -> Integration:
@@ -61,10 +69,7 @@ class PrintedSolver:
         time = np.linspace(0.0, scene.duration, scene.samples)
         time = time[time <= result.time[-1]]
         angles, rates = self._coordinates(result.at(time))
-        refined_time, refined_state = result.refined()
-        fine_angles, fine_rates = self._coordinates(refined_state)
-        fine = {"refined_time": refined_time, "refined_angles": fine_angles, "refined_rates": fine_rates}
-        trajectory = Trajectory(time, angles, rates, **fine)
+        trajectory = Trajectory(time, angles, rates, **self._refined(result))
         if scene.wants("tip"):
             trajectory.tip = rotor.tip_path(angles)
         if scene.wants("energy"):
@@ -86,6 +91,14 @@ class PrintedSolver:
         for k, (t, state) in enumerate(zip(time.tolist(), states.tolist(), strict=True)):
             found[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
         return found
+
+    def _refined(self, result: Ode45Result) -> dict[str, Array]:
+        """ode45's own output points, of the equations as printed alone: the paper's numbers are read off at them."""
+        if not self._keeps_refined:
+            return {}
+        time, states = result.refined()
+        angles, rates = self._coordinates(states)
+        return {"refined_time": time, "refined_angles": angles, "refined_rates": rates}
 
     def _coordinates(self, states: Array) -> tuple[Array, Array]:
         """Angles and rates, (n, 1 + blades) each, of states of what moves; a fixed pitch stays where it started."""
@@ -132,7 +145,7 @@ class PrintedModel:
         rotor = self._rotor(scene)
         tolerances = settings.relative_tolerance, settings.absolute_tolerance
         row = settings.gravity_row if isinstance(settings, PrintedSettings) else DEFAULT_ROW
-        return PrintedSolver(scene, rotor, self._accelerations(rotor, row), *tolerances)
+        return PrintedSolver(scene, rotor, self._accelerations(rotor, row), *tolerances, keeps_refined=not self._errata)
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
         """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""

@@ -1,0 +1,243 @@
+"""Metadata beside a sweep's dataset, for those who find it without its maker: RO-Crate, Croissant, statistics.
+
+    ro-crate-metadata.json     of the folder: the dataset and its sweep, one entry for every dataset described there
+    STEM.croissant.json        the variables of the dataset, with types and units
+    STEM.statistics.json       mean, deviation and range of every variable over the training runs that are ok
+Plain JSON, from the dataset alone. No licence is named: whoever publishes a dataset chooses one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import StoreError
+from rotor_mbs.solution.status import code_of
+from rotor_mbs.store.hdf5 import replace_file
+from rotor_mbs.store.layout import KEYWORDS
+from rotor_mbs.store.sweep_dataset import StoredSweep, Variable
+from rotor_mbs.store.sweep_layout import SPLITS
+
+_PIECE = 1 << 24  # bytes of a variable that are read at once
+_CRATE = "ro-crate-metadata.json"
+_CRATE_PROFILE = "https://w3id.org/ro/crate/1.1"
+_CROISSANT_PROFILE = "http://mlcommons.org/croissant/1.0"
+_CONTEXT = {
+    "@language": "en",
+    "@vocab": "https://schema.org/",
+    "sc": "https://schema.org/",
+    "cr": "http://mlcommons.org/croissant/",
+    "rai": "http://mlcommons.org/croissant/RAI/",
+    "dct": "http://purl.org/dc/terms/",
+    "conformsTo": "dct:conformsTo",
+    "data": {"@id": "cr:data", "@type": "@json"},
+    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "extract": "cr:extract",
+    "column": "cr:column",
+    "field": "cr:field",
+    "fileObject": "cr:fileObject",
+    "recordSet": "cr:recordSet",
+    "source": "cr:source",
+}
+
+
+def describe(path: Path) -> list[Path]:
+    """Writes the three files beside the dataset at `path`; returns their paths.
+
+    Raises
+    ------
+    StoreError
+        Where `path` is no sweep's dataset, a file cannot be written, or the folder's ro-crate-metadata.json was not
+        written here and would be lost.
+    """
+    stored = StoredSweep(path)
+    content = hashlib.sha256(path.read_bytes()).hexdigest()
+    files = {
+        path.with_name(_CRATE): _crate(path, stored, content),
+        path.with_suffix(".croissant.json"): _croissant(path, stored, content),
+        path.with_suffix(".statistics.json"): statistics(stored),
+    }
+    for place, text in files.items():
+        replace_file(place, (json.dumps(text, indent=1) + "\n").encode())
+    return list(files)
+
+
+def statistics(stored: StoredSweep) -> dict[str, Any]:
+    """Mean, deviation, smallest and largest value of every variable of floating point numbers.
+
+    Over the runs that are ok and marked for training, and over their samples in time: one number for each remaining
+    entry (a coordinate, a blade and axis), as nested lists. NaN, of what a run did not reach, is left out.
+
+    Examples
+    --------
+    `{"runs": 800, "variables": {"angles": {"unit": "rad", "mean": [...], "std": [...], ...}}}`
+    """
+    chosen = (stored.column("status") == code_of("ok")) & (stored.column("split") == SPLITS.index("train"))
+    found = {}
+    for variable in stored.variables():
+        if variable.dimensions[0] == "run" and variable.kind == "f":
+            axes = tuple(i for i, name in enumerate(variable.dimensions) if name in ("run", "time"))
+            numbers = _moments(_rows(stored, variable, chosen), axes)
+            found[variable.name] = {"unit": variable.units, "dimensions": list(variable.dimensions), **numbers}
+    return {"runs": int(chosen.sum()), "split": "train", "variables": found}
+
+
+def _rows(stored: StoredSweep, variable: Variable, chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+    runs = max(_PIECE // max(8 * int(np.prod(variable.shape[1:], dtype=np.int64)), 1), 1)
+    first = 0
+    for piece in stored.pieces(variable.name, runs):
+        yield np.asarray(piece[chosen[first : first + len(piece)]], dtype=np.float64)
+        first += len(piece)
+
+
+@dataclass
+class _Moments:
+    """Running count, mean and sum of squared deviations, joined piece by piece as Chan, Golub and LeVeque (1983)."""
+
+    count: Any = 0.0
+    mean: Any = 0.0
+    squares: Any = 0.0
+    least: Any = field(default=np.inf)
+    largest: Any = field(default=-np.inf)
+
+    def add(self, values: NDArray[np.float64], axes: tuple[int, ...]) -> None:
+        finite = np.isfinite(values)
+        count = finite.sum(axis=axes)
+        some = np.maximum(count, 1)
+        mean = np.where(finite, values, 0.0).sum(axis=axes) / some
+        squares = np.where(finite, values - np.expand_dims(mean, axes), 0.0)
+        total = self.count + count
+        step = mean - self.mean
+        self.squares = self.squares + (squares**2).sum(axis=axes) + step**2 * self.count * count / np.maximum(total, 1)
+        self.mean = self.mean + step * count / np.maximum(total, 1)
+        self.least = np.minimum(self.least, np.where(finite, values, np.inf).min(axis=axes, initial=np.inf))
+        self.largest = np.maximum(self.largest, np.where(finite, values, -np.inf).max(axis=axes, initial=-np.inf))
+        self.count = total
+
+
+def _moments(pieces: Iterable[NDArray[np.float64]], axes: tuple[int, ...]) -> dict[str, Any]:
+    found = _Moments()
+    for piece in pieces:
+        found.add(piece, axes)
+    deviation = np.sqrt(found.squares / np.maximum(found.count, 1))
+    numbers = {"mean": found.mean, "std": deviation, "min": found.least, "max": found.largest}
+    return {name: _plain(np.where(found.count > 0, values, np.nan)) for name, values in numbers.items()}
+
+
+def _plain(values: NDArray[np.float64]) -> Any:
+    """As nested lists; null for what is no finite number, which JSON has not."""
+    if values.ndim:
+        return [_plain(value) for value in values]
+    return float(values) if np.isfinite(values) else None
+
+
+def _crate(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
+    place = path.with_name(_CRATE)
+    known = _crate_entities(place)
+    others = [one for one in known if one["@type"] == "File" and one["@id"] != path.name]
+    kept = [one for one in known if one["@type"] == "PropertyValue" and not one["@id"].startswith(f"#{path.name}/")]
+    measured = [
+        {
+            "@id": f"#{path.name}/{one.name}",
+            "@type": "PropertyValue",
+            "name": one.name,
+            "unitText": one.units,
+            "description": one.long_name,
+        }
+        for one in stored.variables()
+    ]
+    file = {
+        "@id": path.name,
+        "@type": "File",
+        "name": stored.title,
+        "description": stored.summary,
+        "encodingFormat": ["application/x-hdf5", "application/netcdf"],
+        "contentSize": str(path.stat().st_size),
+        "sha256": content,
+        "keywords": KEYWORDS,
+        "variableMeasured": [{"@id": one["@id"]} for one in measured],
+    }
+    files = sorted([*others, file], key=lambda one: str(one["@id"]))
+    descriptor = {
+        "@id": _CRATE,
+        "@type": "CreativeWork",
+        "about": {"@id": "./"},
+        "conformsTo": {"@id": _CRATE_PROFILE},
+        "creator": {"@id": "#rotor_mbs"},
+    }
+    root = {
+        "@id": "./",
+        "@type": "Dataset",
+        "name": "Parameter studies of a wind turbine rotor" if others else stored.title,
+        "description": "Datasets of rotor_mbs" if others else stored.summary,
+        "keywords": KEYWORDS,
+        "datePublished": date.today().isoformat(),
+        "hasPart": [{"@id": one["@id"]} for one in files],
+    }
+    program = {
+        "@id": "#rotor_mbs",
+        "@type": "SoftwareApplication",
+        "name": "rotor_mbs",
+        "softwareVersion": str(stored.attributes.get("rotor_mbs", "")),
+    }
+    return {"@context": f"{_CRATE_PROFILE}/context", "@graph": [descriptor, root, program, *files, *kept, *measured]}
+
+
+def _crate_entities(place: Path) -> list[dict[str, Any]]:
+    """What the folder's crate has so far. Raises StoreError where the crate is not ours."""
+    if not place.exists():
+        return []
+    try:
+        graph: list[dict[str, Any]] = json.loads(place.read_text(encoding="utf-8"))["@graph"]
+        if any(one["@id"] == "#rotor_mbs" and one["@type"] for one in graph):
+            return graph
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    raise StoreError(f"{place}: not written by rotor-mbs; allowed: a folder without one")
+
+
+def _croissant(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
+    """The variables with a run in front as fields of one record set, a record a run."""
+    kinds = {"f": "sc:Float", "i": "sc:Integer", "u": "sc:Integer"}
+    fields = [
+        {
+            "@type": "cr:Field",
+            "@id": f"runs/{one.name}",
+            "name": one.name,
+            "description": f"{one.long_name} [{one.units}], dimensions {' x '.join(one.dimensions)}",
+            "dataType": kinds[one.kind],
+            "source": {"fileObject": {"@id": path.name}, "extract": {"column": one.name}},
+        }
+        for one in stored.variables()
+        if one.dimensions[0] == "run"
+    ]
+    return {
+        "@context": _CONTEXT,
+        "@type": "sc:Dataset",
+        "conformsTo": _CROISSANT_PROFILE,
+        "name": path.stem,
+        "description": stored.summary,
+        "keywords": KEYWORDS.split(", "),
+        "datePublished": date.today().isoformat(),
+        "version": "1.0.0",
+        "distribution": [
+            {
+                "@type": "cr:FileObject",
+                "@id": path.name,
+                "name": path.name,
+                "contentUrl": path.name,
+                "contentSize": f"{path.stat().st_size} B",
+                "encodingFormat": "application/x-hdf5",
+                "sha256": content,
+            }
+        ],
+        "recordSet": [{"@type": "cr:RecordSet", "@id": "runs", "name": "runs", "field": fields}],
+    }

@@ -1,0 +1,124 @@
+"""Metadata beside a dataset: statistics from its numbers, JSON-LD that agrees with the file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from rotor_mbs.cli import main
+from rotor_mbs.studies.describe import describe
+
+ROOT = Path(__file__).parents[2]
+SWEEP = """
+title = "Stiffness and start"
+scene = "paper/fig11"
+change = { duration = 1.0 }
+samples = 11
+validation = 0.2
+test = 0.2
+outputs = ["angles", "rates", "tip"]
+[[axis]]
+key = "bearing.stiffness"
+values = [0, 1e3, 1e4]
+[[axis]]
+key = "initial.angles[1]"
+linear = { start = 0, end = 1, count = 6 }
+"""
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("described")
+    (folder / "study.toml").write_text(SWEEP)
+    path = folder / "out" / "study.nc"
+    command = ["sweep", str(folder / "study.toml"), "-o", str(path), "--metadata", "-j", "1"]
+    assert main(command) == 0
+    return path
+
+
+def _json(path: Path) -> Any:
+    return json.loads(path.read_text(), parse_constant=pytest.fail)
+
+
+def test_statistics_are_those_of_the_training_runs(dataset: Path) -> None:
+    """Against NumPy on the whole arrays: rounding alone may differ."""
+    found = _json(dataset.with_suffix(".statistics.json"))
+    with h5py.File(dataset) as file:
+        chosen = (file["status"][()] == 0) & (file["split"][()] == 0)
+        assert 0 < chosen.sum() == found["runs"] < len(chosen)
+        for name, axes in {"angles": (0, 1), "tip": (0, 1), "bearing_stiffness": 0, "energy_drift_max": 0}.items():
+            values, said = file[name][()][chosen], found["variables"][name]
+            assert said["unit"] == file[name].attrs["units"]
+            for key, function in {"mean": np.mean, "std": np.std, "min": np.min, "max": np.max}.items():
+                exact = function(values, axis=axes)
+                assert np.allclose(said[key], exact, rtol=1e-12, atol=1e-15 * np.abs(values).max()), (name, key)
+
+
+def test_a_run_that_broke_off_does_not_count(dataset: Path, tmp_path: Path) -> None:
+    path = tmp_path / "study.nc"
+    path.write_bytes(dataset.read_bytes())
+    with h5py.File(path, "r+") as file:
+        chosen = np.flatnonzero(file["split"][()] == 0)
+        file["status"][chosen[0]] = 2
+        file["angles"][chosen[0]] = np.nan
+        file["angles"][chosen[1], 5:] = np.nan
+    before, after = (
+        _json(Path(one).with_suffix(".statistics.json")) for one in (dataset, describe(path)[0].parent / path)
+    )
+    assert after["runs"] == before["runs"] - 1
+    assert all(isinstance(value, float) for value in after["variables"]["angles"]["mean"])
+
+
+def test_the_crate_and_croissant_name_every_variable_and_the_content(dataset: Path) -> None:
+    digest = hashlib.sha256(dataset.read_bytes()).hexdigest()
+    graph = {one["@id"]: one for one in _json(dataset.with_name("ro-crate-metadata.json"))["@graph"]}
+    entry = graph[dataset.name]
+    assert (entry["sha256"], int(entry["contentSize"])) == (digest, dataset.stat().st_size)
+    assert graph["./"]["hasPart"] == [{"@id": dataset.name}]
+    croissant = _json(dataset.with_suffix(".croissant.json"))
+    assert croissant["distribution"][0]["sha256"] == digest
+    with h5py.File(dataset) as file:
+        units = {name: item.attrs["units"] for name, item in file.items()}
+        along_runs = {name for name, item in file.items() if item.shape[0] == 18 and name != "message_byte"}
+    measured = {graph[one["@id"]]["name"]: graph[one["@id"]]["unitText"] for one in entry["variableMeasured"]}
+    assert measured == units
+    assert {one["name"] for one in croissant["recordSet"][0]["field"]} == along_runs
+
+
+def test_a_second_dataset_joins_the_crate_and_a_foreign_crate_stays(dataset: Path, tmp_path: Path) -> None:
+    for name in ("a.h5", "b.h5", "a.h5"):
+        (tmp_path / name).write_bytes(dataset.read_bytes())
+        describe(tmp_path / name)
+    crate = _json(tmp_path / "ro-crate-metadata.json")["@graph"]
+    assert [one["@id"] for one in crate if one["@type"] == "File"] == ["a.h5", "b.h5"]
+    assert len({one["@id"] for one in crate}) == len(crate)
+    foreign = tmp_path / "ro-crate-metadata.json"
+    foreign.write_text('{"@graph": []}')
+    with pytest.raises(Exception, match="not written by rotor-mbs"):
+        describe(tmp_path / "a.h5")
+    assert foreign.read_text() == '{"@graph": []}'
+
+
+def test_the_loader_of_the_documentation(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its text, run with a stand-in for PyTorch (0.4 GB): normalized angles of the training runs, and their inputs."""
+    [code] = re.findall(r"```python\n(import json.*?)```", (ROOT / "docs/sweeps.md").read_text(), re.DOTALL)
+    assert len(code.strip().splitlines()) <= 12
+    torch = SimpleNamespace(utils=SimpleNamespace(data=SimpleNamespace(Dataset=object)), from_numpy=lambda array: array)
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    monkeypatch.chdir(dataset.parent)
+    names: dict[str, Any] = {}
+    exec(code.replace("study.h5", dataset.name), names)
+    train = names["train"]
+    angles = np.stack([train[i][1] for i in range(len(train))])
+    assert np.abs(angles.mean(axis=(0, 1))).max() < 1e-12
+    assert np.abs(angles[:, :, :2].std(axis=(0, 1)) - 1.0).max() < 1e-12
+    assert train[0][0].shape == (2,)
