@@ -129,7 +129,9 @@ class SweepPlan:
         sweep, table = self.sweep, self.sweep.table
         return {
             "title": table.title,
-            "summary": f"{self.runs} runs of {sweep.base.name} by {', '.join(self.methods)}; varied: {', '.join(sweep.keys)}",
+            "summary": (
+                f"{self.runs} runs of {sweep.base.name} by {', '.join(self.methods)}; varied: {', '.join(sweep.keys)}"
+            ),
             "keywords": KEYWORDS,
             "sweep_toml": sweep.text,
             "base_scene": sweep.base.name,
