@@ -7,12 +7,14 @@ environment variable ROTOR_MBS_REPORT names.
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import subprocess
 import tarfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +25,9 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.modes import write_modes_pages
+from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.modes import compute_modes
+from rotor_mbs.studies.run import solve_judged
 
 pytestmark = [pytest.mark.browser, pytest.mark.skipif(not PROGRAM, reason="no Chromium here")]
 SIZES = (390, 1440)
@@ -155,7 +159,69 @@ def test_the_viewer_obeys_the_keyboard(page: Page, pages: list[Path]) -> None:
     page.key("Home", number=36)
     page.key(".", "Period", 190)
     time.sleep(0.2)
-    assert page.run(clock) == "0.03 s"  # one frame of 10 s / 360
+    assert page.run(clock) == "0.05 s"  # one frame, which is one of 200 sample intervals
+
+
+def _fast() -> list[Made]:
+    """A rotor at 4 rad/s for 300 s, which 361 frames and the shorter way round drew backwards."""
+    long = replace(paper("fig11"), duration=300.0, samples=6001, name="fast")
+    curve = rotor(lambda t: 4.0 * t, lambda t: 2.0 * np.sin(2.0 * t), np.cos, np.sin)
+    return [Made(long, "reference", curve)]
+
+
+def _fig14c() -> list[Made]:
+    """The printed equations of Fig. 14c, whose pitches reach hundreds of rad/s before they diverge."""
+    scene = paper("fig14c")
+    run, _ = solve_judged(scene, "printed/ode45")
+    time, angles = run.time, run.angles
+    curve = lambda t: np.stack([np.interp(t, time, column) for column in angles.T], axis=1)  # noqa: E731
+    return [Made(scene, "printed/ode45", curve, until=len(time) / scene.samples)]
+
+
+_DRAWN = """(() => {{
+  const lines = [], path = CanvasRenderingContext2D.prototype;
+  const box = document.querySelector('.viewer'), canvas = box.querySelector('canvas');
+  document.querySelector('[data-view=front]').click();
+  const {{ moveTo, lineTo }} = path;
+  path.moveTo = function (x, y) {{ lines.push([[x, y]]); moveTo.call(this, x, y); }};
+  path.lineTo = function (x, y) {{ lines[lines.length - 1].push([x, y]); lineTo.call(this, x, y); }};
+  const slider = document.querySelector('[data-part=time]');
+  slider.value = {value};
+  slider.dispatchEvent(new Event('input'));
+  return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => {{
+    Object.assign(path, {{ moveTo, lineTo }});
+    done([canvas.dataset.angles0.split(' ').map(Number), lines.filter(line => {chosen})]);
+  }})));
+}})()"""
+
+
+@pytest.mark.parametrize("made", [_fast, _fig14c])
+def test_drawn_angles_are_those_of_the_data_and_fast_paths_are_round(
+    page: Page, tmp_path: Path, made: Callable[[], list[Made]]
+) -> None:
+    """At 50 random times, to h² max|q̈| / 8 = 0.016 rad of straight lines between frames and the rounding of 16 bits."""
+    (run,) = made()
+    path = write_report(store(tmp_path / "r.h5", [run]), tmp_path / "out").parent
+    with open_results(tmp_path / "r.h5") as opened:
+        stored = next(iter(next(iter(opened.scenes.values())).runs.values()))
+        time, angles = stored.array("time"), stored.array("angles")
+    page.open(next(path.glob("*f*14c.html" if made is _fig14c else "fast.html")), 1440)
+    steps = np.abs(np.diff(angles, axis=0)).max()
+    for share in np.random.default_rng(0).random(50):
+        drawn, lines = page.run(_DRAWN.format(value=1000.0 * share, chosen="line.length === 2"))
+        wanted = np.array([np.interp(share * time[-1], time, column) for column in angles.T])
+        np.testing.assert_allclose(drawn, wanted, atol=0.016 + steps / 32766)
+        # A blade's axis, from the hub, as it stands in the picture: from above, clockwise in this view.
+        hub, axis = next(np.array(line) for line in lines if len(line) == 2 and math.dist(*line) > 50.0)
+        turned = np.arctan2(axis[0] - hub[0], hub[1] - axis[1])
+        phases = [0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0]  # the blade that is drawn first is the farthest
+        assert min(abs(np.remainder(turned - wanted[0] - p + np.pi, 2 * np.pi) - np.pi) for p in phases) < 0.02
+    _, lines = page.run(_DRAWN.format(value=1000, chosen="line.length > 300"))
+    trails = [np.array(line) for line in lines]
+    assert trails
+    for trail in trails:
+        corners = np.diff(np.unwrap(np.arctan2(*(trail - hub).T[::-1])))
+        assert np.abs(corners).max() < 0.1  # rad; a polygon of 63 corners a turn or more
 
 
 @pytest.mark.parametrize("how", ["mouse", "touch"])

@@ -20,10 +20,19 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core import numbers, svg
-from rotor_mbs.report.core.canvas import panels, svg_text
+from rotor_mbs.report.core.canvas import panels
 from rotor_mbs.report.core.elements import LegendEntry
 from rotor_mbs.report.core.files import page_names
-from rotor_mbs.report.core.looks import COLOURS, GREY, Look, label_of, look_of
+from rotor_mbs.report.core.looks import (
+    COLOURS,
+    GREY,
+    PALETTE,
+    Look,
+    class_of,
+    coordinate_look,
+    label_of,
+    look_of,
+)
 from rotor_mbs.report.plots import time_histories as figures
 from rotor_mbs.report.plots.paths import paths
 
@@ -151,19 +160,44 @@ def _is_vertical(line: Line2D) -> bool:
     return bool(x[0] == x[1] and y[0] != y[1] and x[0] < 0.0)
 
 
-def test_embedding_moves_no_point_and_changes_no_label() -> None:
+def test_a_picture_has_every_point_label_and_colour_of_its_axes() -> None:
     picture = panels((2.0,), "time (s)")
-    picture.axes[0].plot([0.0, 0.5, 1.0, 1.0, 2.0], [0.1234567, 0.5, 0.25, 0.75, 0.123])
-    picture.axes[0].set_yticks([0.125, 0.625])
-    plain = svg_text(picture.figure)
-    text = svg.embedded(plain, "n", "title <b>", "described & so")
-    assert ">0.125<" in text
-    assert ">0.625<" in text
-    assert "title &lt;b&gt;" in text
-    assert "described &amp; so" in text
-    found, wanted = (max(re.findall(r' d="(M[^"]*)"', one), key=len) for one in (text, plain))
-    numbers_found, numbers_wanted = (np.array(re.findall(r"-?[\d.]+", one), float) for one in (found, wanted))
-    np.testing.assert_allclose(numbers_found, numbers_wanted, atol=0.051)
+    axes = picture.axes[0]
+    axes.plot([0.0, 0.5, 1.0, 1.0, 2.0], [0.1234567, 0.5, 0.25, 0.75, 0.123], color=COLOURS[2], marker="s")
+    axes.set_yticks([0.125, 0.625])
+    axes.set_ylabel("angle (rad)")
+    text = svg.drawing(picture, "n", "title <b>", "described & so")
+    for shown in (">0.125<", ">0.625<", ">time (s)<", ">angle (rad)<", "title &lt;b&gt;", "described &amp; so"):
+        assert shown in text
+    curve, marks = re.findall(rf'class="{class_of(COLOURS[2])}[^"]*"[^>]* d="([^"]*)"', text)
+    wanted = axes.transData.transform(axes.get_lines()[0].get_xydata()) * 72.0 / picture.figure.dpi
+    height = 72.0 * picture.figure.get_figheight()
+    x, y = map(float, re.search(r'<svg x="([\d.]+)" y="([\d.]+)"', text).groups())  # type: ignore[union-attr]
+    begin, _, steps = curve.removeprefix("M").partition("l")
+    drawn = np.vstack(
+        [np.array(begin.split(), float), np.array(re.findall(r"-?(?:\d+\.?\d*|\.\d+)", steps), float).reshape(-1, 2)]
+    )
+    np.testing.assert_allclose(
+        drawn.cumsum(axis=0) + np.array([x, y]), wanted * (1, -1) + np.array([0.0, height]), atol=0.11
+    )
+    assert marks.count("M") == len(wanted)
+
+
+def test_every_colour_of_a_picture_is_in_the_style_sheet_light_and_dark(report: Path) -> None:
+    for path in report.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        style = text[: text.index("</style>")]
+        for name in set(re.findall(r'class="(k\d+)', text)):
+            assert style.count(f"--{name}:") == 2, name
+            assert f".{name}{{color:var(--{name})}}" in style
+        assert not re.search(r'(stroke|fill)="#', text[len(style) :])  # no colour that a dark page could not change
+
+
+def test_colours_of_methods_and_of_coordinates_differ() -> None:
+    of_methods = {look_of(name).colour for name in ("reference", *method_names())}
+    of_coordinates = {coordinate_look(index).colour for index in range(12)}
+    assert not of_methods & of_coordinates
+    assert of_methods | of_coordinates <= set(PALETTE)
 
 
 # What a page has

@@ -14,18 +14,18 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.viewer import FRAMES, magnification, packed, script_json, viewer
+from rotor_mbs.report.pages.viewer import FEWEST, MOST, frames, magnification, packed, script_json, viewer
 from rotor_mbs.store.read import open_results
 
 TEMPLATES = Path(write_report.__code__.co_filename).parent / "templates"
 FIG11 = paper("fig11", samples=301)
 TURNING = rotor(lambda t: 40.0 * t, lambda t: -7.0 * t + 1.0, np.cos, np.sin)
-TURN = 2.0 * np.pi
 
 
-def unpacked(text: str, coordinates: int) -> np.ndarray:  # type: ignore[type-arg]
-    """rad, (frames, coordinates), each within one turn: as templates/viewer.js reads it."""
-    return np.frombuffer(base64.b64decode(text), "<u2").reshape(-1, coordinates) * TURN / 65536
+def unpacked(packed: dict) -> np.ndarray:  # type: ignore[type-arg]
+    """rad, (frames, coordinates): as templates/viewer.js reads it."""
+    steps = np.frombuffer(base64.b64decode(packed["steps"]), "<i2").reshape(-1, len(packed["start"]))
+    return packed["start"] + packed["quantum"] * np.cumsum(steps.astype(int), axis=0)
 
 
 def data_of(text: str) -> dict:  # type: ignore[type-arg]
@@ -34,15 +34,36 @@ def data_of(text: str) -> dict:  # type: ignore[type-arg]
     return json.loads(found[1])
 
 
-def test_angles_come_back_to_a_ten_thousandth_of_a_radian() -> None:
+def test_angles_come_back_to_a_ten_thousandth_of_a_radian_over_any_number_of_turns() -> None:
     time = np.linspace(0.0, 10.0, 1001)
     angles = np.stack([200.0 * time, -3.0 + np.sin(time)], axis=1)
-    found = unpacked(packed(time, angles, 10.0 / 360), 2)
-    assert len(found) == 361
-    at = np.arange(361) * 10.0 / 360
-    wanted = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
-    gap = (found - wanted + np.pi) % TURN - np.pi
-    assert np.abs(gap).max() <= 0.5 * TURN / 65536 * 1.001  # rounding to 16 bits
+    found = unpacked(packed(time, angles, 0.01))
+    np.testing.assert_allclose(found, angles, atol=0.5001e-4)  # rounding, which does not add up
+
+
+def test_frames_follow_from_the_fastest_rate() -> None:
+    """A rotor at 4 rad/s for 300 s turned backwards with 361 frames: 3.3 rad from one to the next."""
+    time = np.linspace(0.0, 300.0, 3001)
+    turning, still = np.stack([4.0 * time, 0.0 * time], axis=1), np.zeros((3001, 2))
+    assert frames([(time, turning), (time, still)]) == MOST
+    assert frames([(time, still)]) == FEWEST
+    assert frames([(time, 0.1 * turning)]) == MOST  # 120 rad in steps of 0.05
+    assert frames([(time, 0.025 * turning)]) == pytest.approx(601, abs=1)
+    # Samples that are hardly more than needed are shown as they are.
+    assert frames([(time[:1001], turning[:1001])]) == 1001
+
+
+def test_a_motion_too_fast_for_the_frames_is_stated(tmp_path: Path) -> None:
+    made = {}
+    for name, rate in (("slow", 4.0), ("fast", 400.0)):
+        path = store(tmp_path / f"{name}.h5", [Made(FIG11, "reference", rotor(lambda t, w=rate: w * t))])
+        with open_results(path) as opened:
+            scene = opened.scenes["paper/fig11"]
+            found = viewer(scene, dict(scene.runs))
+        assert found is not None
+        made[name] = list(found.notes)
+    assert made["slow"] == []
+    assert "turns by up to 13 rad from one frame to the next" in made["fast"][0].replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
@@ -51,10 +72,10 @@ def test_a_page_holds_both_models_thinned_and_small(tmp_path: Path) -> None:
     text = (folder / "paper-fig11.html").read_text(encoding="utf-8")
     data = data_of(text)
     assert [one["name"] for one in data["models"]] == ["as printed, ode45", "reference, quad precision"]
-    frames = [len(unpacked(one["angles"], 4)) for one in data["models"]]
-    assert frames[1] == FRAMES
+    counts = [len(unpacked(one)) for one in data["models"]]
+    assert counts[1] == 301  # every sample
     # The printed run stops at 149/300 of 10 s: its frames do, too.
-    assert (frames[0] - 1) * data["step"] == pytest.approx(10.0 * 149 / 300, abs=data["step"])
+    assert (counts[0] - 1) * data["step"] == pytest.approx(10.0 * 149 / 300, abs=data["step"])
     assert data["blades"][1]["tip"] == list(FIG11.blades[1].tip)
     assert len(json.dumps(data)) < 15_000
     own = [one for one in re.findall(r"<script>(.*?)</script>", text, re.S) if "viewer" in one]
@@ -70,7 +91,7 @@ def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path
         made = viewer(scene, dict(scene.runs))
     assert made is not None
     data = json.loads(str(made.data))
-    assert (FRAMES - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
+    assert (len(unpacked(data["models"][0])) - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
 
 
 @pytest.mark.parametrize(("offset", "factor"), [(0.11, 10), (0.5, 2), (2.0, 1), (0.0, None)])

@@ -17,6 +17,8 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
@@ -157,3 +159,13 @@ def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, labe
     with style():
         panels.figure.colorbar(mesh, ax=axes).set_label(label)
     return levels
+
+
+def has_map(figure: Figure) -> bool:
+    """Whether the figure has a `growth_map`."""
+    return any(isinstance(one, QuadMesh) for axes in figure.axes for one in axes.collections)
+
+
+def hex_colour(colour: Any) -> str:
+    """Any colour of matplotlib's as "#0072b2"."""
+    return to_hex(colour)

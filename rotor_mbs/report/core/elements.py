@@ -7,23 +7,24 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from rotor_mbs.report.core.looks import GREY, Look
+from rotor_mbs.report.core.looks import GREY, Look, class_of
 
 _DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
-_MARKS = {
-    "o": "M3 0a3 3 0 1 1-6 0a3 3 0 1 1 6 0z",
-    "s": "M-3-3h6v6h-6z",
-    "^": "M0-3.5l3.5 6.5h-7z",
-    "v": "M0 3.5l3.5-6.5h-7z",
-    "x": "M-3-3l6 6m0-6l-6 6",
-    "D": "M0-4l4 4l-4 4l-4-4z",
-    "P": "M-1-3h2v2h2v2h-2v2h-2v-2h-2v-2h2z",
-    "X": "M-3-1.8L-1.8-3 0-1.2 1.8-3 3-1.8 1.2 0 3 1.8 1.8 3 0 1.2-1.8 3-3 1.8-1.2 0z",
-    "h": "M0-3.2L2.8-1.6V1.6L0 3.2-2.8 1.6V-1.6z",
-    "*": "M0-4l1 3h3l-2 2l1 3l-3-2l-3 2l1-3l-2-2h3z",
-    "<": "M-3.5 0l6.5-3.5v7z",
-    ">": "M3.5 0l-6.5-3.5v7z",
-    "p": "M0-4l3.8 2.8l-1.5 4.4h-4.6l-1.5-4.4z",
+# Paths of markers around a point, in relative steps: several can stand in one path.
+MARKS = {
+    "o": "m3 0c0 4-6 4-6 0c0-4 6-4 6 0z",
+    "s": "m-3-3h6v6h-6z",
+    "^": "m0-3.5l3.5 6.5h-7z",
+    "v": "m0 3.5l3.5-6.5h-7z",
+    "x": "m-3-3l6 6m0-6l-6 6",
+    "D": "m0-4l4 4l-4 4l-4-4z",
+    "P": "m-1-3h2v2h2v2h-2v2h-2v-2h-2v-2h2z",
+    "X": "m-3-1.8l1.2-1.2 1.8 1.8 1.8-1.8 1.2 1.2-1.8 1.8 1.8 1.8-1.2 1.2-1.8-1.8-1.8 1.8-1.2-1.2 1.8-1.8z",
+    "h": "m0-3.2l2.8 1.6v3.2l-2.8 1.6-2.8-1.6v-3.2z",
+    "*": "m0-4l1 3h3l-2 2l1 3l-3-2l-3 2l1-3l-2-2h3z",
+    "<": "m-3.5 0l6.5-3.5v7z",
+    ">": "m3.5 0l-6.5-3.5v7z",
+    "p": "m0-4l3.8 2.8l-1.5 4.4h-4.6l-1.5-4.4z",
 }
 
 
@@ -82,18 +83,24 @@ class LegendEntry:
         return _DASHES.get(self.look.line, "")
 
     @property
+    def colour_class(self) -> str:
+        """The class of its colour in the style sheet."""
+        return class_of(self.look.colour) or class_of(GREY)
+
+    @property
     def mark(self) -> str:
         """The marker's path in SVG."""
-        return _MARKS.get(self.look.marker, "")
+        return MARKS.get(self.look.marker, "")
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as SVG for the inside of a page, its caption, and notes below the caption."""
+    """A figure as SVG for the inside of a page, its caption, notes below the caption, and its own legend."""
 
     svg: Markup
     caption: str
     notes: Sequence[str] = ()
+    legend: Sequence[LegendEntry] = ()
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import numbers
+from rotor_mbs.report.core.looks import palette_css, with_light_palette
 from rotor_mbs.store.hdf5 import replace_file
 
 GENERATOR = "rotor_mbs report"
@@ -81,10 +82,17 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    style = (_TEMPLATES / "style.css").read_text(encoding="utf-8").strip()
+    style, picture = ((_TEMPLATES / f"{name}.css").read_text(encoding="utf-8") for name in ("style", "picture"))
     scripts = {path.stem: _script(path) for path in sorted(_TEMPLATES.glob("*.js"))}
     hashes = {name: _hash(text) for name, text in scripts.items()}
-    environment.globals.update(generator=GENERATOR, style=Markup(style), scripts=scripts, hashes=hashes)
+    alone = with_light_palette(picture.replace("figure>svg", ":root"))  # of a picture that is saved as a file
+    environment.globals.update(
+        picture_style=alone,
+        generator=GENERATOR,
+        style=Markup(palette_css() + style + picture.strip()),
+        scripts=scripts,
+        hashes=hashes,
+    )
     environment.filters.update(number=numbers.number, with_unit=numbers.with_unit)
     return environment
 

@@ -2,14 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.methods.ladders import Look
 
-__all__ = ["COLOURS", "GREY", "Look", "coordinate_look", "label_of", "look_of", "with_capital"]
+__all__ = [
+    "COLOURS", "COORDINATES", "GREY", "INK", "PALETTE", "PAPER", "Look",
+    "class_of", "coordinate_look", "label_of", "look_of", "palette_css", "with_capital", "with_light_palette",
+]  # fmt: skip
 
-# Okabe & Ito's colours, distinguishable with colour blindness; without the yellow, which does not show on white.
-COLOURS = ("#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-GREY = "#666666"
+# Every colour of a picture, and what stands for it on a dark page. A picture has colours of methods or of coordinates,
+# never of both.
+INK, PAPER, GREY = "#000000", "#ffffff", "#666666"
+_METHODS = {  # Okabe & Ito's, distinguishable with colour blindness; without the yellow, which does not show on white
+    INK: "#e6e9ed", "#0072b2": "#4fa8e0", "#d55e00": "#ff8a3d", "#009e73": "#2fc498", "#cc79a7": "#e79cc6",
+    "#e69f00": "#f7bd45", "#56b4e9": "#9bd6f8",
+}  # fmt: skip
+_COORDINATES = {  # Tol's muted ones: the rotor, then a blade each
+    "#4a5058": "#c9ced4", "#882255": "#e583b2", "#2a8a7e": "#62cdbf", "#5a46b5": "#ab9ff5", "#8a7a1c": "#d6c75c",
+    "#b5505f": "#f2a3ae",
+}  # fmt: skip
+_OTHERS = {GREY: "#a3adb8", PAPER: "#1d2127", "#c8c8c8": "#4d5560", "#dddddd": "#3a424b", "#f2e3de": "#3a2e2a"}
+PALETTE = {**_METHODS, **_COORDINATES, **_OTHERS}
+COLOURS, COORDINATES = tuple(_METHODS), tuple(_COORDINATES)
+_CLASSES = {colour: f"k{place}" for place, colour in enumerate(PALETTE)}
+
+
+def class_of(colour: str) -> str:
+    """The class of a colour of the palette in the style sheet; "" for another colour."""
+    return _CLASSES.get(colour, "")
+
+
+def palette_css() -> str:
+    """The palette as variables of a style sheet, light and, where the page is dark, dark; and a class per colour."""
+    light, dark = (_variables(shades) for shades in ({one: one for one in PALETTE}, PALETTE))
+    classes = "".join(f".{name}{{color:var(--{name})}}" for name in _CLASSES.values())
+    night = "@media screen and (prefers-color-scheme:dark)"
+    return f":root{{{light}--grid:#e4e4e4}}\n{night}{{:root{{{dark}--grid:#333b44}}}}\n{classes}\n"
+
+
+def _variables(shades: Mapping[str, str]) -> str:
+    values = "".join(f"--{_CLASSES[one]}:{shown};" for one, shown in shades.items())
+    return f"{values}--sheet:{shades[PAPER]};"
+
+
+def with_light_palette(css: str) -> str:
+    """`css` of pictures and the classes of the palette, with light colours in place of variables."""
+    css = "".join(f".{name}{{color:{colour}}}" for colour, name in _CLASSES.items()) + css
+    for name, colour in [*((name, colour) for colour, name in _CLASSES.items()), ("sheet", PAPER), ("grid", "#e4e4e4")]:
+        css = css.replace(f"var(--{name})", colour)
+    return css
 
 
 def with_capital(text: str) -> str:
@@ -19,4 +62,5 @@ def with_capital(text: str) -> str:
 
 def coordinate_look(index: int) -> Look:
     """Line of a coordinate: 0 the rotor, i the pitch (and the tip) of blade i."""
-    return Look(COLOURS[index % len(COLOURS)], "-" if index == 0 else ("-", "--", "-.")[(index - 1) % 3], "")
+    colour = COORDINATES[0] if index == 0 else COORDINATES[1 + (index - 1) % (len(COORDINATES) - 1)]
+    return Look(colour, "-" if index == 0 else ("-", "--", "-.")[(index - 1) % 3], "")

@@ -1,7 +1,7 @@
 """The data of the viewer on a scene's page: the bodies, and each model's angles at equally spaced times.
 
-Angles are turns in 16 bits (1e-4 rad, a pixel at the tip on any screen). Between frames the viewer goes the shorter
-way round: a coordinate may turn half a revolution from one to the next. `templates/viewer.js` draws.
+Angles are sent as differences of 16 bits, so that a coordinate may turn any number of times; the number of frames
+follows from the fastest rate. `templates/viewer.js` draws.
 """
 
 from __future__ import annotations
@@ -18,14 +18,17 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.rehydrate import scene_of
-from rotor_mbs.report.core.looks import coordinate_look
+from rotor_mbs.report.core.looks import class_of, coordinate_look, with_capital
+from rotor_mbs.report.core.numbers import with_unit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[Any]
-FRAMES = 361
+FEWEST, MOST = 241, 2401  # frames: of a slow motion; of a page of a size that can be mailed
+_ARC = 0.05  # rad that a coordinate turns from a frame to the next, where the samples and MOST allow it
+_COARSE = 0.5 * math.pi  # rad from a frame to the next beyond which the page says that it interpolates
+_QUANTUM, _LARGEST = 1e-4, 32767  # rad: a pixel at the tip on any screen; 16 bits with a sign
 _VISIBLE = 0.1  # of the longest blade
-_TURN = 65536  # values of 16 bits
 
 
 @dataclass(frozen=True)
@@ -33,11 +36,13 @@ class Viewer:
     """For the template. data: JSON, safe inside a script element; models: their names, in the order of the data.
 
     magnified: how many times the tip's distance from the pitch axis is drawn at first; None where it has none.
+    notes: where a motion is too fast for the frames.
     """
 
     data: Markup
     models: Sequence[str]
     magnified: int | None
+    notes: Sequence[str] = ()
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> Viewer | None:
@@ -51,17 +56,50 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> Viewer | None:
     end = max(float(time[-1]) for time, _ in moves.values())
     if end <= 0.0:
         return None
-    step = end / (FRAMES - 1)
+    count = frames(list(moves.values()))
+    step = end / (count - 1)
     data = {
         "step": step,
-        "colours": [coordinate_look(i + 1).colour for i in range(len(scene.blades))],
+        "colours": [class_of(coordinate_look(i + 1).colour) for i in range(len(scene.blades))],
         "blades": [
             {"phase": phase, "tip": blade.tip, "mass": blade.centre_of_mass}
             for phase, blade in zip(scene.phases, scene.blades, strict=True)
         ],
-        "models": [{"name": name, "angles": packed(*move, step)} for name, move in moves.items()],
+        "models": [{"name": name, **packed(*move, step)} for name, move in moves.items()],
     }
-    return Viewer(script_json(data), list(moves), magnification(scene))
+    notes = [
+        note for name, (time, angles) in moves.items() if (note := _coarseness(name, angles_at(time, angles, step)))
+    ]
+    return Viewer(script_json(data), list(moves), magnification(scene), notes)
+
+
+def frames(moves: Sequence[tuple[Array, Array]]) -> int:
+    """How many frames the runs (time in s, angles in rad) need: as many as the fastest motion takes, at most MOST.
+
+    All samples where they are not many more than needed: then nothing is interpolated that was not stored.
+    """
+    time = max((time for time, _ in moves), key=lambda time: float(time[-1]))
+    rate = max(float((np.abs(np.diff(a, axis=0)).max(axis=1) / np.diff(t)).max()) for t, a in moves)
+    needed = min(max(math.ceil(min(rate * float(time[-1]) / _ARC, 1e9)) + 1, FEWEST), MOST)
+    return len(time) if len(time) <= MOST and needed > len(time) // 2 else needed
+
+
+def angles_at(time: Array, angles: Array, step: float) -> Array:
+    """(frames, coordinates) rad at 0, step, 2 step ...: straight between samples."""
+    count = math.floor(float(time[-1]) / step + 1e-9) + 1
+    at = np.minimum(np.arange(count) * step, time[-1])
+    return np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
+
+
+def _coarseness(name: str, shown: Array) -> str:
+    """A sentence where a coordinate turns far between two frames: which way it took in between is not known there."""
+    largest = float(np.abs(np.diff(shown, axis=0)).max(initial=0.0))
+    if largest <= _COARSE:
+        return ""
+    return (
+        f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame to the next, the limit of the "
+        "page's data: in between the picture goes evenly."
+    )
 
 
 def magnification(scene: Scene) -> int | None:
@@ -76,13 +114,17 @@ def magnification(scene: Scene) -> int | None:
     return max(1, round(_VISIBLE * length / offset))
 
 
-def packed(time: Array, angles: Array, step: float) -> str:
-    """Base64 of (frames, coordinates) unsigned 16 bit, little end first: the angle at 0, step, 2 step ... in turns."""
-    frames = math.floor(float(time[-1]) / step + 1e-9) + 1
-    at = np.minimum(np.arange(frames) * step, time[-1])
-    values = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
-    turns = np.round(values / (2.0 * np.pi) * _TURN) % _TURN
-    return base64.b64encode(turns.astype("<u2").tobytes()).decode("ascii")
+def packed(time: Array, angles: Array, step: float) -> dict[str, object]:
+    """The angles (rad) at 0, step, 2 step ...: those at the start, and the steps from frame to frame in `quantum` rad.
+
+    steps: base64 of (frames, coordinates) signed 16 bit, little end first. Rounding does not add up.
+    """
+    shown = angles_at(time, angles, step)
+    largest = float(np.abs(np.diff(shown, axis=0)).max(initial=0.0))
+    quantum = max(_QUANTUM, largest / (_LARGEST - 1))
+    places = np.round((shown - shown[0]) / quantum)
+    steps = np.diff(places, axis=0, prepend=0.0).astype("<i2")
+    return {"start": shown[0].tolist(), "quantum": quantum, "steps": base64.b64encode(steps.tobytes()).decode("ascii")}
 
 
 def script_json(data: object) -> Markup:

@@ -1,25 +1,32 @@
 "use strict";
 (() => {
   // Turns the data of each viewer on the page into a rotor that moves. Angles: rotor, then a pitch per blade.
-  const TURN = 65536, RING = 72, GREY = "#6b7280", INK = "#1b1f24";
+  const RING = 72, ARC = 0.06, TRAIL = 20000;
   const VIEWS = { oblique: [-62, 14], front: [-90, 0], side: [0, 0], top: [-90, 89] };
+  const shades = getComputedStyle(document.documentElement), night = matchMedia("(prefers-color-scheme:dark)");
+  const shade = (name) => shades.getPropertyValue(`--${name}`).trim();
 
-  const unpack = (text, columns) => {
-    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-    const values = new DataView(bytes.buffer), frames = [];
+  // Differences of 16 bits, in units of `quantum` rad, summed up from the start.
+  const unpack = ({ start, quantum, steps }) => {
+    const bytes = Uint8Array.from(atob(steps), (sign) => sign.charCodeAt(0)), columns = start.length;
+    const values = new DataView(bytes.buffer), frames = [], sums = start.map(() => 0);
     for (let at = 0; at < bytes.length; at += 2 * columns) {
-      frames.push(Array.from({ length: columns }, (_, i) => values.getUint16(at + 2 * i, true)));
+      frames.push(start.map((from, i) => from + quantum * (sums[i] += values.getInt16(at + 2 * i, true))));
     }
     return frames;
   };
 
-  // Between two frames the short way round.
+  // Angles are whole, not within one turn: straight from a frame to the next.
   const between = (frames, place) => {
     const last = frames.length - 1, i = Math.min(Math.floor(place), last), j = Math.min(i + 1, last), part = place - i;
-    return frames[i].map((from, k) => {
-      const way = ((frames[j][k] - from + 1.5 * TURN) % TURN) - TURN / 2;
-      return ((from + (j > i ? part * way : 0)) * 2 * Math.PI) / TURN;
-    });
+    return frames[i].map((from, k) => from + part * (frames[j][k] - from));
+  };
+
+  // Places on the path of each frame interval: so many that it turns by no more than ARC between two of them.
+  const sections = (frames, column) => {
+    const ways = frames.slice(1).map((to, i) => Math.abs(to[0] - frames[i][0]) + Math.abs(to[column] - frames[i][column]));
+    const arc = Math.max(ARC, ways.reduce((sum, way) => sum + way, 0) / TRAIL);
+    return ways.map((way) => Math.max(1, Math.ceil(way / arc)));
   };
 
   // Ry(rotor + phase) Rz(pitch) of a point of the blade, its distance from the pitch axis magnified.
@@ -30,8 +37,8 @@
   };
 
   const start = (box) => {
-    const data = JSON.parse(box.querySelector("script").textContent), columns = data.blades.length + 1;
-    const models = data.models.map((one) => ({ name: one.name, frames: unpack(one.angles, columns) }));
+    const data = JSON.parse(box.querySelector("script").textContent);
+    const models = data.models.map((one) => ({ name: one.name, frames: unpack(one) }));
     const canvas = box.querySelector("canvas"), pen = canvas.getContext("2d");
     const part = (name) => box.querySelector(`[data-part=${name}]`);
     const reach = Math.max(...data.blades.map((blade) => Math.hypot(...blade.tip)));
@@ -41,12 +48,21 @@
     const value = (name, otherwise) => (part(name) ? part(name).value : otherwise);
     const magnified = () => Number(value("offset", 1));
 
+    // Of each blade the points of its path, and the time of each.
     const trace = () => {
-      trails = models.map((one) => data.blades.map((blade, i) =>
-        one.frames.map((_, frame) => {
-          const angles = between(one.frames, frame);
-          return placed(blade.tip, blade.phase, angles[0], angles[i + 1], magnified());
-        })));
+      trails = models.map(({ frames }) => data.blades.map((blade, i) => {
+        const points = [], times = [];
+        const add = (place) => {
+          const angles = between(frames, place);
+          points.push(placed(blade.tip, blade.phase, angles[0], angles[i + 1], magnified()));
+          times.push(place * data.step);
+        };
+        add(0);
+        sections(frames, i + 1).forEach((count, frame) => {
+          for (let k = 1; k <= count; k++) add(frame + k / count);
+        });
+        return { points, times };
+      }));
     };
 
     const camera = (centre, scale) => {
@@ -68,30 +84,32 @@
 
     const room = (see) => {
       const ring = Array.from({ length: RING + 1 }, (_, i) => (2 * Math.PI * i) / RING);
-      line(see, ring.map((w) => [reach * Math.sin(w), 0, reach * Math.cos(w)]), "#d5dae0", 1);
-      line(see, [[0, 0, 0], [0, -0.3 * reach, 0]], GREY, 6);
+      line(see, ring.map((w) => [reach * Math.sin(w), 0, reach * Math.cos(w)]), shade("k16"), 1);
+      line(see, [[0, 0, 0], [0, -0.3 * reach, 0]], shade("k13"), 6);
     };
 
     const paths = (see, index, plain) => {
-      const until = Math.min(now / data.step, models[index].frames.length - 1);
-      trails[index].forEach((trail, i) => {
+      trails[index].forEach(({ points, times }, i) => {
+        const colour = shade(data.colours[i]), dashes = plain ? [4, 3] : [];
+        const after = times.findIndex((time) => time > now);
         pen.globalAlpha = 0.18;
-        line(see, trail, data.colours[i], 1, plain ? [4, 3] : []);
+        line(see, points, colour, 1, dashes);
         pen.globalAlpha = plain ? 0.6 : 0.9;
-        line(see, trail.slice(0, Math.floor(until) + 1), data.colours[i], 1.4, plain ? [4, 3] : []);
+        line(see, after < 0 ? points : points.slice(0, after), colour, 1.4, dashes);
       });
       pen.globalAlpha = 1;
     };
 
     const blades = (see, index, plain) => {
       const angles = between(models[index].frames, now / data.step), m = magnified();
+      canvas.dataset[`angles${index}`] = angles.join(" ");
       const drawn = data.blades.map((blade, i) => {
         const put = (point) => placed(point, blade.phase, angles[0], angles[i + 1], m);
         const tip = put(blade.tip), root = put([blade.tip[0], blade.tip[1], 0.06 * reach]);
         return { i, tip, root, axis: put([0, 0, blade.tip[2]]), mass: put(blade.mass), depth: see.depth(tip) };
       });
       drawn.sort((one, other) => one.depth - other.depth).forEach(({ i, tip, root, axis, mass }) => {
-        const colour = data.colours[i];
+        const colour = shade(data.colours[i]);
         if (!plain) {
           pen.beginPath();
           [[0, 0, 0], axis, tip, root].forEach((point, k) => pen[k ? "lineTo" : "moveTo"](...see.at(point)));
@@ -105,7 +123,7 @@
         [[mass, 4], [tip, 2.5]].forEach(([point, size]) => {
           pen.beginPath();
           pen.arc(...see.at(point), size, 0, 2 * Math.PI);
-          pen.fillStyle = plain ? "#fff" : colour;
+          pen.fillStyle = plain ? shade("sheet") : colour;
           pen.fill();
           pen.setLineDash([]);
           Object.assign(pen, { strokeStyle: colour, lineWidth: 1.5 });
@@ -114,14 +132,14 @@
       });
       pen.beginPath();
       pen.arc(...see.at([0, 0, 0]), 6, 0, 2 * Math.PI);
-      pen.fillStyle = INK;
+      pen.fillStyle = shade("k0");
       pen.fill();
     };
 
     const label = (index, x, y, dashed) => {
       const one = models[index], last = (one.frames.length - 1) * data.step, over = now > last + 0.5 * data.step;
       pen.font = "600 14px system-ui, sans-serif";
-      pen.fillStyle = over ? "#a8300a" : INK;
+      pen.fillStyle = over ? shade("bad") : shade("k0");
       const text = `${one.name}${dashed ? ` (${box.dataset.dashed})` : ""}`;
       pen.fillText(over ? `${text}: ${box.dataset.ended} ${last.toFixed(2)} s` : text, x, y);
     };
@@ -228,6 +246,7 @@
     box.hidden = false;
     trace();
     new ResizeObserver(refresh).observe(canvas);
+    night.addEventListener("change", refresh);
     refresh();
   };
 

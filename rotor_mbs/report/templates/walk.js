@@ -7,7 +7,9 @@
     const copy = figure.querySelector("svg").cloneNode(true), box = copy.viewBox.baseVal;
     copy.setAttribute("width", `${WIDTH_MM}mm`);
     copy.setAttribute("height", `${(WIDTH_MM * box.height) / box.width}mm`);
-    copy.setAttribute("style", "font-size:9.5px;font-family:'DejaVu Sans',Verdana,Arial,sans-serif;stroke-linejoin:round;background:#fff");
+    const style = document.createElementNS(copy.namespaceURI, "style");
+    style.textContent = document.querySelector("[data-style]").dataset.style + ":root{background:#fff}";
+    copy.prepend(style);
     return { text: new XMLSerializer().serializeToString(copy), ratio: box.height / box.width };
   };
 
