@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis.claims import all_hold, readings_of
 from rotor_mbs.analysis.published import Published, TrajectoryNumber
 from rotor_mbs.analysis.statistics import measure
-from rotor_mbs.solution.status import code_of
+from rotor_mbs.solution.status import COMPLETE, code_of
 
 Array = NDArray[np.float64]
 
@@ -142,7 +142,7 @@ class SampledRuns:
     @property
     def decides(self) -> NDArray[np.bool_]:
         """(runs,) whether each reached its end without gaining a thousandfold energy."""
-        complete = np.isin(self.status, [code_of("ok"), code_of("inaccurate")])
+        complete = np.isin(self.status, [code_of(name) for name in COMPLETE])
         # Infinite or undefined: the energy is beyond all numbers.
         return complete & (np.nan_to_num(self.energy_drift, nan=np.inf) < ENERGY_GAIN)
 

@@ -9,6 +9,7 @@ from typing import Protocol
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
 from rotor_mbs.analysis.statistics import measure
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Choice = Callable[[StoredScene], StoredRun | None]
@@ -111,7 +112,7 @@ def rounds_to(value: float, printed: float, decimals: int) -> bool:
 
 
 def _ended_early(run: StoredRun | None) -> bool:
-    return run is not None and run.status not in ("ok", "inaccurate")
+    return run is not None and run.status not in COMPLETE
 
 
 def _read(test: Condition, numbers: Numbers) -> Reading:

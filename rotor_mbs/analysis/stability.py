@@ -28,6 +28,7 @@ OUTCOMES = {
     "false_success": ("!", "fails and claims success"),
     "refuses": ("–", "refuses a scene in which no motion exists"),
     "timed_out": ("⧗", "too slow for the time limit"),
+    "unchecked": ("?", "ends; there is nothing to judge it by"),
 }
 
 _HOLDS = ("holds", "energy_alone")
@@ -135,8 +136,8 @@ def _outcome(run: StoredRun, ladder: Record | None, *, has_motion: bool) -> str:
         return "holds" if "angle_error_max" in run.attributes else "energy_alone"
     if ladder is not None and bool(_ok(ladder).any()):
         return "smaller_step"
-    if run.status == "timed_out":
-        return "timed_out"
+    if run.status in ("timed_out", "unchecked"):
+        return run.status
     if run.attributes.get("false_success", 0):
         return "false_success"
     if run.status == "singular" and not has_motion:

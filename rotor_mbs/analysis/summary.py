@@ -9,6 +9,7 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.scenario.catalogue import natural_order
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredScene
 
 # Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that
@@ -130,7 +131,7 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
     made = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
     complete = {name: gains[name] for name in made if runs[name].status == "ok"}
     largest = max(complete, key=lambda name: complete[name], default="")
-    ended_early = tuple(name for name, run in runs.items() if run.status not in ("ok", "inaccurate"))
+    ended_early = tuple(name for name, run in runs.items() if run.status not in COMPLETE)
     return PrintedEnergy(Tally(len(made), len(gains)), complete.get(largest, 0.0), largest, ended_early)
 
 

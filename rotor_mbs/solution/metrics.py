@@ -18,6 +18,9 @@ HORIZON_GROWTH = 1e5  # a scene's horizon: when an error of the initial state ma
 
 Metrics = dict[str, float]
 
+# rad: beyond it a double's last digit is above 1e-10 rad, and neither its sine nor an error of 1e-9 rad means anything.
+ANGLE_LIMIT = 1e6
+
 # A pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
 # far below what a plot shows.
 _LEFT_ZERO = 1e-9
@@ -74,7 +77,7 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
         metrics["energy_scale_J"] = scale
         metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
         metrics["energy_gain_J"] = float(energy.max())
-    if reference is not None:
+    if reference is not None and scene.wants("angles"):
         metrics |= _angle_errors(run, reference)
     return metrics | _of_quantities(scene, run, reference) | _peaks(scene, run)
 
@@ -120,7 +123,7 @@ def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
     metrics = {"horizon_s": horizon(reference)}
     if until > 1:
         metrics["angle_error_max"] = float(error[:until].max())
-        metrics["angle_error_per_growth"] = float((error / _carried_error(reference)[: len(error)])[:until].max())
+        metrics["angle_error_per_growth"] = float(_relative_error(run, reference)[:until].max())
     if len(error) > 1:
         metrics["angle_error_whole"] = float(error.max())
         if len(run.time) == len(reference.time):
@@ -128,10 +131,27 @@ def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
     return metrics | _invariant_set(run, reference)
 
 
+def _relative_error(run: Trajectory, reference: Trajectory) -> Array:
+    """(common samples,) Larger of the rotor's and the pitches' angle errors, each of what an error of 1 at the start
+    would have become: the growth times how far the rotor has turned from its start, or the largest pitch (at least 1).
+    """
+    n = min(len(run.time), len(reference.time))
+    error = np.abs(run.angles[:n] - reference.angles[:n])
+    rotor, pitch = (size[:n] for size in _motion_sizes(reference))
+    found: Array = np.maximum(error[:, 0] / rotor, error[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
+    return found
+
+
+def _motion_sizes(reference: Trajectory) -> tuple[Array, Array]:
+    """((n,), (n,)) rad: the rotor's largest way from its start so far, and the largest pitch; each at least 1."""
+    turned = np.abs(reference.angles[:, 0] - reference.angles[0, 0])
+    pitch = np.abs(reference.angles[:, 1:]).max(axis=1)
+    return np.maximum(np.maximum.accumulate(turned), 1.0), np.maximum(np.maximum.accumulate(pitch), 1.0)
+
+
 def _carried_error(reference: Trajectory) -> Array:
-    """(n,) What a relative error of 1 at the start would have become: growth times the largest angle (at least 1)."""
-    largest = np.maximum.accumulate(np.abs(reference.angles).max(axis=1))
-    return running_growth(reference) * np.maximum(largest, 1.0)
+    """(n,) What a relative error of 1 at the start would have become in a quantity that follows from all angles."""
+    return running_growth(reference) * np.maximum(*_motion_sizes(reference))
 
 
 def _invariant_set(run: Trajectory, reference: Trajectory) -> Metrics:

@@ -12,9 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# The six that a run's state can have; then a point of which no run was made, and a run whose process died.
-RUN_STATUSES = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out")
-STATUSES = (*RUN_STATUSES, "left_out", "worker_died")
+# Those that a run's state can have ("unchecked": complete, with nothing to judge it by), a point of which no run was
+# made, and a run whose process died. Codes are places in this list: new ones go to its end.
+STATUSES = (
+    "ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "left_out", "worker_died", "unchecked",
+)  # fmt: skip
+RUN_STATUSES = tuple(name for name in STATUSES if name not in ("left_out", "worker_died"))
+# Those of runs that reached the end.
+COMPLETE = ("ok", "inaccurate", "unchecked")
 
 
 def code_of(status: str) -> int:

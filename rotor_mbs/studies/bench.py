@@ -27,7 +27,7 @@ from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import COMPLETE, STATUSES
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import Record, write_records
 from rotor_mbs.store.results_file import ResultsStore
@@ -224,7 +224,7 @@ class Measured:
         else:
             row |= statistics(self.timings.times[point])
             judged, prepared = self.judged[point], self.prepared[point]
-            if judged.status in ("ok", "inaccurate"):  # the errors of a run that broke off are those of its part
+            if judged.status in COMPLETE:  # the errors of a run that broke off are those of its part
                 row |= {name: judged.metrics.get(name, np.nan) for name in _ERRORS}
             row |= {
                 "setup_time_s": prepared.setup_s,

@@ -22,6 +22,7 @@ from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import Metrics
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.studies.stored_references import load_reference
 
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
@@ -127,10 +128,10 @@ class PointTimer:
 
 def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[str, str]:
     """A bench asks how large an error is: it is a failure only where nothing of the motion is right."""
-    if status not in ("ok", "inaccurate"):
+    if status not in COMPLETE:
         return status, message
     if "angle_error_max" not in metrics:  # no reference: energy alone decides
-        return ("ok", "") if metrics.get("energy_drift_max", 0.0) < USELESS_DRIFT else (status, message)
+        return ("ok", "") if metrics.get("energy_drift_max", np.inf) < USELESS_DRIFT else (status, message)
     error = metrics["angle_error_max"]
     if error < USELESS_RAD:
         return "ok", ""

@@ -21,7 +21,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import COMPLETE, STATUSES
 from rotor_mbs.store.records import Record
 from rotor_mbs.studies.stored_references import load_reference
 
@@ -58,10 +58,7 @@ def ladder_record(job: Job) -> Record:
         expected, step = _FACTOR * seconds, step / _FACTOR
     judgements = [judgement for _, judgement in rows]
     # A run that broke off has no error up to the horizon.
-    errors = [
-        one.metrics.get("angle_error_max", np.nan) if one.status in ("ok", "inaccurate") else np.nan
-        for one in judgements
-    ]
+    errors = [one.metrics.get("angle_error_max", np.nan) if one.status in COMPLETE else np.nan for one in judgements]
     arrays = {
         "step": np.array([step for step, _ in rows]),
         "status": np.array([STATUSES.index(one.status) for one in judgements], dtype=np.int64),

@@ -148,7 +148,8 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     assert block.work is not None
     errors = energy_balance(block.kinetic_energy, block.potential_energy, block.work)
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
-    ok = clearly_ok(scenes, chunk.method, block.integrations, block.samples, drifts)
+    angles = largest(block.angles.reshape(len(scenes), -1))
+    ok = clearly_ok(scenes, chunk.method, block.integrations, block.samples, drifts, angles)
     rows = empty_rows(len(scenes), chunk.row, METRICS)
     for name in chunk.row.names or ():
         if name not in rows:

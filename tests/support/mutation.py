@@ -147,6 +147,8 @@ _TARGETS = (
             "_broken_off",
             "_through_singularity",
             "_inaccurate",
+            "_unchecked",
+            "start_slack",
             "energy_slack",
             "energy_conditioning",
             "_shares_at_quarter_turns",
@@ -169,7 +171,8 @@ _TARGETS = (
             "angle_error",
             "energy_scale",
             "_angle_errors",
-            "_carried_error",
+            "_relative_error",
+            "_motion_sizes",
             "HORIZON_GROWTH",
         ),
         0.5,
@@ -400,7 +403,7 @@ def _logic(node: ast.AST, text: str) -> Iterator[tuple[str, Change]]:
         yield f"{text}: min, max", lambda n: _with(n, func=ast.Name(other_name, ast.Load()))
 
 
-STATUS_WORDS = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out")
+STATUS_WORDS = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "unchecked")
 
 
 # Judging mutants

@@ -20,6 +20,7 @@ from rotor_mbs.report.pages.claims import description_of, unit_of
 from rotor_mbs.report.pages.error_pictures import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.report.paper_figures import HEADINGS, PATHS, TORQUES, PaperFigure, compared_runs
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
@@ -130,7 +131,7 @@ def comparison(scene: StoredScene) -> ModelComparison:
     if printed is not None:
         gain = metric(printed, "energy_gain_J")
         pitch = float(np.abs(printed.array("angles")[:, 1:]).max(initial=0.0))
-        if printed.status not in ("ok", "inaccurate"):
+        if printed.status not in COMPLETE:
             ended = float(printed.array("time")[-1])
     if printed is not None and corrected is not None:
         gap = angle_difference(printed, corrected)

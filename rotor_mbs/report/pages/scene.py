@@ -25,6 +25,7 @@ from rotor_mbs.report.paper_figures import HEADINGS
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.paths import paths
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[np.float64]
@@ -117,7 +118,7 @@ def _lead(drawn: DrawnRuns) -> list[str]:
     """What the pictures show, a sentence each."""
     printed, found = drawn.printed, []
     departure = None if printed is None else metric(printed, "angle_error_whole")
-    if printed is not None and printed.status not in ("ok", "inaccurate"):
+    if printed is not None and printed.status not in COMPLETE:
         end = with_unit(float(printed.array("time")[-1]), "s", 3)
         found.append(f"The printed model diverges: ode45 stops at {end}.")
     elif printed is not None and departure is not None:

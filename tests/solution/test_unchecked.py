@@ -1,0 +1,72 @@
+"""No run is ok that nothing was compared with, and none because of where its angles start."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.scenes import paper
+
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import ANGLE_LIMIT
+from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.studies.run import solve_judged
+
+METHOD = "lagrange/dop853"
+
+
+def turned(scene: Scene, turns: float) -> Scene:
+    """The same motion: the rotor starts whole turns further on."""
+    return scene.replace(**{"initial.angles[0]": scene.initial_angles[0] + 2.0 * np.pi * turns})
+
+
+def test_a_wrong_motion_without_energy_and_reference_is_unchecked() -> None:
+    """Errors of 2e-3 rad in a motion of 1e-3 rad: nothing is compared with anything."""
+    scene = paper("fig08", duration=1.0, samples=11, outputs=("angles", "rates"))
+    time = np.linspace(0.0, 1.0, 11)
+    angles = np.full((11, 4), 1e-3) * np.sin(time)[:, None]
+    wrong = Trajectory(time, angles + 2e-3, np.zeros((11, 4)))
+    verdict = judge(scene, Solution(scene, METHOD, wrong, Integration(True)), None)
+    assert (verdict.status, verdict.false_success) == ("unchecked", False)
+    assert "no energy, and no reference" in verdict.message
+    exact = Trajectory(time, angles, np.zeros((11, 4)), error_growth=np.ones(11))
+    assert judge(scene, Solution(scene, METHOD, wrong, Integration(True)), exact).status == "inaccurate"
+
+
+def test_two_samples_a_minute_apart_without_energy_are_unchecked() -> None:
+    """The reference is past its horizon at the second sample; with energies the balance decides."""
+    scene = paper("fig11", duration=60.0, samples=2, outputs=("angles", "rates"))
+    run = solve(METHOD, scene, {})
+    exact = run.trajectory.replace(error_growth=np.array([1.0, 1e9]))
+    verdict = judge(scene, run, exact)
+    assert verdict.status == "unchecked"
+    assert "the horizon is before the second sample" in verdict.message
+    assert solve_judged(scene.replace(outputs=("angles", "energy")), METHOD)[0].status == "ok"
+
+
+@pytest.mark.parametrize("turns", [0, 1e5])
+def test_a_start_turns_away_excuses_no_error(turns: float) -> None:
+    """Errors are relative to how far the rotor turns and to the pitches, not to where the rotor's angle starts."""
+    scene = turned(paper("fig11", duration=2.0, samples=21, outputs=("angles", "rates")), turns)
+    exact = solve("reference", scene, {}).trajectory
+    for column in (0, 2):
+        angles = exact.angles.copy()
+        angles[5:, column] += 1e-5
+        wrong = Solution(scene, METHOD, exact.replace(angles=angles), Integration(True))
+        assert judge(scene, wrong, exact).status == "inaccurate"
+    assert judge(scene, solve("lagrange/taylor", scene, {}), exact).status == "ok"
+
+
+def test_angles_without_digits_are_unchecked() -> None:
+    """At 1e100 rad not even the reference has a sine that means anything."""
+    scene = paper("fig03", duration=1.0, samples=11)
+    far = replace(scene, initial_angles=(1e100, *scene.initial_angles[1:]))
+    exact = solve("reference", far, {})
+    verdict = judge(far, exact, exact.trajectory)
+    assert verdict.status == "unchecked"
+    assert f"up to {ANGLE_LIMIT:.0e} rad" in verdict.message
+    assert judge(far, solve("exudyn_tree/rk67", far, {}), exact.trajectory).status != "ok"
