@@ -5,6 +5,7 @@ The Python API. Everything is loaded when it is first used: importing this packa
     scenes, scene, load      names of the shipped scenes; one of them; a scene of one's own from a TOML file
     run                      one scene by one method: a `Run`
     compare                  one scene by several methods, against its reference: a `Comparison`
+    compare_data             a trajectory of another program against a scene's reference: a `DataComparison`
     sweep                    one scene over the values of its parameters: a `SweepData`
     claims                   the paper's claims in words as shares of many runs, its numbers under other conditions
     export                   a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark problem
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
     from rotor_mbs.errors import RotorError as RotorError
     from rotor_mbs.errors import StoreError as StoreError
     from rotor_mbs.methods.base import Method as Method
+    from rotor_mbs.report.data_comparison import DataComparison as DataComparison
+    from rotor_mbs.report.data_comparison import compare_data as compare_data
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
     from rotor_mbs.studies.claims import claims as claims
@@ -64,6 +67,7 @@ _PLACES = {
     ),
     "rotor_mbs.errors": ("InputError", "MethodRefusal", "RotorError", "StoreError"),
     "rotor_mbs.methods.base": ("Method",),
+    "rotor_mbs.report.data_comparison": ("DataComparison", "compare_data"),
     "rotor_mbs.scenario.scene": ("Blade", "Scene"),
     "rotor_mbs.studies.claims": ("claims",),
     "rotor_mbs.studies.export": ("export",),

@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor_mbs.analysis.rehydrate import rehydrate
-from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
+from rotor_mbs.scenario.catalogue import list_scenes, only_scene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.solution.metrics import metrics_of
@@ -64,10 +63,7 @@ def scene(name: str) -> Scene:
     >>> scene.replace(gravity=9.81, **{"initial.angles[1]": 0.3}).initial_angles[1]
     0.3
     """
-    found = find_scenes([name])
-    if len(found) != 1:
-        raise InputError(f"{name}: {len(found)} scenes; allowed: the name of one scene, see rotor_mbs.scenes()")
-    return found[0]
+    return only_scene(name)
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
@@ -159,8 +155,9 @@ class Comparison:
 
     def table(self) -> TextTable:
         """A row for each method: status, error (rad), energy drift (of the energy scale), run time (s)."""
-        rows = [run_row(r.method, r.status, r.metrics, float(np.median(r.run_times_s))) for r in self.runs.values()]
-        return TextTable(RUN_HEAD, rows)
+        return TextTable(
+            ("method", "status", "error (rad)", "energy drift", "time (s)"), [_row(r) for r in self.runs.values()]
+        )
 
     @property
     def plot(self) -> ComparisonPlots:
@@ -426,3 +423,9 @@ def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
 
 def _with_reference(solution: Solution, reference: Trajectory | None) -> Run:
     return Run(**{one.name: getattr(solution, one.name) for one in fields(Solution)}, reference=reference)
+
+
+def _row(run: Run) -> tuple[str, ...]:
+    numbers = [run.metrics.get(name, np.nan) for name in ("angle_error_max", "energy_drift_max")]
+    texts = ["" if np.isnan(value) else f"{value:.1e}" for value in numbers]
+    return (run.method, run.status, *texts, f"{float(np.median(run.run_times_s)):.3g}")

@@ -56,6 +56,7 @@ def _parser() -> tuple[_Parser, _Commands]:
     for add in (
         _add_list_and_show,
         _add_runs,
+        _add_compare,
         _add_bench,
         _add_reference,
         _add_check,
@@ -110,6 +111,32 @@ def _add_runs(commands: _Commands) -> None:
     )  # fmt: skip
     run.add_argument("-o", "--output", type=_file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
     _add_pool_options(run)
+
+
+def _add_compare(commands: _Commands) -> None:
+    compare = _command(
+        commands, "compare", "another program's trajectory against a scene's reference; exit status 1 where it differs",
+        "compare:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
+    )  # fmt: skip
+    compare.add_argument(
+        "data", type=Path, metavar="DATA",
+        help="text with a header, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb",
+    )  # fmt: skip
+    compare.add_argument("--scene", required=True, metavar="SCENE", help=_SCENE)
+    compare.add_argument(
+        "--columns",
+        type=Path,
+        metavar="MAP.toml",
+        help="column, unit, sign, zero of each channel (default: guessed)",
+    )
+    compare.add_argument(
+        "--tolerance", type=_positive(float, "a number more than 0"), default=1e-6, metavar="X",
+        help="rad per unit of error growth that still agree (default: %(default)g)",
+    )  # fmt: skip
+    compare.add_argument(
+        "-o", "--output", type=Path, default=Path("comparison"), metavar="DIR", help="of the page " + _default("DIR")
+    )
+    compare.add_argument("--json", action="store_true", help="the verdict as JSON, for a script")
 
 
 def _add_bench(commands: _Commands) -> None:

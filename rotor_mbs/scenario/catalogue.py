@@ -105,6 +105,14 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
     return scenes
 
 
+def only_scene(argument: str) -> Scene:
+    """The one scene that `argument` means. Raises InputError where it means several, as for `find_scenes`."""
+    found = find_scenes([argument])
+    if len(found) != 1:
+        raise InputError(f"{argument}: {len(found)} scenes; allowed: the name of one scene, or a TOML file")
+    return found[0]
+
+
 def _shipped() -> dict[str, Path]:
     folder = scenarios_folder()
     paths = (path for path in folder.rglob("*.toml") if path.parent != sweeps_folder())

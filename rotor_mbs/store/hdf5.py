@@ -193,3 +193,50 @@ def sync_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Arrays of numbers of up to two dimensions and their units by name, of any HDF5 file: those of one group.
+
+    group   its path, or the end of it; may be left out where one group alone has arrays, or one alone but the
+            reference below `scene`
+    Raises StoreError with the groups that there are.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            places = _array_places(file)
+            name = _chosen(path, list(places), group.strip("/"), scene)
+            chosen = file[name or "/"]
+            arrays = {name: chosen[name][()] for name in places[name]}
+            units = {name: str(_plain(chosen[name].attrs.get("units", ""))) for name in arrays}
+    except (OSError, RuntimeError, KeyError) as exc:
+        raise StoreError(f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]})") from exc
+    return arrays, {name: unit for name, unit in units.items() if unit}
+
+
+def _chosen(path: Path, places: Sequence[str], group: str, scene: str) -> str:
+    """The one group that is meant. Raises StoreError."""
+    inside = [one for one in places if one.startswith(f"{scene}/")] or list(places)
+    fitting = [one for one in inside if one == group] or [one for one in inside if f"/{one}".endswith(f"/{group}")]
+    if not group:
+        fitting = [one for one in inside if not one.endswith("/reference")]
+    if len(fitting) == 1:
+        return fitting[0]
+    if not places:
+        raise StoreError(f"{path}: no arrays of numbers in it; allowed: a time and angles")
+    shown = ", ".join(one or "/" for one in inside[:12]) + (", ..." if len(inside) > 12 else "")
+    problem = f"no group {group!r}" if group else "arrays in several groups"
+    raise StoreError(f"{path}: {problem}; allowed: a mapping file with group = one of {shown}")
+
+
+def _array_places(file: Any) -> dict[str, list[str]]:
+    """Names of the arrays of numbers by their group; groups without any are left out."""
+    places: dict[str, list[str]] = {}
+
+    def note(path: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and 0 < len(item.shape) <= 2 and item.size > 1:
+            folder, _, name = path.rpartition("/")
+            places.setdefault(folder, []).append(name)
+
+    file.visititems(note)
+    return places

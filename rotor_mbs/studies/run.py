@@ -145,8 +145,7 @@ def run_cases(scene: Scene, methods: Iterable[str], reference: Case, settings: M
 def perform_run(job: Job) -> Result:
     """Solves, judges and stores one run, in a worker process. Raises StoreError where it cannot be written."""
     case = job.case
-    is_read = case.method == REFERENCE and "frozen" in case.options
-    if is_read:
+    if case.method == REFERENCE and "frozen" in case.options:
         run, attributes = frozen_solution(case.scene, case.scene_hash)
     else:
         attributes = {}
@@ -171,9 +170,7 @@ def perform_run(job: Job) -> Result:
         **verdict.metrics,
     }
     write_run(job.part, case.scene_hash, run, attributes)
-    return Result(
-        verdict.status, verdict.message, 0.0 if is_read else float(np.median(run.run_times_s)), is_read=is_read
-    )
+    return Result(verdict.status, verdict.message, float(np.median(run.run_times_s)))
 
 
 def store_failure(status: str, job: Job, message: str) -> Result:

@@ -208,7 +208,7 @@ def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsy
         assert main(["export", "paper/fig03", "--to", to]) == 0
     assert capsys.readouterr().out.split() == ["fig03.xml", "fig03-exudyn.py", "fig03-equations.py"]
     assert main(["export", "paper", "--to", "csv"]) == 2
-    assert "allowed: one scene's name or file" in capsys.readouterr().err
+    assert "allowed: the name of one scene" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="2"):
         main(["export", "paper/fig03", "--to", "step"])
 

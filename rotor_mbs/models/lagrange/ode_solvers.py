@@ -25,6 +25,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
+# As closed_form.accelerations
+Accelerations = Callable[..., list[float]]
 
 
 # (right-hand side, start, end, state at the start, sample times inside) -> Advance
@@ -32,10 +34,21 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per segment of the torque."""
+    """Any integrator over the scene, one call per segment of the torque.
 
-    def __init__(self, scene: Scene, integrator: Integrator) -> None:
+    times           as of `system.Propagation`
+    accelerations   the equations, where they are not the closed form as it is
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        integrator: Integrator,
+        times: Array | None = None,
+        accelerations: Accelerations = closed_form.accelerations,
+    ) -> None:
         self._scene = scene
+        self._accelerations = accelerations
         self._integrator = integrator
         self._form = rotor_form(scene)
         self._segments = torque_segments(scene)
@@ -43,7 +56,7 @@ class OdeSolver:
         columns = scene.moving_coordinates
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
         self._initial = np.concatenate([*start, np.zeros(int(self._has_work))])
-        self._times = np.linspace(0.0, scene.duration, scene.samples)
+        self._times = np.linspace(0.0, scene.duration, scene.samples) if times is None else times
         self._states: Array = self._initial[None, :]
 
     def integrate(self) -> Integration:
@@ -51,14 +64,20 @@ class OdeSolver:
         return integration
 
     def _advance(self, segment: TorqueSegment, state: Array, times: Array) -> Advance:
-        function = right_hand_side(self._form, segment, with_work=self._has_work)
+        function = right_hand_side(self._form, segment, with_work=self._has_work, accelerations=self._accelerations)
         return self._integrator(function, segment.start, segment.end, state, times)
 
     def observe(self) -> Trajectory:
         return samples.trajectory(self._scene, self._times, self._states)
 
 
-def right_hand_side(form: RotorForm, segment: TorqueSegment, *, with_work: bool) -> RightHandSide:
+def right_hand_side(
+    form: RotorForm,
+    segment: TorqueSegment,
+    *,
+    with_work: bool,
+    accelerations: Accelerations = closed_form.accelerations,
+) -> RightHandSide:
     """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
     count = 1 + len(form.blades)
     offset, slope = float(segment.offset), float(segment.slope)
@@ -68,7 +87,7 @@ def right_hand_side(form: RotorForm, segment: TorqueSegment, *, with_work: bool)
         angles, rates = values[:count], values[count : 2 * count]
         torque = offset + slope * time
         try:
-            found = closed_form.accelerations(angles, rates, form, torque, math.sin, math.cos)
+            found = accelerations(angles, rates, form, torque, math.sin, math.cos)
         except (ZeroDivisionError, ValueError, OverflowError):
             # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
             return [math.nan] * len(values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -85,19 +85,76 @@ def error_growth(scene: Scene) -> Array:
     The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the
     variational equations of the closed form; infinite once it is past what double precision can hold.
     """
+    return _largest_growth(scene, _transition_matrices(scene))
+
+
+def _transition_matrices(scene: Scene, times: Array | None = None) -> Array:
+    """(n, 2k, 2k) from the variational equations, for k coordinates that move."""
     count = 2 * len(scene.moving_coordinates)
-    propagation = Propagation(scene, build_system(scene), variational=True, compact_mode=True)
+    propagation = Propagation(scene, build_system(scene), variational=True, compact_mode=True, times=times)
     propagation.run()
-    return _largest_growth(scene, propagation.states[:, count:].reshape(-1, count, count))
+    matrices: Array = propagation.states[:, count:].reshape(-1, count, count)
+    return matrices
 
 
 def _largest_growth(scene: Scene, matrices: Array) -> Array:
     """(samples,) from the state transition matrices of the first samples, as far as they are finite."""
-    units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
-    growth = np.full(scene.samples, np.inf)
+    growth = np.full(max(scene.samples, len(matrices)), np.inf)
     finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
-    growth[finite] = np.linalg.norm(matrices[finite] * units / units[:, None], ord=2, axis=(1, 2))
+    growth[finite] = np.linalg.norm(_in_units(scene, matrices[finite]), ord=2, axis=(1, 2))
     return growth
+
+
+def _in_units(scene: Scene, matrices: Array) -> Array:
+    """State transition matrices for angles in rad and rates in `rate_units`."""
+    units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
+    scaled: Array = matrices * units / units[:, None]
+    return scaled
+
+
+_QUAD = 1e-30  # tolerance: its error, grown 1e10-fold, is still below what a double can hold
+
+
+@dataclass(frozen=True)
+class TimedReference:
+    """The reference of a scene at chosen times.
+
+    trajectory   as far as it got: time, angles, rates, error_growth
+    growth       (n, 2 (1 + blades)): of angles, then rates, how many times larger than an error of the initial state
+                 theirs may be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
+    units        (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
+    """
+
+    trajectory: Trajectory
+    growth: Array
+    units: Array
+
+
+def reference_at(scene: Scene, times: Array) -> TimedReference:
+    """The reference at `times`, (n,) s, increasing from 0 to the scene's duration; nothing is interpolated.
+
+    In quad precision with heyoka, else by DOP853 at its tightest.
+    """
+    if is_available():
+        run = Propagation(scene, build_system(scene), quad=True, tol=_QUAD, compact_mode=True, times=times)
+        run.run()
+        trajectory = samples.trajectory(scene, times, run.states.astype(float))
+        matrices = _transition_matrices(scene, times)
+        trajectory.error_growth = _largest_growth(scene, matrices)[: len(trajectory.time)]
+    else:
+        fallback = FallbackReference(scene, times)
+        fallback.integrate()
+        trajectory, matrices = fallback.observe(), fallback.transition_matrices()
+    rows, moving, count = len(trajectory.time), scene.moving_coordinates, len(scene.initial_angles)
+    columns = [*moving, *(count + i for i in moving)]
+    units, growth = np.ones(2 * count), np.ones((rows, 2 * count))
+    units[[count + i for i in moving]] = rate_units(scene)
+    growth[:, columns] = np.inf
+    known = min(rows, len(matrices))
+    with np.errstate(all="ignore"):
+        norms = np.linalg.norm(_in_units(scene, matrices[:known]), axis=2)
+    growth[np.ix_(range(known), columns)] = np.where(np.isfinite(norms), norms, np.inf)
+    return TimedReference(trajectory, growth, units)
 
 
 # Where heyoka is not installed: DOP853 at its tightest, with the larger uncertainty that it has.
@@ -113,9 +170,11 @@ _PERTURBATION = 1e-9
 class FallbackReference:
     """Two DOP853 runs, and one more for each initial value, perturbed, to see how errors grow."""
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._runs = [OdeSolver(scene, scipy_integrator("DOP853", *tolerances)) for tolerances in (_TIGHTEST, _LOOSER)]
+    def __init__(self, scene: Scene, times: Array | None = None) -> None:
+        self._scene, self._times = scene, times
+        self._runs = [
+            OdeSolver(scene, scipy_integrator("DOP853", *tolerances), times) for tolerances in (_TIGHTEST, _LOOSER)
+        ]
 
     def integrate(self) -> Integration:
         best, _ = (run.integrate() for run in self._runs)
@@ -127,23 +186,23 @@ class FallbackReference:
         difference = np.full(len(result.time), np.inf)
         difference[:rows] = np.abs(result.angles[:rows] - check.angles[:rows]).max(axis=1)
         result.angle_uncertainty = uncertainty(difference, result.angles, float(np.finfo(float).eps))
-        result.error_growth = self._growth(result)
+        result.error_growth = _largest_growth(self._scene, self.transition_matrices())[: len(result.time)]
         return result
 
-    def _growth(self, result: Trajectory) -> Array:
-        """(n,) by the same measure as the variational equations, of difference quotients."""
+    def transition_matrices(self) -> Array:
+        """(n, 2k, 2k) by difference quotients, in place of the variational equations."""
         moving = self._scene.moving_coordinates
-        state = _state(result, moving)
+        state = _state(self._runs[0].observe(), moving)
         columns = []
         for neighbour in _neighbours(self._scene, moving):
-            solver = OdeSolver(neighbour, scipy_integrator("DOP853", *_TIGHTEST))
+            solver = OdeSolver(neighbour, scipy_integrator("DOP853", *_TIGHTEST), self._times)
             solver.integrate()
             near = _state(solver.observe(), moving)
             column = np.full_like(state, np.inf)
             rows = min(len(near), len(state))
             column[:rows] = (near[:rows] - state[:rows]) / _PERTURBATION
             columns.append(column)
-        return _largest_growth(self._scene, np.stack(columns, axis=-1))[: len(state)]
+        return np.stack(columns, axis=-1)
 
 
 def _state(run: Trajectory, moving: Sequence[int]) -> Array:

@@ -100,12 +100,20 @@ class Propagation:
 
     quad         in quad precision; the scene's doubles are taken as exact
     variational  with the state transition matrix (without the work) as further variables, row by row
+    times        (n,) s, of the samples, increasing from 0 up to the duration; the scene's where it is left out
     options      of the engine's integrator
     states       (n, variables) at the samples of the last run, cut before the first row that is not finite
     """
 
     def __init__(
-        self, scene: Scene, system: EquationSystem, *, quad: bool = False, variational: bool = False, **options: Any
+        self,
+        scene: Scene,
+        system: EquationSystem,
+        *,
+        quad: bool = False,
+        variational: bool = False,
+        times: Array | None = None,
+        **options: Any,
     ) -> None:
         engine = heyoka()
         columns, count = scene.moving_coordinates, 2 * len(scene.moving_coordinates)
@@ -123,7 +131,7 @@ class Propagation:
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
         self._torque = None if system.has_constant_torque else len(system.parameters.values) - 2
         self._segments = torque_segments(scene)
-        self.times = np.linspace(0.0, scene.duration, scene.samples)
+        self.times = np.linspace(0.0, scene.duration, scene.samples) if times is None else times
         self.states = self._initial[None, :]
 
     def run(self) -> Integration:

@@ -1,0 +1,112 @@
+"""A file of any format as a table: the one place that decides what a file is."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.foreign.table import DataTable, table_of
+from rotor_mbs.foreign.text_files import read_text
+from rotor_mbs.store import hdf5
+
+LARGEST = 1 << 29  # bytes; a trajectory of a million rows of ten columns is 80 MB
+FORMATS = "text with a header, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
+_HDF5, _NETCDF3, _ZIP = b"\x89HDF\r\n\x1a\n", b"CDF", b"PK\x03\x04"
+_MATLAB_5 = b"MATLAB 5.0 MAT-file"
+
+
+def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -> DataTable:
+    """The columns of numbers in a file; `group`, `scene`: see `store.hdf5.read_arrays`.
+
+    Raises InputError or StoreError, in one line, for what cannot be read.
+    """
+    path = Path(path)
+    head = _head(path)
+    source = str(path)
+    try:
+        if head.startswith(_HDF5) or head[512:].startswith(_HDF5):  # MATLAB puts a block of its own in front
+            return table_of(source, *hdf5.read_arrays(path, group, scene))
+        if head.startswith(_ZIP):
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+                return table_of(source, {name: archive[name] for name in archive.files})
+        if head.startswith(_MATLAB_5):
+            return _matlab(path)
+        if head.startswith(_NETCDF3):
+            return _netcdf3(path)
+        if path.suffix.lower() == ".outb":
+            return _openfast(path)
+        if b"\x00" in head:
+            raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
+        return read_text(source, _decoded(path.read_bytes()))
+    except (OSError, ValueError, zipfile.BadZipFile, MemoryError, KeyError) as exc:
+        raise InputError(f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}") from exc
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes. Raises InputError for what is no file, is empty, or is too large."""
+    if not path.is_file():
+        raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; allowed: {FORMATS}")
+    size = path.stat().st_size
+    if size == 0:
+        raise InputError(f"{path}: empty; allowed: {FORMATS}")
+    if size > LARGEST:
+        raise InputError(f"{path}: {size / 2**30:.1f} GB; allowed: up to {LARGEST / 2**30:g} GB: export fewer rows")
+    try:
+        with path.open("rb") as file:
+            return file.read(1024)
+    except OSError as exc:
+        raise InputError(f"{path}: cannot be read: {exc.strerror}") from exc
+
+
+def _decoded(content: bytes) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+def _line(exc: BaseException) -> str:
+    return (str(exc).splitlines() or [type(exc).__name__])[0]
+
+
+def _matlab(path: Path) -> DataTable:
+    from scipy.io import loadmat  # late: 0.1 s
+    from scipy.io.matlab import MatReadError
+
+    try:
+        found: dict[str, Any] = loadmat(path)
+    except (MatReadError, TypeError, IndexError) as exc:
+        raise InputError(f"{path}: a damaged MAT file: {_line(exc)}") from exc
+    return table_of(str(path), {name: values for name, values in found.items() if not name.startswith("__")})
+
+
+def _netcdf3(path: Path) -> DataTable:
+    from scipy.io import netcdf_file  # late: as above
+
+    with netcdf_file(path, "r", mmap=False) as file:
+        arrays = {name: np.array(one[:]) for name, one in file.variables.items()}
+        units = {name: one.units.decode() for name, one in file.variables.items() if hasattr(one, "units")}
+    return table_of(str(path), arrays, units)
+
+
+def _openfast(path: Path) -> DataTable:
+    """OpenFAST's binary output, by its own project's reader."""
+    import struct
+
+    try:
+        from openfast_io.FAST_output_reader import load_binary_output
+    except ImportError as exc:
+        hint = 'pip install "rotor_mbs[openfast]", or text output (OutFileFmt 1)'
+        raise InputError(f"{path}: openfast_io is not installed; allowed: {hint}") from exc
+    try:
+        values, facts, _ = load_binary_output(str(path))
+    except struct.error as exc:
+        raise InputError(f"{path}: a damaged OpenFAST file: {_line(exc)}") from exc
+    names, units = facts["attribute_names"], facts["attribute_units"]
+    arrays = {name: values[:, i] for i, name in enumerate(names)}
+    return table_of(str(path), arrays, dict(zip(names, units, strict=True)))

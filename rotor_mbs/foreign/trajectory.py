@@ -1,0 +1,115 @@
+"""Data of a scene: a time and any of its angles and rates, in s, rad, rad/s; refused where they cannot be compared."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.foreign.channels import Channel
+from rotor_mbs.foreign.files import read_table
+from rotor_mbs.foreign.mapping import Source, read_mapping, sources
+from rotor_mbs.foreign.table import DataTable, table_of
+from rotor_mbs.scenario.scene import Scene
+
+Array = NDArray[np.float64]
+_FEWEST = 3  # rows: fewer have no motion to be compared
+
+
+@dataclass(frozen=True)
+class ForeignData:
+    """Samples of another program.
+
+    Attributes
+    ----------
+    source : name of the file.
+    time : (n,) s, increasing from 0 or later.
+    values : (n, channels) rad or rad/s.
+    channels : what the columns are.
+    read : a line for each channel: column, unit, and what was assumed.
+    unused : names of the columns that are no channel.
+    wrapped : for each channel, whether whole turns are missing from it.
+    """
+
+    source: str
+    time: Array
+    values: Array
+    channels: tuple[Channel, ...]
+    read: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
+    wrapped: tuple[bool, ...] = ()
+
+    @property
+    def columns(self) -> list[int]:
+        """Of the channels, in a matrix of all angles, then all rates."""
+        return [one.column for one in self.channels]
+
+
+def load_data(
+    data: str | os.PathLike[str] | Mapping[str, Any],
+    scene: Scene,
+    columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+) -> ForeignData:
+    """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
+    mapping = read_mapping(columns if columns is None or isinstance(columns, Mapping) else Path(columns), scene)
+    if isinstance(data, Mapping):
+        table = table_of("data", data)
+    else:
+        table = read_table(data, mapping.group if mapping else "", scene.name)
+    return _data(table, sources(table, scene, mapping))
+
+
+def _data(table: DataTable, found: Sequence[Source]) -> ForeignData:
+    lengths = {source.column: len(table[source.column].values) for source in found}
+    if len(set(lengths.values())) > 1:
+        shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
+        raise InputError(f"{table.source}: columns of different lengths: {shown}; allowed: a row for every time")
+    arrays = [_values(table, source) for source in found]
+    time = arrays[0]
+    _refuse_wrong_times(table.source, time)
+    used = {source.column for source in found}
+    return ForeignData(
+        table.source,
+        time,
+        np.stack(arrays[1:], axis=1),
+        tuple(source.channel for source in found[1:]),
+        tuple(str(source) for source in found),
+        tuple(name for name in table.columns if name not in used),
+        tuple(source.wrapped for source in found[1:]),
+    )
+
+
+def _values(table: DataTable, source: Source) -> Array:
+    """In s, rad or rad/s. Raises InputError where a number is not finite."""
+    values = table[source.column].values
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise InputError(
+            f"{table.source}: column {source.column!r} is {values[bad[0]]} in row {bad[0] + 1} of {len(values)}; "
+            "allowed: finite numbers"
+        )
+    found: Array = source.sign * (values + source.offset) * source.factor
+    return np.unwrap(found) if source.wrapped else found
+
+
+def _refuse_wrong_times(source: str, time: Array) -> None:
+    if len(time) < _FEWEST:
+        raise InputError(f"{source}: {len(time)} rows; allowed: {_FEWEST} or more")
+    if time[0] < 0.0:
+        raise InputError(
+            f"{source}: begins at t = {time[0]:g} s; allowed: times from 0, the scene's start (`offset` of the time)"
+        )
+    wrong = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(wrong):
+        row = int(wrong[0])
+        problem = "repeats" if time[row + 1] == time[row] else "comes before"
+        raise InputError(
+            f"{source}: the time of row {row + 2}, {time[row + 1]:.9g} s, {problem} that of the row above, "
+            f"{time[row]:.9g} s; allowed: times that increase"
+        )

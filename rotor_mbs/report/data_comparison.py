@@ -1,0 +1,134 @@
+"""Data of another program against a scene's reference: table, figure, page; what `rotor_mbs.compare_data` returns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict
+from rotor_mbs.foreign.trajectory import load_data
+from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.pages.data_comparison import error_panels, write_comparison_page
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.text_table import TextTable
+from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
+
+
+def compare_data(
+    data: str | os.PathLike[str] | Mapping[str, Any],
+    scene: Scene,
+    *,
+    columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> DataComparison:
+    """A trajectory of another program, judged against the scene's reference at the times of the data.
+
+    Parameters
+    ----------
+    data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or a column
+        each, such as `rotor`, `pitch_1_deg`; any of them may be missing.
+    columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each channel, and whether
+        it is wrapped. Without it they are guessed from the names; `verdict.read` says how.
+    tolerance : rad per unit of error growth (error amplification) that still agree.
+
+    Raises
+    ------
+    InputError
+        For data that cannot be read or compared: one line with the file, column or row, and what is allowed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rotor_mbs as rm
+    >>> scene = rm.scene("paper/fig03")
+    >>> run = rm.run(scene, "lagrange/dop853")
+    >>> found = rm.compare_data({"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}, scene)
+    >>> found.status, found.verdict.read[1]
+    ('ok', "rotor = 'rotor_deg' [deg]")
+    """
+    study = compare_with_reference(load_data(data, scene, columns), scene, tolerance)
+    return DataComparison(study)
+
+
+@dataclass(frozen=True)
+class DataComparison:
+    """A comparison: see `rotor_mbs.compare_data`. Prints as a table.
+
+    Attributes
+    ----------
+    study : data, reference and numbers.
+    verdict : the numbers, see `rotor_mbs.analysis.data_verdict.DataVerdict`.
+    status, message, agrees : "ok" and "", or another status and why in a line; whether it is "ok".
+    likely : what the difference looks like, of causes that were tried by running them.
+    """
+
+    study: DataStudy
+
+    @property
+    def verdict(self) -> DataVerdict:
+        return self.study.verdict
+
+    @property
+    def status(self) -> str:
+        return self.verdict.status
+
+    @property
+    def message(self) -> str:
+        return self.verdict.message
+
+    @property
+    def agrees(self) -> bool:
+        return self.verdict.agrees
+
+    @property
+    def likely(self) -> tuple[str, ...]:
+        return self.verdict.likely
+
+    def table(self) -> TextTable:
+        """A row for each channel: errors (rad, rad/s), until when it agrees (s), lag (s), scale, offset."""
+        head = ("channel", "largest error", "per growth", *(f"to {level:g}" for level in LEVELS))
+        return TextTable((*head, "lag (s)", "scale - 1", "offset"), [_row(one) for one in self.verdict.channels])
+
+    def plot(self) -> Panels:
+        """The error of each channel over time, and what the tolerance allows it."""
+        return error_panels(self.study)
+
+    def to_html(self, folder: str | os.PathLike[str]) -> Path:
+        """The page into a folder; its path."""
+        return write_comparison_page(self.study, Path(folder))
+
+    def __repr__(self) -> str:
+        """Says how columns were read, numbers by channel, and the verdict."""
+        verdict = self.verdict
+        lines = [f"{verdict.source}: {verdict.rows} rows against {verdict.scene}", *map("  {}".format, verdict.read)]
+        if verdict.unused:
+            lines.append(f"  not used: {', '.join(verdict.unused[:12])}{', ...' * (len(verdict.unused) > 12)}")
+        lines += ["", str(self.table()), ""]
+        lines.append(
+            f"compared until {verdict.compared_until:g} s, judged up to the horizon at {verdict.horizon_s:g} s"
+        )
+        if verdict.energy_drift is not None:
+            lines.append(f"energy balance: {verdict.energy_drift:.1e} of the energy scale")
+        lines += verdict.notes
+        lines.append(f"{verdict.status}{': ' * bool(verdict.message)}{verdict.message}")
+        lines += [f"looks like: {cause}" for cause in verdict.likely]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return (
+            f"<p>{escape(self.status)} {escape(self.message)}</p>{self.table()._repr_html_()}{self.plot()._repr_svg_()}"
+        )
+
+
+def _row(one: ChannelErrors) -> tuple[str, ...]:
+    until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in one.agrees_until)
+    return (
+        one.name, f"{one.error_max:.1e} {one.unit}", f"{one.error_per_growth:.1e}", *until,
+        f"{one.lag_s:.1e}", f"{one.scale - 1.0:.1e}", f"{one.offset:.1e}",
+    )  # fmt: skip

@@ -1,0 +1,138 @@
+"""The page of data of another program against a scene's reference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rotor_mbs.analysis.data_verdict import LEVELS, DataVerdict
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
+from rotor_mbs.report.core.files import INDEX, render, write_pages
+from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
+from rotor_mbs.report.core.numbers import number, with_unit
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.plots import time_histories
+from rotor_mbs.report.plots.time_histories import Series
+from rotor_mbs.studies.compare_data import DataStudy
+
+_ALLOWED = Look(GREY, ":", "")
+_SMALLEST = 1e-18
+
+
+def write_comparison_page(study: DataStudy, output: Path) -> Path:
+    """The page into a folder; its path. Raises StoreError where it cannot be written."""
+    write_pages(output, {INDEX: render("data_comparison", comparison_page(study))})
+    return output / INDEX
+
+
+def comparison_page(study: DataStudy) -> dict[str, object]:
+    """What the template has: verdict, pictures, tables."""
+    verdict = study.verdict
+    return {
+        "scene": verdict.scene,
+        "title": study.scene.title,
+        "source": Path(verdict.source).name,
+        "agrees": verdict.agrees,
+        "status": verdict.status,
+        "lead": _lead(verdict),
+        "errors": Section([*_motion(study), *_errors(study)], _legend(study), [_table(verdict)]),
+        "read": verdict.read,
+        "unused": verdict.unused,
+        "notes": verdict.notes,
+    }
+
+
+def _lead(verdict: DataVerdict) -> list[str]:
+    reach = f"{verdict.rows} rows until {number(verdict.compared_until, 4)} s; judged up to the horizon at "
+    reach += (
+        f"{with_unit(verdict.horizon_s, 's', 4)}, tolerance {number(verdict.tolerance)} rad per unit of error growth."
+    )
+    sentences = [reach]
+    if verdict.message:
+        sentences.append(f"{verdict.message[:1].upper()}{verdict.message[1:]}.")
+    if verdict.energy_drift is not None:
+        sentences.append(f"Energy balance of the data: {number(verdict.energy_drift)} of the energy scale.")
+    return sentences + [f"The difference looks like: {cause}." for cause in verdict.likely]
+
+
+def error_panels(study: DataStudy) -> Panels:
+    """The error of each channel (rad, rad/s) over time, on a logarithmic axis, and what the tolerance allows."""
+    time, expected = study.reference.time, np.hstack([study.reference.angles, study.reference.rates])
+    errors = np.abs(study.data.values[: len(time)] - expected[:, study.data.columns])
+    series = [Series(time, error, look) for error, look in zip(errors.T, _looks(study), strict=True)]
+    allowed = study.verdict.tolerance * study.carried.max(axis=1)
+    series.append(Series(time, np.maximum(allowed, _SMALLEST), _ALLOWED))
+    return time_histories.errors(series, "error (rad, rad/s)", study.verdict.horizon_s)
+
+
+def _looks(study: DataStudy) -> list[Look]:
+    """As everywhere for the coordinates; rates thinly dotted."""
+    count = 1 + len(study.scene.blades)
+    looks = [coordinate_look(column % count) for column in study.data.columns]
+    return [
+        Look(look.colour, look.line if column < count else ":", "")
+        for look, column in zip(looks, study.data.columns, strict=True)
+    ]
+
+
+def _legend(study: DataStudy) -> list[LegendEntry]:
+    entries = [
+        LegendEntry(channel.name, look) for channel, look in zip(study.data.channels, _looks(study), strict=True)
+    ]
+    return [*entries, line_entry("allowed for the channel that grows most", GREY, ":")]
+
+
+def _errors(study: DataStudy) -> list[Picture]:
+    caption = "Error of each channel against the reference at the times of the data; vertical line: horizon"
+    worst = max(study.verdict.channels, key=lambda one: one.error_max)
+    text = f"Largest error up to the horizon: {number(worst.error_max)} {worst.unit}, {worst.name}."
+    return [picture(error_panels(study), "errors", caption, text)]
+
+
+def _motion(study: DataStudy) -> list[Picture]:
+    """Angles of the reference as lines, those of the data as marks."""
+    count, data, time = 1 + len(study.scene.blades), study.data, study.reference.time
+    chosen = [j for j, column in enumerate(data.columns) if column < count]
+    if not chosen:
+        return []
+    panels = canvas.panels((2.9,), time_histories.TIME_AXIS)
+    axes = panels.axes[0]
+    every = max(1, len(time) // 40)
+    for j in chosen:
+        column = data.columns[j]
+        look = coordinate_look(column)
+        axes.plot(*time_histories.thin(time, study.reference.angles[:, column]), color=look.colour, linestyle=look.line)
+        axes.plot(
+            time[::every], data.values[: len(time) : every, j], linestyle="none", marker="o", markersize=3.6,
+            markerfacecolor="none", markeredgecolor=look.colour,
+        )  # fmt: skip
+    time_histories.set_range(axes, np.hstack([study.reference.angles, data.values[: len(time), chosen]]))
+    axes.set_ylabel(time_histories.ANGLE_AXIS)
+    caption = "Angles: reference as lines, data as circles"
+    return [picture(panels, "motion", caption, f"{caption}; {study.scene.title}.")]
+
+
+def _table(verdict: DataVerdict) -> PageTable:
+    head = (
+        "Channel",
+        "largest error",
+        "per unit of growth",
+        *(f"agrees to {number(level, 1)} until" for level in LEVELS),
+    )
+    rows: list[Row] = []
+    for one in verdict.channels:
+        good = one.error_per_growth <= verdict.tolerance
+        until = [number(None) if np.isnan(time) else with_unit(time, "s", 4) for time in one.agrees_until]
+        rows.append(
+            [
+                one.name, with_unit(one.error_max, one.unit),
+                TableCell(number(one.error_per_growth), "good" if good else "bad"), *until,
+                with_unit(one.lag_s, "s"), number(one.scale - 1.0), with_unit(one.offset, one.unit),
+            ]
+        )  # fmt: skip
+    return PageTable(
+        "Channels up to the horizon", (*head, "constant lag", "scale less 1", "offset"), rows, tuple(range(1, 9))
+    )

@@ -1,0 +1,194 @@
+"""Data of another program against the reference of a scene, evaluated at the times of the data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.analysis.data_verdict import (
+    DEFAULT_TOLERANCE,
+    DataVerdict,
+    carried_errors,
+    channel_errors,
+    rows_to_the_horizon,
+)
+from rotor_mbs.errors import InputError
+from rotor_mbs.foreign.trajectory import ForeignData
+from rotor_mbs.models.lagrange import samples
+from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
+from rotor_mbs.scenario.accuracy_bounds import Bound
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.solution import Solution
+
+METHOD = "data"  # what takes the place of a method's name
+# An error of the state changes the energy by its gradient: some ten times the error, of the energy scale; tenfold that.
+_ENERGY_PER_ANGLE = 100.0
+_ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
+_FEWEST = 3
+
+
+@dataclass(frozen=True)
+class DataStudy:
+    """Data, what they were compared with, and the verdict.
+
+    Attributes
+    ----------
+    scene, data : what was compared; the data cut to the scene's duration.
+    reference : at the times of the data, as far as the motion goes: time, angles, rates, error_growth.
+    carried : (n, channels) what an error of the initial state of 1 rad may be in each channel, at most.
+    verdict : the numbers.
+    """
+
+    scene: Scene
+    data: ForeignData
+    reference: Trajectory
+    carried: Array
+    verdict: DataVerdict
+
+
+def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = DEFAULT_TOLERANCE) -> DataStudy:
+    """The verdict on data.
+
+    Raises InputError for a tolerance that is not positive, and for data without rows in the scene's duration.
+    """
+    if not 0.0 < tolerance < float("inf"):
+        raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0, rad per unit of error growth")
+    inside = data.time <= scene.duration * (1.0 + _ROUNDING)
+    cut = replace(data, time=data.time[inside], values=data.values[inside])
+    exact = _reference(scene, cut.time)
+    place: NDArray[np.int64] = np.searchsorted(exact.trajectory.time, cut.time)
+    rows = int((place < len(exact.trajectory.time)).sum())
+    if not rows:
+        raise InputError(f"{data.source}: no row within the {scene.duration:g} s of {scene.name}; allowed: times in s")
+    place = place[:rows]
+    carried = carried_errors(exact.trajectory, exact.growth, exact.units)[place][:, data.columns]
+    at_rows = _rows_of(exact.trajectory, place)
+    cut = _with_whole_turns(cut, at_rows)
+    verdict = _verdict(scene, data, cut, at_rows, exact, carried, tolerance)
+    return DataStudy(scene, cut, at_rows, carried, verdict)
+
+
+def _reference(scene: Scene, time: Array) -> TimedReference:
+    """At the times of the data and at the scene's samples, which make growth and horizon the same for all data."""
+    end = max(scene.duration, float(time[-1])) if len(time) else scene.duration
+    times = np.union1d(np.append(time, end), np.linspace(0.0, scene.duration, scene.samples))
+    whole = replace(scene, duration=end, samples=len(times), outputs=("angles", "rates"))
+    return reference_at(whole, times)
+
+
+def _rows_of(trajectory: Trajectory, place: NDArray[np.int64]) -> Trajectory:
+    return Trajectory(
+        trajectory.time[place], trajectory.angles[place], trajectory.rates[place],
+        error_growth=trajectory.error_growth[place],
+    )  # fmt: skip
+
+
+def _states(trajectory: Trajectory) -> Array:
+    return np.hstack([trajectory.angles, trajectory.rates])
+
+
+def _with_whole_turns(data: ForeignData, reference: Trajectory) -> ForeignData:
+    """Wrapped channels with as many turns as the reference has in the first row."""
+    values = data.values.copy()
+    expected = _states(reference)[0, data.columns]
+    for j, wrapped in enumerate(data.wrapped):
+        if wrapped:
+            values[:, j] += 2.0 * np.pi * np.round((expected[j] - values[0, j]) / (2.0 * np.pi))
+    return replace(data, values=values)
+
+
+def _verdict(
+    scene: Scene, whole: ForeignData, data: ForeignData, reference: Trajectory, exact: TimedReference, carried: Array,
+    tolerance: float,
+) -> DataVerdict:  # fmt: skip
+    rows, (horizon_s, until) = len(reference.time), rows_to_the_horizon(exact.trajectory, reference.time)
+    compared = replace(data, time=data.time[:rows], values=data.values[:rows])
+    expected = _states(reference)[:, data.columns]
+    slopes = _slopes(exact, reference.time)[:, data.columns]
+    names = [(channel.name, channel.unit) for channel in data.channels]
+    errors = channel_errors(names, reference.time, compared.values, expected, slopes, carried, max(until, 1))
+    run = _as_run(scene, compared, reference, tolerance)
+    found = judge(run.scene, run, reference)
+    status, message = found.status, found.message
+    worst = max(errors, key=lambda one: one.error_per_growth)
+    if not worst.error_per_growth <= tolerance:
+        status, message = (
+            "inaccurate",
+            (
+                f"{worst.name}: error {worst.error_max:.1e} {worst.unit} up to the horizon, "
+                f"{worst.error_per_growth:.1e} per unit of error growth, allowed {tolerance:.0e}"
+            ),
+        )
+    if status == "ok":
+        status, message = _uncovered(scene, compared, exact, until)
+    return DataVerdict(
+        scene.name, data.source, status, message, tolerance, errors, rows, float(reference.time[-1]), horizon_s,
+        found.metrics.get("energy_drift_max"), data.read, data.unused, tuple(_notes(scene, whole, data, run)),
+    )  # fmt: skip
+
+
+def _slopes(exact: TimedReference, time: Array) -> Array:
+    """(n, 2 (1 + blades)) Time derivatives at the rows; of rates by differences."""
+    states = _states(exact.trajectory)
+    count = states.shape[1] // 2
+    rates = states[:, count:]
+    slopes = np.gradient(rates, exact.trajectory.time, axis=0) if len(rates) > 1 else 0.0 * rates
+    place = np.searchsorted(exact.trajectory.time, time)
+    found: Array = np.hstack([rates, slopes])[place]
+    return found
+
+
+def _as_run(scene: Scene, data: ForeignData, reference: Trajectory, tolerance: float) -> Solution:
+    """The data as a run that can be judged; channels that they lack are the reference's and so add no error."""
+    states = _states(reference).copy()
+    states[:, data.columns] = data.values
+    count = states.shape[1] // 2
+    scene = replace(scene, duration=float(data.time[-1]), samples=len(data.time), outputs=("angles", "rates"))
+    trajectory = Trajectory(data.time, states[:, :count], states[:, count:])
+    if set(data.columns) == set(range(2 * count)) and scene.has_constant_torque and not scene.has_damping:
+        moving = scene.moving_coordinates
+        columns = [*moving, *(count + i for i in moving)]
+        scene = replace(scene, outputs=("angles", "rates", "energy"))
+        energies = samples.trajectory(scene, data.time, states[:, columns])
+        trajectory.quantities |= {name: energies.quantities[name] for name in _ENERGIES}
+    bounds = (
+        Bound("agreement", METHOD, tolerance, "as asked for"),
+        Bound("energy", METHOD, _ENERGY_PER_ANGLE * tolerance, "what an error of the tolerance does to the energy"),
+    )
+    return Solution(scene, METHOD, trajectory, Integration(True), bounds=bounds)
+
+
+_ENERGIES = ("kinetic_energy", "potential_energy", "work")
+
+
+def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: int) -> tuple[str, str]:
+    """What the rows leave out of the motion, which is then not ok: its start, its end, or all but a row of it."""
+    time, end = data.time, min(scene.duration, float(exact.trajectory.time[-1]))
+    step = float(np.diff(time).max(initial=0.0))
+    if time[-1] < end - 1.5 * step:
+        return "inaccurate", f"the data end at t = {time[-1]:.6g} s of {end:g} s: the rest is not known"
+    if time[0] > 1.5 * step:
+        return "inaccurate", f"the data begin at t = {time[0]:.6g} s: what was before is not known"
+    if until < _FEWEST:
+        return "inaccurate", f"{until} rows up to the horizon: too few to be compared"
+    return "ok", ""
+
+
+def _notes(scene: Scene, whole: ForeignData, data: ForeignData, run: Solution) -> Sequence[str]:
+    notes = []
+    if len(whole.time) > len(data.time):
+        notes.append(f"{len(whole.time) - len(data.time)} rows after the scene's {scene.duration:g} s are not compared")
+    missing = [label for i, label in enumerate(scene.coordinate_labels) if i not in data.columns]
+    if missing:
+        notes.append(f"no angle of: {', '.join(missing)}")
+    if "energy" not in run.scene.outputs:
+        reason = "not all angles and rates are given" if missing or len(data.columns) < 2 * len(
+            scene.coordinate_labels
+        ) else "the work of dampers or of a torque that changes is not known"  # fmt: skip
+        notes.append(f"no energy balance: {reason}")
+    return notes

@@ -1,0 +1,47 @@
+"""For the tests of other projects: a trajectory of theirs must agree with the reference of a scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotor_mbs.report.data_comparison import DataComparison, compare_data
+from rotor_mbs.scenario.catalogue import only_scene
+from rotor_mbs.scenario.scene import Scene
+
+
+def assert_agrees(
+    time: Any, angles: Any, *, scene: Scene | str, rates: Any = None, tolerance: float = 1e-6
+) -> DataComparison:
+    """Raises AssertionError, with the table of the comparison, where the trajectory does not agree.
+
+    Parameters
+    ----------
+    time : (n,) s, increasing; any times within the scene's duration, its start and end among them.
+    angles : (n, 1 + blades) rad: rotor, then the pitch of each blade, unwrapped.
+    scene : the name of a shipped scene, a TOML file, or a `Scene`.
+    rates : (n, 1 + blades) rad/s; optional. With them the energy balance is examined, too.
+    tolerance : rad per unit of error growth.
+
+    Returns
+    -------
+    The comparison, with its numbers.
+
+    Raises
+    ------
+    InputError
+        For arrays that cannot be compared: other shapes, times that do not increase, numbers that are not finite.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> from rotor_mbs.testing import assert_agrees
+    >>> run = rm.run(rm.scene("paper/fig03"), "exudyn_tree/rk67")
+    >>> assert_agrees(run.time, run.angles, scene="paper/fig03").status
+    'ok'
+    """
+    chosen = only_scene(scene) if isinstance(scene, str) else scene
+    arrays = {"time": time, "angles": angles} | ({} if rates is None else {"rates": rates})
+    found = compare_data(arrays, chosen, tolerance=tolerance)
+    if not found.agrees:
+        raise AssertionError(str(found))
+    return found

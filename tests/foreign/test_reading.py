@@ -1,0 +1,169 @@
+"""Files of other programs: every format gives the same numbers; names guessed or mapped; wrong input is one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.data_files import FORMATS
+from support.scenes import paper
+
+import rotor_mbs as rm
+from rotor_mbs.cli import main
+from rotor_mbs.errors import InputError, RotorError
+from rotor_mbs.foreign.channels import channels, guess
+from rotor_mbs.foreign.trajectory import load_data
+
+SCENE = paper("fig08")
+TIME = np.linspace(0.0, 10.0, 201)
+ANGLES = np.stack([0.3 - 2.0 * TIME, 0.7 * np.cos(TIME), 0.1 * TIME, 0.2 * np.sin(3.0 * TIME)], axis=1)
+RATES = np.stack([-2.0 + 0.0 * TIME, -0.7 * np.sin(TIME), 0.1 + 0.0 * TIME, 0.6 * np.cos(3.0 * TIME)], axis=1)
+STATES = np.hstack([ANGLES, RATES])
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_gives_the_same_numbers(tmp_path: Path, name: str) -> None:
+    if name.endswith(".outb"):
+        pytest.importorskip("openfast_io")
+    FORMATS[name](tmp_path / name, SCENE, TIME, ANGLES, RATES)
+    turns = name == "data.out"  # OpenFAST's azimuth is from 0 to 360 degrees
+    columns = {"rotor": {"column": "Azimuth", "wrapped": True}} if turns else None
+    data = load_data(tmp_path / name, SCENE, columns)
+    np.testing.assert_allclose(data.time, TIME, rtol=1e-15)
+    assert 0 in data.columns
+    np.testing.assert_allclose(
+        data.values - data.values[0], STATES[:, data.columns] - STATES[0, data.columns], atol=2e-14
+    )
+    assert turns or len(data.columns) >= 4
+
+
+def test_guesses_say_what_they_took_for_what(tmp_path: Path) -> None:
+    FORMATS["data.outb"](tmp_path / "data.outb", SCENE, TIME, ANGLES, RATES)
+    pytest.importorskip("openfast_io")
+    data = load_data(tmp_path / "data.outb", SCENE)
+    assert data.read[:3] == ("time = 'Time' [s]", "rotor = 'Azimuth' [deg]", "pitch 1 = 'BldPitch1' [deg]")
+    assert "rotor rate = 'RotSpeed' [rpm]" in data.read
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [
+        ("t", "time"), ("Time", "time"), ("time_ms", "time"), ("rotor", "rotor"), ("rotor_deg", "rotor"),
+        ("Azimuth", "rotor"), ("rotor speed", "rotor rate"), ("RotSpeed", "rotor rate"), ("psi_dot", "rotor rate"),
+        ("pitch 1", "pitch 1"), ("PtchPMzc2", "pitch 2"), ("theta3", "pitch 3"), ("pitch_2_rate", "pitch 2 rate"),
+        ("theta_dot_1", "pitch 1 rate"), ("pitch", None), ("tip 1 x", None), ("RotTorq", None), ("pitch 4", None),
+    ],
+)  # fmt: skip
+def test_names_that_are_known(name: str, channel: str | None) -> None:
+    found = guess(name, 0, channels(SCENE))
+    assert (found and found.name) == channel
+
+
+def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    table = np.column_stack([1e3 * TIME, -(np.degrees(ANGLES[:, 0]) + 90.0), RATES[:, 2] * 30.0 / np.pi])
+    np.savetxt(path, table, delimiter=";", header="zeit;a;b", comments="", fmt="%.17g")
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(
+        'time = { column = "zeit", unit = "ms" }\n'
+        'rotor = { column = "a", unit = "deg", sign = -1, offset = 90.0 }\n'
+        'pitch_2_rate = { column = "b", unit = "rpm" }\n'
+    )
+    data = load_data(path, SCENE, mapping)
+    assert data.columns == [0, 6]
+    np.testing.assert_allclose(data.values, STATES[:, [0, 6]], atol=1e-13)
+    assert data.read[1] == "rotor = -'a' +90 [deg]"
+
+
+def test_results_of_this_program_are_data_too(tmp_path: Path) -> None:
+    scene = rm.scene("paper/fig03")
+    rm.compare(scene, ["lagrange/dop853", "exudyn_tree/rk67"]).save(tmp_path / "r.h5")
+    with pytest.raises(RotorError, match=r"several groups; .*paper/fig03/exudyn_tree/rk67"):
+        load_data(tmp_path / "r.h5", scene)
+    (tmp_path / "map.toml").write_text('group = "exudyn_tree/rk67"\nrotor = "angles[0]"\n')
+    data = load_data(tmp_path / "r.h5", scene, tmp_path / "map.toml")
+    assert (
+        data.values[:, 0].tobytes() == rm.open(tmp_path / "r.h5")["paper/fig03/exudyn_tree/rk67"].angles[:, 0].tobytes()
+    )
+
+
+def _sparse(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(2 << 30)
+
+
+def _write(text: str) -> Callable[[Path], None]:
+    return lambda path: path.write_text(text) and None
+
+
+HEAD = "time [s],rotor [rad]\n"
+WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
+    "unknown columns": (_write("time,a,b\n0,1,2\n1,2,3\n2,3,4\n"), "no column for an angle or a rate"),
+    "no time": (_write("rotor,pitch 1\n0,1\n1,2\n2,3\n"), "no column for the time"),
+    "other lengths": (_write(HEAD + "0,1\n1,2\n2\n"), "1 fields, where the rows above have 2"),
+    "text in numbers": (_write(HEAD + "0,1\n1,two\n2,3\n"), "'two' in column 2; allowed: a number"),
+    "nothing": (lambda path: path.touch(), "empty"),
+    "names alone": (_write(HEAD), "no row of numbers"),
+    "no header": (_write("0,1\n1,2\n2,3\n"), "no line of names"),
+    "2 GB": (_sparse, "2.0 GB; allowed: up to 0.5 GB"),
+    "wrong unit": (_write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"), "'kg'; allowed: rad, deg, turns"),
+    "wrong unit of time": (_write("time [rad],rotor [rad]\n0,1\n1,2\n2,3\n"), "'rad'; allowed: s, ms"),
+    "NaN": (_write(HEAD + "0,1\n1,nan\n2,3\n"), "is nan in row 2 of 3"),
+    "repeated time": (_write(HEAD + "0,1\n1,2\n1,3\n"), "the time of row 3, 1 s, repeats"),
+    "decreasing time": (_write(HEAD + "0,1\n2,2\n1,3\n"), "comes before"),
+    "before the start": (_write(HEAD + "-1,1\n0,2\n1,3\n"), "begins at t = -1 s"),
+    "too few rows": (_write(HEAD + "0,1\n1,2\n"), "2 rows; allowed: 3 or more"),
+    "two columns of one name": (_write("time,rotor,rotor\n0,1,1\n1,2,2\n2,3,3\n"), "two columns are named"),
+    "two columns for one channel": (_write("time,rotor,azimuth\n0,1,1\n1,2,2\n2,3,3\n"), "could be rotor"),
+    "a damaged archive": (lambda path: path.write_bytes(b"PK\x03\x04damaged"), "cannot be read"),
+    "a damaged HDF5 file": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100)), "not a readable HDF5"),
+    "a damaged MAT file": (lambda path: path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(200)), "cannot be read"),
+    "a program": (lambda path: path.write_bytes(b"\x7fELF" + bytes(100)), "not a format that can be read"),
+    "a folder": (lambda path: path.mkdir(), "is a folder"),
+    "no file": (Path.exists, "no such file"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str, capsys: pytest.CaptureFixture[str]) -> None:
+    make, message = WRONG[case]
+    path = tmp_path / "data.csv"
+    make(path)
+    assert main(["compare", str(path), "--scene", "paper/fig08", "-o", str(tmp_path / "page")]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "page").exists()
+
+
+@pytest.mark.parametrize(
+    ("mapping", "message"),
+    [
+        ('rotr = "a"', "rotr: no such channel; allowed: rotor"),
+        ('rotor = "c"', "no column 'c'; it has: t, a, b"),
+        ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
+        ('rotor = { column = "a", sign = 2 }', "sign: 2; allowed: 1, -1"),
+        ('rotor = { column = "a", offset = "x" }', "offset: 'x'"),
+        ('rotor = { column = "a", zero = 1 }', "zero: no such key"),
+        ("rotor = 3", "names no column"),
+        ('time = "t"', "no channel to compare"),
+        ("rotor", "not TOML"),
+    ],
+)
+def test_a_wrong_mapping_is_refused(tmp_path: Path, mapping: str, message: str) -> None:
+    (tmp_path / "data.csv").write_text("t,a,b\n0,1,2\n1,2,3\n2,3,4\n")
+    (tmp_path / "map.toml").write_text(mapping)
+    with pytest.raises(InputError, match=message.replace("(", r"\(")) as caught:
+        load_data(tmp_path / "data.csv", SCENE, tmp_path / "map.toml")
+    assert len(caught.value.problems) == 1
+
+
+def test_without_its_package_a_binary_openfast_file_says_how_to_get_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    FORMATS["data.outb"](tmp_path / "data.outb", SCENE, TIME, ANGLES, RATES)
+    monkeypatch.setitem(__import__("sys").modules, "openfast_io.FAST_output_reader", None)
+    with pytest.raises(InputError, match=r"rotor_mbs\[openfast\]"):
+        load_data(tmp_path / "data.outb", SCENE)

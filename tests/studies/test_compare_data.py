@@ -1,0 +1,186 @@
+"""Trajectories of codes that are not the package's, judged at their own times."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import other_code
+from support.data_files import FORMATS
+
+import rotor_mbs as rm
+from rotor_mbs.cli import main
+from rotor_mbs.models.lagrange import reference
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.testing import assert_agrees
+
+# (scene, format, duration of the short form, s): three formats more are in test_a_third_engine_and_exported_files.
+ACCEPTED = [
+    ("paper/fig08", "data.csv", 4.0),
+    ("paper/fig09", "data.npz", 2.5),
+    ("paper/fig11", "data.out", 2.5),
+    ("check/general", "data.mat", 1.5),  # springs, dampers, a torque with a jump, full inertia
+    ("check/general", "data.nc", 1.5),
+    ("check/general", "data.txt", 1.5),
+]
+
+
+def uneven(duration: float, rows: int = 240) -> np.ndarray:
+    """Times that are no sample times of any scene, from 0 to the end."""
+    share = np.linspace(0.0, 1.0, rows)
+    return duration * (share + 0.1 * np.sin(np.pi * share) ** 2)
+
+
+def scene_of(name: str, duration: float) -> Scene:
+    scene = rm.scene(name)
+    return replace(scene, duration=duration, samples=1 + round(duration * (scene.samples - 1) / scene.duration))
+
+
+def accepted(name: str, kind: str, duration: float, folder: Path) -> None:
+    scene = scene_of(name, duration)
+    time = uneven(duration)
+    angles, rates = other_code.trajectory(scene, time)
+    FORMATS[kind](folder / kind, scene, time, angles, rates)
+    columns = None
+    if kind == "data.out":
+        columns = {"rotor": {"column": "Azimuth", "wrapped": True}}
+        columns |= {f"pitch_{i}": f"BldPitch{i}" for i in (1, 2, 3)} | {"rotor_rate": "RotSpeed"}
+    found = rm.compare_data(folder / kind, scene, columns=columns)
+    assert (found.status, found.message) == ("ok", "")
+    # SciPy at 1e-11 makes errors of some 1e-11 a step; a wrong digit in the equations, at least 1e-4.
+    assert max(one.error_per_growth for one in found.verdict.channels) < 1e-8
+    assert found.likely == ()
+
+
+@pytest.mark.parametrize(("name", "kind", "duration"), ACCEPTED)
+def test_a_correct_code_agrees(tmp_path: Path, name: str, kind: str, duration: float) -> None:
+    accepted(name, kind, duration, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["paper/fig08", "paper/fig09", "paper/fig11"])
+def test_a_correct_code_agrees_to_the_end(tmp_path: Path, name: str) -> None:
+    accepted(name, "data.csv", 10.0, tmp_path)
+
+
+def test_mujoco_agrees_through_plain_arrays() -> None:
+    """RK4 at its default step: an error of 1e-8 of a step's size, far below the tolerance."""
+    pytest.importorskip("mujoco")
+    scene = scene_of("paper/fig11", 1.0)
+    run = rm.run(scene, "mujoco/rk4")
+    found = rm.compare_data({"time": run.time, "qpos": run.angles, "qvel": run.rates}, scene)
+    assert found.agrees
+
+
+def test_the_reference_at_the_times_of_the_data_is_the_frozen_one() -> None:
+    """At the scene's samples: the shipped file, bit for bit; between them: what a finer sampling has there."""
+    pytest.importorskip("heyoka")
+    scene = rm.scene("paper/fig08")
+    frozen = rm.run(scene, "lagrange/dop853").reference
+    time = np.union1d(frozen.time, uneven(10.0))
+    found = reference.reference_at(replace(scene, samples=len(time)), time).trajectory
+    at = np.searchsorted(time, frozen.time)
+    assert found.angles[at].tobytes() == frozen.angles.tobytes()
+
+
+def test_growth_of_each_channel_is_at_most_that_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row of the state transition matrix is no longer than its norm; without heyoka it is the same by differences."""
+    scene = scene_of("paper/fig09", 0.5)
+    found = reference.reference_at(scene, np.linspace(0.0, 0.5, 6))
+    largest = found.growth.max(axis=1)
+    assert (largest <= found.trajectory.error_growth * (1.0 + 1e-9)).all()
+    assert (found.trajectory.error_growth <= largest * np.sqrt(8.0) * (1.0 + 1e-9)).all()
+    monkeypatch.setattr(reference, "is_available", lambda: False)
+    other = reference.reference_at(scene, np.linspace(0.0, 0.5, 6))
+    np.testing.assert_allclose(other.trajectory.angles, found.trajectory.angles, atol=1e-11)
+    np.testing.assert_allclose(other.growth, found.growth, rtol=1e-4)
+
+
+def test_a_driven_rotor_is_judged_by_its_own_growth() -> None:
+    """Fig. 15's pitches are unstable and its rotor is not: mass 1 % off is 1e-6 of a turn before the horizon."""
+    scene = rm.scene("paper/fig15-10kNm")
+    heavier = tuple(replace(blade, mass=1.01 * blade.mass) for blade in scene.blades)
+    time = np.linspace(0.0, 10.0, 101)
+    angles, rates = other_code.trajectory(replace(scene, blades=heavier), time)
+    found = rm.compare_data({"time": time, "angles": angles, "rates": rates}, scene)
+    assert found.status == "inaccurate"
+    assert found.message.startswith("rotor")
+
+
+def test_the_command_prints_a_table_and_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Status 0 for data that agree, 1 for others; JSON has the same numbers."""
+    scene = rm.scene("paper/fig03")
+    run = rm.run(scene, "lagrange/dop853")
+    for factor, status in ((1.0, 0), (1.001, 1)):
+        FORMATS["data.csv"](tmp_path / "d.csv", scene, run.time, factor * run.angles, run.rates)
+        call = ["compare", str(tmp_path / "d.csv"), "--scene", "paper/fig03", "-o", str(tmp_path / "page")]
+        assert main(call) == status
+        shown = capsys.readouterr().out
+        assert "rotor = 'rotor' [deg]" in shown
+        assert ("\nok\n" in shown) == (status == 0)
+        page = (tmp_path / "page" / "index.html").read_text()
+        assert page.count("<svg role") + page.count('role="img"') >= 2
+        assert ("inaccurate" in page) == (status == 1)
+        assert main([*call, "--json"]) == status
+        found = json.loads(capsys.readouterr().out)
+        assert found["agrees"] == (status == 0)
+        assert found["channels"][0]["agrees_until"]["0.001"] == (
+            10.0 if status == 0 else found["channels"][0]["agrees_until"]["0.001"]
+        )
+    assert main([*call, "--tolerance", "0.1"]) == 0
+
+
+def test_a_test_of_another_project() -> None:
+    scene = rm.scene("paper/fig03")
+    run = rm.run(scene, "lagrange/dop853")
+    assert assert_agrees(run.time, run.angles, scene="paper/fig03", rates=run.rates).agrees
+    with pytest.raises(AssertionError, match="rotor: error"):
+        assert_agrees(run.time, run.angles + 1e-4, scene=scene)
+    with pytest.raises(rm.InputError, match="different lengths"):
+        assert_agrees(run.time[1:], run.angles, scene=scene)
+
+
+@pytest.mark.parametrize(
+    ("cut", "message"), [(slice(None, 800), "the data end at t = 7.99 s"), (slice(300, None), "begin at")]
+)
+def test_data_that_leave_out_a_part_are_not_ok(cut: slice, message: str) -> None:
+    run = rm.run(rm.scene("paper/fig08"), "lagrange/dop853")
+    found = rm.compare_data({"time": run.time[cut], "angles": run.angles[cut]}, run.scene)
+    assert found.status == "inaccurate"
+    assert message in found.message
+
+
+def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
+    run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
+    alone = rm.compare_data({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene)
+    assert (alone.status, len(alone.verdict.channels)) == ("ok", 1)
+    assert "no angle of: rotor" in alone.verdict.notes
+    assert rm.compare_data({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).agrees
+    wrong = rm.compare_data({"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene)
+    assert wrong.message.startswith("rotor rate")
+    assert wrong.verdict.channels[0].scale == pytest.approx(1.001, abs=1e-9)
+
+
+def test_lag_scale_and_offset_are_those_that_were_put_in() -> None:
+    """A smooth scene; the lag's own curvature error is of second order, 1e-6."""
+    scene = rm.scene("paper/fig03")
+    run = rm.run(replace(scene, samples=10001), "lagrange/dop853")
+    late = 0.25 + 0.999 * run.angles[10:-1:10, 0]  # 0.01 s late of the rows' times, from the second on
+    found = rm.compare_data({"t": run.time[10:-1:10] - 0.001, "rotor": late}, scene)
+    (channel,) = found.verdict.channels
+    assert channel.lag_s == pytest.approx(-0.001, rel=0.01)
+    assert channel.scale == pytest.approx(0.999, abs=1e-5)
+    assert channel.offset == pytest.approx(0.25, abs=1e-4)
+
+
+def test_the_energy_of_data_is_examined_beyond_the_horizon() -> None:
+    """Fig. 11 after 6.15 s: angles are not judged any more, a damper that nobody asked for is."""
+    scene = rm.scene("paper/fig11")
+    run = rm.run(scene, "lagrange/dop853")
+    rates = run.rates * np.where(run.time < 6.5, 1.0, 0.9)[:, None]
+    found = rm.compare_data({"time": run.time, "angles": run.angles, "rates": rates}, scene)
+    assert found.status == "inaccurate"
+    assert found.message.startswith("energy drift")

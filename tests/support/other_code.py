@@ -1,0 +1,100 @@
+"""Trajectories by a code that is not the package's: Lagrange's equations of the rotor, typed anew, under SciPy.
+
+From positions in the base frame; nothing of the package but a scene's numbers. `Mistakes` are those that people make.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from rotor_mbs.scenario.scene import Scene
+
+Array = Any
+
+
+@dataclass(frozen=True)
+class Mistakes:
+    """phases: rad, in place of the right ones; coriolis: factor; e1, e2, e3: the paper's errata, for point masses."""
+
+    phases: tuple[float, ...] = ()
+    coriolis: float = 1.0
+    e1: bool = False
+    e2: bool = False
+    e3: bool = False
+
+
+NONE = Mistakes()
+
+
+def trajectory(scene: Scene, times: Array, mistakes: Mistakes = NONE) -> tuple[Array, Array]:
+    """(n, 1 + blades) angles and rates at `times`, from 0 on."""
+    count = 1 + len(scene.blades)
+    accelerations = _equations(scene, mistakes)
+    state = np.array([*scene.initial_angles, *scene.initial_rates])
+    kinks = [t for t, _ in scene.rotor_torque if 0.0 < t < times[-1]]
+    rows = [state[None, :]]
+    for start, end in pairwise(sorted({0.0, *kinks, float(times[-1])})):
+        inside = times[(times > start) & (times <= end)]
+        asked = inside if len(inside) and inside[-1] == end else np.append(inside, end)
+
+        def derivative(t: float, y: Array, start: float = start, end: float = end) -> Array:
+            shift = 1e-9 * (end - start)  # a jump of the torque belongs to the interval that it begins
+            torque = scene.torque_at(min(max(t, start + shift), end - shift))
+            return np.concatenate([y[count:], accelerations(torque, y[:count], y[count:])])
+
+        run = solve_ivp(derivative, (start, end), state, "DOP853", asked, rtol=1e-11, atol=1e-12)
+        rows.append(run.y.T[: len(inside)])
+        state = run.y[:, -1]
+    found = np.concatenate(rows)[1:] if times[0] > 0.0 else np.concatenate(rows)
+    return found[:, :count], found[:, count:]
+
+
+def _equations(scene: Scene, mistakes: Mistakes) -> Callable[[float, Array, Array], Array]:
+    """(torque, angles, rates) -> accelerations: pitches eliminated, arrays over the blades."""
+    blades = scene.blades
+    phases = np.array(mistakes.phases or [2.0 * np.pi * i / len(blades) for i in range(len(blades))])
+    m = np.array([blade.mass for blade in blades])
+    x, y, z = np.array([blade.centre_of_mass for blade in blades]).T
+    xx, yy, zz, xy, xz, yz = np.array([blade.inertia for blade in blades]).T
+    k, d = (np.array(values or [0.0] * len(blades)) for values in (scene.bearing_stiffness, scene.bearing_damping))
+
+    def accelerations(torque: float, q: Array, w: Array) -> Array:
+        sp, cp, s, c = np.sin(q[0] + phases), np.cos(q[0] + phases), np.sin(q[1:]), np.cos(q[1:])
+        u, v = x * c - y * s, x * s + y * c  # the centre of mass, across the blade and along the shaft
+        spin, rate, zero = w[0], w[1:], 0.0 * u
+        # First and second derivatives of its position (cp u + sp z, v, cp z - sp u) by the angle φ and the pitch θ.
+        phi = [cp * z - sp * u, x * c if mistakes.e1 else zero, -cp * u - sp * z]
+        theta = [-cp * v, u, sp * v]
+        phi_phi = [-cp * u - sp * z, zero, sp * u - cp * z]
+        phi_theta = [sp * v, -0.5 * x * s if mistakes.e1 else zero, cp * v]
+        theta_theta = [-(sp if mistakes.e2 else cp) * u, -v, sp * u]
+        a, a_slope = xx * s * s + yy * c * c + 2.0 * xy * s * c, 2.0 * (xx - yy) * s * c + 2.0 * xy * (c * c - s * s)
+        b, b_slope = xz * s + yz * c, xz * c - yz * s
+        coriolis = mistakes.coriolis * spin * rate
+        last = rate if mistakes.e3 else rate * rate
+        on_rotor = -m * _dot(phi, _sum(phi_phi, spin**2, phi_theta, 2.0 * coriolis, theta_theta, rate**2))
+        on_pitch = -m * _dot(theta, _sum(phi_phi, spin**2, phi_theta, 2.0 * coriolis, theta_theta, last))
+        on_rotor -= m * scene.gravity * phi[2] + a_slope * coriolis + b_slope * rate**2
+        on_pitch += -m * scene.gravity * theta[2] + 0.5 * a_slope * spin**2 - k * q[1:] - d * rate
+        coupling, pitch_inertia = m * _dot(phi, theta) + b, m * _dot(theta, theta) + zz
+        inertia = scene.hub_inertia + np.sum(m * _dot(phi, phi) + a - coupling**2 / pitch_inertia)
+        moment = torque - scene.shaft_damping * spin + np.sum(on_rotor - coupling * on_pitch / pitch_inertia)
+        rotor = moment / inertia
+        return np.concatenate([[rotor], (on_pitch - coupling * rotor) / pitch_inertia])
+
+    return accelerations
+
+
+def _dot(first: list[Array], second: list[Array]) -> Array:
+    return sum(one * other for one, other in zip(first, second, strict=True))
+
+
+def _sum(*terms: Any) -> list[Array]:
+    """The weighted sum of vectors, given as vector, weight, vector, weight, ..."""
+    return [sum(vector[i] * weight for vector, weight in zip(terms[::2], terms[1::2], strict=True)) for i in range(3)]
