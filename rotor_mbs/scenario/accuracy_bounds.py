@@ -18,7 +18,7 @@ from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 CHECKS = (
     "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "gap", "exact", "published",
-    "reference", "growth", "frozen", "symmetry", "order", "printed", "rules", "speed",
+    "reference", "growth", "frozen", "symmetry", "order", "extrapolated", "printed", "rules", "speed",
 )  # fmt: skip
 
 

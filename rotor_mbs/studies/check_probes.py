@@ -18,7 +18,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.metrics import horizon_samples, running_growth
+from rotor_mbs.solution.metrics import angle_error, horizon_samples, running_growth
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.studies.check_printed import differences
 from rotor_mbs.studies.check_status_rules import SCENE, known_runs, metrics_off, shares_off
@@ -27,11 +27,13 @@ from rotor_mbs.studies.stored_references import load_frozen
 # Scenes of probes that need none of the shipped ones.
 _OWN_SCENES = ("random states", "made by hand")
 
+_CHAIN = "exudyn_chain/generalized_alpha"
 
-def probe(kind: str, scene: str, method: str, expected: float = 0.0) -> Case:
-    """A measurement: kind (a key of _KINDS), name of the scene, method, expected order."""
+
+def probe(kind: str, scene: str, method: str, expected: float = 0.0, **settings: object) -> Case:
+    """A measurement: kind (a key of _KINDS), name of the scene, method, expected order or error, settings."""
     found = replace(SCENE, name=scene) if scene in _OWN_SCENES else find_scenes([scene])[0]
-    return Case(found, method, study=kind, options={"expected": expected})
+    return Case(found, method, settings, study=kind, options={"expected": expected})
 
 
 def probes() -> list[Case]:
@@ -44,7 +46,9 @@ def probes() -> list[Case]:
         probe("order", "paper/fig11", "mujoco/rk4", 4.0),
         probe("order", "paper/fig11", "mujoco/implicitfast", 1.0),
         probe("order", "paper/fig11", "exudyn_tree/rk44", 4.0),
-        probe("order", "paper/fig11", "exudyn_chain/generalized_alpha", 2.0),
+        probe("order", "paper/fig11", _CHAIN, 2.0),
+        probe("extrapolated", "paper/fig08", _CHAIN, 1e-9, extrapolation="richardson", newton_relative_tolerance=1e-12),
+        probe("extrapolated", "paper/fig11", _CHAIN, 1e-6, extrapolation="richardson"),
         probe("reference", "paper/fig08", REFERENCE),
         probe("reference", "paper/fig11", REFERENCE),
         probe("reference", "check/general", REFERENCE),
@@ -131,6 +135,27 @@ def _order(case: Case) -> list[Verdict]:
     return [measured(case, "angles", abs(order - expected), "", look)]
 
 
+def _extrapolated(case: Case) -> list[Verdict]:
+    """The error of angles with an uncertainty, of the expected one and of this uncertainty.
+
+    Over the whole run where its pitches that are zero stay so, up to the horizon else: there any rounding has grown.
+    """
+    frozen = load_frozen(case.scene.name)
+    moves = frozen.angles[:, 1:].any(axis=0).all()
+    count = horizon_samples(frozen) if moves else len(frozen.time)
+    scene = replace(_scene(case, float(frozen.time[count - 1])), samples=count)
+    found, expected = _run(case, scene, **case.settings), float(str(case.options["expected"]))
+    largest = share = math.nan
+    if found is not None and found.angle_uncertainty is not None:
+        error = angle_error(found, frozen)
+        largest, share = float(error.max()), float((error / found.angle_uncertainty).max())
+    look = f"{largest:.1e} rad, expected at most {expected:g} rad: the chain, or Newton's residual"
+    return [
+        measured(case, "angles", largest / expected, "of expected", look),
+        measured(case, "angles, of their uncertainty", share, "of uncertainty", look),
+    ]
+
+
 def _reference(case: Case) -> list[Verdict]:
     """Computed now against frozen; a fallback reference is compared within its own uncertainty."""
     scene = case.scene
@@ -211,6 +236,7 @@ SPEED_RATIOS = {"lagrange/taylor": 0.23, "exudyn_tree/rk67": 13.1}
 _KINDS: dict[str, Callable[[Case], Iterable[Verdict]]] = {
     "symmetry": _symmetry,
     "order": _order,
+    "extrapolated": _extrapolated,
     "reference": _reference,
     "printed": _printed,
     "rules": _rules,

@@ -227,7 +227,7 @@ def _schedule(settings: Any, scheme: Scheme, interval: IntegrationInterval, rows
     span = (interval.end - interval.start) / interval.sample_intervals
     steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
     integration.startTime, integration.endTime = interval.start, interval.end
-    integration.numberOfSteps = steps * interval.sample_intervals
+    integration.numberOfSteps = steps * scheme.refinement * interval.sample_intervals
     every_step = scheme.step is None and rows_between
     # The engine adds up periods: shortened by a tenth of a step over the whole interval, rounding makes none come late.
     period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)

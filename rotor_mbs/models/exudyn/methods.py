@@ -6,7 +6,7 @@ Listing what a method builds needs no engine; the engine is loaded when a system
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from itertools import product
 from typing import Any
@@ -19,6 +19,7 @@ from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
 from rotor_mbs.models.exudyn.energy import work_needs_rows
+from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, ExtrapolatedSolver
 from rotor_mbs.models.exudyn.timetable import RotorTorque, TorqueSegment, integration_intervals
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
@@ -31,15 +32,21 @@ _MOST_STEPS = 1e9
 Reading = Callable[[Scene, Sequence[TorqueSegment], Callable[[str], Array]], Trajectory]
 
 
+_NODE = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
+_EXTRAPOLATION = choice(NONE, (NONE, RICHARDSON), doc="richardson: three runs, with step, step/2 and step/4")
+
+
 @dataclass(frozen=True)
 class ChainAlphaSettings(schemes.AlphaSettings):
     step: float = schemes.step(5e-4)
-    node: str = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
+    node: str = _NODE
+    extrapolation: str = _EXTRAPOLATION
 
 
 @dataclass(frozen=True)
 class ChainNewmarkSettings(schemes.NewtonSettings):
-    node: str = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
+    node: str = _NODE
+    extrapolation: str = _EXTRAPOLATION
 
 
 class MultibodySolver:
@@ -83,15 +90,22 @@ def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
 
 
 def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
-    scheme, torque = _scheme(scene, settings), RotorTorque(scene)
+    scheme = _scheme(scene, settings)
     if scene.wants("loads") and settings.node == "rotation_vector":
         raise MethodRefusal(
             "exudyn_chain: loads need the setting node = euler_parameters: with rotation_vector the engine's "
             "multipliers start wrong, and those of newmark_index2 stay so"
         )
-    parts = chain.parts(scene, torque, settings.node)
-    # Its angles are unwrapped from row to row, so rows are kept between samples.
-    return MultibodySolver(scene, parts, torque, scheme, sensor_samples.chain_trajectory, rows_between=True)
+
+    def build(refinement: int = 1) -> Solver:
+        torque = RotorTorque(scene)
+        parts, finer = chain.parts(scene, torque, settings.node), replace(scheme, refinement=refinement)
+        # Its angles are unwrapped from row to row, so rows are kept between samples.
+        return MultibodySolver(scene, parts, torque, finer, sensor_samples.chain_trajectory, rows_between=True)
+
+    if settings.extrapolation == RICHARDSON:
+        return ExtrapolatedSolver(build, settings.newton_relative_tolerance)
+    return build()
 
 
 def _linearize_tree(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:

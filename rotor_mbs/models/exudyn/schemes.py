@@ -20,6 +20,7 @@ class Scheme:
 
     step is the largest step in s, or None where the scheme chooses its own; it is then given up after `trial_steps`
     trials within one integration interval (the engine itself repeats a rejected smallest step for ever).
+    refinement: how many equal steps take the place of each step that fits the sample interval.
     """
 
     solver: str
@@ -27,6 +28,7 @@ class Scheme:
     options: Mapping[str, object] = field(default_factory=dict)
     step: float | None = None
     trial_steps: int = 0
+    refinement: int = 1
 
     def with_accelerations(self) -> Scheme:
         """The same, with accelerations at the end of every step; an implicit scheme has them anyway."""

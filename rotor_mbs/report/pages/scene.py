@@ -241,6 +241,11 @@ def difference_section(drawn: DrawnRuns) -> Section:
                 f"The uncertainty of the reference, {size}, is far below the axis; its angles are stored in double "
                 "precision, rounded by at most half a unit in the last place."
             )
+    for method, run in runs.items():
+        if "angle_uncertainty" in run:
+            look = Look(look_of(method).colour, ":", "")
+            others.append(Series(run.array("time"), run.array("angle_uncertainty"), look))
+            legend.append(LegendEntry(f"{label_of(method)}: its uncertainty", look))
     shown = error_pictures.error_picture(
         curves, "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", drawn.horizon, others,

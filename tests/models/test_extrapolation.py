@@ -1,0 +1,135 @@
+"""Richardson extrapolation of the chain: exact where it must be, of higher order, with an uncertainty that bounds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.references import reference, run, scene
+
+from rotor_mbs.models.exudyn.extrapolation import extrapolated
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import horizon_samples
+from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.solution import Solution
+
+ALPHA, NEWMARK = "exudyn_chain/generalized_alpha", "exudyn_chain/newmark_index2"
+RICHARDSON = {"extrapolation": "richardson"}
+
+
+def beginning(name: str, samples: int) -> Scene:
+    full = scene(name)
+    return replace(full, duration=float(reference(name).time[samples - 1]), samples=samples)
+
+
+def errors(found: Solution, name: str) -> np.ndarray:
+    """(n,) rad: largest over the coordinates."""
+    return np.abs(found.angles - reference(name).angles[: len(found.time)]).max(axis=1)
+
+
+def test_terms_of_second_and_fourth_order_vanish() -> None:
+    time, (a, b) = np.linspace(0.0, 1.0, 5), np.random.default_rng(1).normal(size=(2, 5, 4))
+    exact = Trajectory(time, np.ones((5, 4)), np.ones((5, 4)), work=time, constraint_error=time)
+    runs = [
+        Trajectory(time, 1.0 + a * h**2 + b * h**4, 1.0 - a * h**2, work=time * (1.0 + h**2), constraint_error=time * h)
+        for h in (0.4, 0.2, 0.1)
+    ]
+    found = extrapolated(runs, tolerance=0.0)
+    np.testing.assert_allclose(found.angles, exact.angles, rtol=1e-15)
+    np.testing.assert_allclose(found.rates, exact.rates, rtol=1e-15)
+    np.testing.assert_allclose(found.work, exact.work, rtol=1e-14)
+    assert (found.constraint_error == 0.1 * time).all()  # of the finest run: a distance has no sign
+    # Two extrapolations of second order are off by b h⁴ / 4, of h = 0.4 and 0.2.
+    distance = np.abs(b).max(axis=1) * (0.4**4 - 0.2**4) / 4
+    np.testing.assert_allclose(found.angle_uncertainty, 4 * np.maximum.accumulate(distance), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("method", "steps", "order"), [(NEWMARK, (0.01, 0.005), 6.0), (ALPHA, (0.005, 0.0025), 3.0)])
+def test_order_of_what_remains(method: str, steps: tuple[float, ...], order: float) -> None:
+    """The trapezoidal rule has even powers of the step only, generalized-α one of h³, too; Newton to rounding."""
+    name = "check/point-masses"
+    settings = {**RICHARDSON, "newton_relative_tolerance": 1e-12}
+    coarse, fine = (errors(run(beginning(name, 51), method, **settings, step=step), name).max() for step in steps)
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "samples"),
+    [
+        ("check/general", ALPHA, 51),
+        ("check/held", ALPHA, 51),
+        ("paper/fig08", NEWMARK, 101),
+        ("paper/fig09", ALPHA, 101),
+        ("paper/fig14a", ALPHA, 101),
+    ],
+)
+def test_uncertainty_bounds_the_error_at_every_sample(name: str, method: str, samples: int) -> None:
+    found = run(beginning(name, samples), method, **RICHARDSON)
+    assert found.trajectory.angle_uncertainty is not None
+    assert (errors(found, name) <= found.trajectory.angle_uncertainty).all()
+    assert found.trajectory.angle_uncertainty[-1] <= 5e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [
+        ("paper/fig09", 5e-4),
+        ("paper/fig11", 5e-4),
+        ("paper/fig12", 2.5e-4),
+        ("paper/fig13b", 1.25e-4),
+        ("paper/fig14a", 5e-4),
+        ("paper/fig14b", 2.5e-4),
+        ("paper/fig14c", 2.5e-4),
+    ],
+)
+def test_chaotic_scenes_to_1e_6_before_the_horizon(name: str, step: float) -> None:
+    samples = horizon_samples(reference(name))
+    found = run(beginning(name, samples), ALPHA, **RICHARDSON, step=step)
+    error = errors(found, name)
+    assert len(error) == samples
+    assert error.max() <= 1e-6
+    assert (error <= found.trajectory.angle_uncertainty).all()
+
+
+@pytest.mark.slow
+def test_fig08_to_1e_9_over_ten_seconds() -> None:
+    """Seven seconds past the time at which the neighbours of its invariant set have left."""
+    found = run(scene("paper/fig08"), ALPHA, **RICHARDSON, newton_relative_tolerance=1e-12)
+    error = errors(found, "paper/fig08")
+    assert len(error) == scene("paper/fig08").samples
+    assert error.max() <= 1e-9
+    assert (error <= found.trajectory.angle_uncertainty).all()
+
+
+def test_every_quantity_is_extrapolated() -> None:
+    name = "check/general"
+    one = beginning(name, 21)
+    plain, better = run(one, ALPHA, step=1e-3), run(one, ALPHA, **RICHARDSON, step=1e-3)
+    exact = run(one)
+    assert set(better.quantities) == {*plain.quantities, "angle_uncertainty"}
+    for quantity in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
+        off, before = (np.abs(found[quantity] - exact[quantity]).max() for found in (better, plain))
+        assert off <= 1e-3 * before
+    assert plain.trajectory.angle_uncertainty is None
+    assert (better.angles[0] == plain.angles[0]).all()
+
+
+def test_steps_are_those_of_all_runs_and_fit_each_other() -> None:
+    """Also where half a step would fit the sample interval otherwise than twice the steps do."""
+    one = beginning("check/general", 3)
+    interval = one.duration / 2
+    found = run(one, ALPHA, **RICHARDSON, step=interval / 21)
+    plain = run(one, ALPHA, step=interval / 21)
+    assert found.integration.steps == 7 * plain.integration.steps
+
+
+def test_a_run_that_breaks_off_ends_all() -> None:
+    """No residual is that small. Of the runs that were not begun the first sample is known, and no more."""
+    hopeless = {"newton_relative_tolerance": 1e-300, "newton_absolute_tolerance": 1e-300}
+    found = run(beginning("paper/fig11", 11), ALPHA, **RICHARDSON, **hopeless)
+    assert not found.integration.success
+    assert found.integration.message
+    assert len(found.time) == 1
+    assert found.trajectory.angle_uncertainty.shape == (1,)
