@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor_mbs.analysis.rehydrate import rehydrate
+from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene
@@ -155,9 +156,8 @@ class Comparison:
 
     def table(self) -> TextTable:
         """A row for each method: status, error (rad), energy drift (of the energy scale), run time (s)."""
-        return TextTable(
-            ("method", "status", "error (rad)", "energy drift", "time (s)"), [_row(r) for r in self.runs.values()]
-        )
+        rows = [run_row(r.method, r.status, r.metrics, float(np.median(r.run_times_s))) for r in self.runs.values()]
+        return TextTable(RUN_HEAD, rows)
 
     @property
     def plot(self) -> ComparisonPlots:
@@ -423,9 +423,3 @@ def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
 
 def _with_reference(solution: Solution, reference: Trajectory | None) -> Run:
     return Run(**{one.name: getattr(solution, one.name) for one in fields(Solution)}, reference=reference)
-
-
-def _row(run: Run) -> tuple[str, ...]:
-    numbers = [run.metrics.get(name, np.nan) for name in ("angle_error_max", "energy_drift_max")]
-    texts = ["" if np.isnan(value) else f"{value:.1e}" for value in numbers]
-    return (run.method, run.status, *texts, f"{float(np.median(run.run_times_s)):.3g}")

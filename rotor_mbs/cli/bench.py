@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 
+from rotor_mbs.analysis.run_tables import bench_table
 from rotor_mbs.cli.arguments import cores
-from rotor_mbs.cli.terminal import ProgressLine, print_not_computed
+from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.report.pages.bench import write_bench_report
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.store.records import read_records
 from rotor_mbs.studies.bench import run_bench
 from rotor_mbs.studies.cost_scaling import run_cost_scaling
 
@@ -29,6 +31,8 @@ def bench(arguments: argparse.Namespace) -> int:
             made += run_cost_scaling(methods, output, on_progress=progress, **limits)
     for line in report.left_out:
         print(line, file=sys.stderr)
+    names = {scene.name for scene in scenes}
+    print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
     index = write_bench_report(output, output.with_name(f"{output.stem}-report"))
     print(f"{output}: {report.measured} scenes measured, {report.kept} there already\nreport: {index}")
     lost = [one for one in made if not one.is_computed]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from rotor_mbs.execution.provenance import fingerprint
@@ -14,6 +15,7 @@ from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import read_records
 
 _STAMP = ".made-from"
+_SUMMARY = "summary.txt"  # what `reproduce` prints at its end
 
 
 def report(arguments: argparse.Namespace) -> int:
@@ -50,20 +52,21 @@ def animate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def render_if_changed(results: Path, output: Path, jobs: int) -> Path:
-    """The index of the report on `results` in `output`; made anew unless the same data and code have made it before.
+def render_if_changed(results: Path, output: Path, jobs: int, summary: Callable[[Path], str]) -> tuple[Path, str]:
+    """The index of the report on `results` in `output`, and the text that `summary` makes of `results`.
 
-    Raises StoreError.
+    Both are made anew unless the same data and code have made them before. Raises StoreError.
     """
     from rotor_mbs.report.build import write_report
     from rotor_mbs.report.core.files import INDEX
 
     made_from = _digest(results)
-    stamp = output / _STAMP
-    if not (stamp.is_file() and stamp.read_text() == made_from and (output / INDEX).is_file()):
+    stamp, index, text = output / _STAMP, output / INDEX, output / _SUMMARY
+    if not (stamp.is_file() and stamp.read_text() == made_from and index.is_file() and text.is_file()):
         write_report(results, output, jobs)
+        replace_file(text, summary(results).encode())
         replace_file(stamp, made_from.encode())
-    return output / INDEX
+    return index, text.read_text(encoding="utf-8")
 
 
 def _digest(results: Path) -> str:

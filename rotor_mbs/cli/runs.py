@@ -5,11 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from pathlib import Path
 
+from rotor_mbs.analysis.claim_records import stored_claims
+from rotor_mbs.analysis.claims import claims
+from rotor_mbs.analysis.run_tables import finding_lines, method_table, run_table
+from rotor_mbs.analysis.summary import finding
 from rotor_mbs.cli import EXIT_BAD_INPUT
-from rotor_mbs.cli.terminal import ProgressLine, print_summary
+from rotor_mbs.cli.terminal import ProgressLine, print_summary, print_table, print_text
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.reference import compute_references
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
@@ -32,6 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
             scenes, methods, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
             settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
+    with open_results(arguments.output) as results:
+        print_table(run_table(results.scenes, methods))
     return print_summary(report, arguments.output)
 
 
@@ -43,10 +51,22 @@ def reproduce(arguments: argparse.Namespace) -> int:
     results = arguments.output / "results.h5"
     with ProgressLine() as progress:
         report = reproduce_paper(results, workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress)
+        progress.stage("report: drawing the pages")
+        index, summary = render_if_changed(results, arguments.output / "report", arguments.jobs, _summary)
     status = print_summary(report, results)
-    index = render_if_changed(results, arguments.output / "report", arguments.jobs)
+    print_text(summary)
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
+
+
+def _summary(path: Path) -> str:
+    """Numbers and claims of the paper, and a line for each method over all its scenes."""
+    with open_results(path) as results:
+        runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
+        study = stored_claims(results)
+        facts = finding(results.scenes, claims(results.scenes))
+        lines = finding_lines(facts, None if study is None else study.shares)
+        return "\n".join([*lines, "", str(method_table(runs)), ""])
 
 
 def reference(arguments: argparse.Namespace) -> int:

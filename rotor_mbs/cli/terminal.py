@@ -3,40 +3,97 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shutil
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TextIO
 
+from rotor_mbs.solution.status import STATUSES
+
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.execution.execute import Outcome
+    from rotor_mbs.solution.text_table import TextTable
     from rotor_mbs.studies.run import RunReport
 
 
+# How a status is coloured on a terminal: well; open to doubt; anything else went wrong.
+_COLOURS = {"ok": "32", "inaccurate": "33", "unchecked": "33"}
+_BAD = "31"
+_STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'error', 'no_reference'))})\b")
+
+
+def has_colour(stream: TextIO) -> bool:
+    """Whether to colour what is printed there: on a terminal, unless the user asks for none (https://no-color.org)."""
+    return stream.isatty() and "NO_COLOR" not in os.environ
+
+
+def coloured(text: str) -> str:
+    """The statuses in a text, each in its colour."""
+    return _STATUS.sub(lambda found: f"\x1b[{_COLOURS.get(found[0], _BAD)}m{found[0]}\x1b[0m", text)
+
+
+def print_table(table: TextTable) -> None:
+    """On standard output, after an empty line; nothing where it has no rows."""
+    if table.rows:
+        print_text(str(table))
+
+
+def print_text(text: str) -> None:
+    """On standard output, after an empty line, with its statuses coloured on a terminal."""
+    print("", coloured(text) if has_colour(sys.stdout) else text, sep="\n")
+
+
 class _RenewedLine:
-    """One line that renews itself on a terminal, plain lines in a log. A context manager that clears it."""
+    """One line that renews itself on a terminal, plain lines in a log. A context manager that clears it.
+
+    On a terminal it is renewed every second, so that a long run is no silence.
+    """
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._is_terminal = self._stream.isatty()
         self._start = time.monotonic()
+        self._text = ""
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
 
     def __enter__(self) -> Self:
+        if self._is_terminal:
+            threading.Thread(target=self._renew, daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._is_terminal:
-            self._print("\r\x1b[K", end="")
+        self._ended.set()
+        with self._lock:
+            if self._is_terminal:
+                self._print("\r\x1b[K", end="")
+
+    def _renew(self) -> None:
+        while not self._ended.wait(1.0):
+            with self._lock:
+                if self._text and not self._ended.is_set():
+                    self._print_over(self._text)
 
     def _show(self, text: str, *, keep: bool = False) -> None:
-        """keep: it stays on the terminal."""
-        if self._is_terminal:
-            self._print(f"\r\x1b[K{text[: self._width]}", end="\n" if keep else "")
-        else:
-            self._print(text)
+        """keep: it stays on the terminal, whole."""
+        with self._lock:
+            self._text = "" if keep else text
+            if not self._is_terminal:
+                self._print(text)
+            elif keep:
+                self._print(f"\r\x1b[K{coloured(text) if has_colour(self._stream) else text}")
+            else:
+                self._print_over(text)
+
+    def _print_over(self, text: str) -> None:
+        elapsed = f"  {span(time.monotonic() - self._start)}"
+        self._print(f"\r\x1b[K{text[: self._width - len(elapsed)]}{elapsed}", end="")
 
     def _print(self, text: str, end: str = "\n") -> None:
         print(text, end=end, file=self._stream, flush=True)
@@ -47,18 +104,29 @@ class _RenewedLine:
 
 
 class ProgressLine(_RenewedLine):
-    """Called after each case."""
+    """Called after each case. What is left is estimated from the work done, not from the number of cases."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        super().__init__(stream)
+        self._last = self._list_start = self._start
 
     def __call__(self, done: int, total: int, outcome: Outcome) -> None:
+        if done == 1:
+            self._list_start = self._last
+        self._last = time.monotonic()
         result = outcome.result
-        seconds = f" {result.seconds:.3f} s" if result.seconds else ""
+        seconds = " (read, not computed)" if result.is_read else f" {result.seconds:.3f} s" if result.seconds else ""
         reason = f": {result.message}" if result.message else ""
         text = f"[{done:{len(str(total))}d}/{total}] {outcome.case.label} {result.status}{seconds}{reason}"
         keep = result.status != "ok"  # a person must not miss it
-        if self._is_terminal and done < total and not keep:
-            left = (time.monotonic() - self._start) / done * (total - done)
-            text += f"  ({span(left)} left)"
+        if self._is_terminal and done < total and not keep and outcome.share > 0.0:
+            left = (self._last - self._list_start) / outcome.share * (1.0 - outcome.share)
+            text = f"{outcome.share:4.0%}, about {span(left)} left  {text}"
         self._show(text, keep=keep)
+
+    def stage(self, text: str) -> None:
+        """What is done after the cases, such as drawing pages."""
+        self._show(text)
 
 
 class SweepProgress(_RenewedLine):

@@ -13,6 +13,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene, scene_hash
 
 RUN = "run"
+_FIXED_WORK = 3.0  # building, judging, storing
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,11 @@ class Case:
     def label(self) -> str:
         """The case in a line of progress."""
         return f"{self.scene.name} {self.method}" + ("" if self.study == RUN else f" {self.study}")
+
+    @property
+    def work(self) -> float:
+        """Roughly how much there is to compute, for estimates: 1 is 10 s of a scene by the fastest method."""
+        return _FIXED_WORK + find_method(self.method).relative_cost * self.scene.duration / 10.0
 
     @functools.cached_property
     def scene_hash(self) -> str:

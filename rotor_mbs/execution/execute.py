@@ -39,20 +39,28 @@ class Job:
 
 @dataclass(frozen=True)
 class Result:
-    """What a worker process reports of a job: status, one line of message ("" where all is well), run time in s."""
+    """What a worker process reports of a job: status, one line of message ("" where all is well), run time in s.
+
+    is_read: it was not computed but read from a file that is shipped.
+    """
 
     status: str
     message: str = ""
     seconds: float = 0.0
     value: Any = None
+    is_read: bool = False
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A case that this call computed, or tried to."""
+    """A case that this call computed, or tried to.
+
+    share: how much of the work of the call was done when it ended, from 0 to 1.
+    """
 
     case: Case
     result: Result
+    share: float = 0.0
 
     @property
     def is_computed(self) -> bool:
@@ -103,11 +111,13 @@ def execute(
         stored = store.stored_keys()
         missing = [case for case in cases if case.key not in stored and not _part(parts, case.key).exists()]
         made: list[Outcome] = []
+        work = sum(case.work for case in missing)
         for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
             jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored)) for case in wave]
             for outcome in _outcomes(jobs, run_jobs, on_time_out):
-                made.append(outcome)
-                on_progress(len(made), len(missing), outcome)
+                done = outcome.case.work + sum(one.case.work for one in made)
+                made.append(replace(outcome, share=done / work))
+                on_progress(len(made), len(missing), made[-1])
         new = {case.key for case in missing}
         found = sorted(parts.glob("*.h5"), key=lambda path: (path.stem in new, path.name))
         if found or not store.path.exists():

@@ -145,7 +145,8 @@ def run_cases(scene: Scene, methods: Iterable[str], reference: Case, settings: M
 def perform_run(job: Job) -> Result:
     """Solves, judges and stores one run, in a worker process. Raises StoreError where it cannot be written."""
     case = job.case
-    if case.method == REFERENCE and "frozen" in case.options:
+    is_read = case.method == REFERENCE and "frozen" in case.options
+    if is_read:
         run, attributes = frozen_solution(case.scene, case.scene_hash)
     else:
         attributes = {}
@@ -170,7 +171,9 @@ def perform_run(job: Job) -> Result:
         **verdict.metrics,
     }
     write_run(job.part, case.scene_hash, run, attributes)
-    return Result(verdict.status, verdict.message, float(np.median(run.run_times_s)))
+    return Result(
+        verdict.status, verdict.message, 0.0 if is_read else float(np.median(run.run_times_s)), is_read=is_read
+    )
 
 
 def store_failure(status: str, job: Job, message: str) -> Result:

@@ -125,6 +125,10 @@ def test_run_writes_every_run_and_a_second_one_has_nothing_to_do(tmp_path: Path,
     first = rotor_mbs("run", quick, "-m", "lagrange/dop853", "-m", "exudyn_tree/rk67", "-o", "r.h5", cwd=tmp_path)
     assert first.returncode == 0, first.stderr
     assert "3 runs made (3 ok)" in first.stdout
+    table = [line.split() for line in first.stdout.splitlines() if line.startswith("quick ")]
+    assert [row[:3] for row in table] == [
+        ["quick", "reference", "ok"], ["quick", "lagrange/dop853", "ok"], ["quick", "exudyn_tree/rk67", "ok"],
+    ]  # fmt: skip
     before = (tmp_path / "r.h5").read_bytes()
     second = rotor_mbs("run", quick, "-m", "lagrange/dop853", "-m", "exudyn_tree/rk67", "-o", "r.h5", cwd=tmp_path)
     assert "nothing to do, 3 there already" in second.stdout

@@ -1,0 +1,107 @@
+"""What came out, as small tables for a terminal or a notebook: of runs, of methods over many runs, of bench curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from rotor_mbs.analysis.claim_shares import ClaimShares
+from rotor_mbs.analysis.run_selection import in_catalogue_order
+from rotor_mbs.analysis.summary import Finding
+from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.solution.text_table import TextTable
+from rotor_mbs.store.read import StoredRun, StoredScene
+from rotor_mbs.store.records import Record
+
+RUN_HEAD = ("method", "status", "error (rad)", "energy drift", "time (s)")
+_VERBS = {"holds": "hold", "fails": "fail"}
+_MOST_ROWS = 40  # of a table with a row for each run
+
+
+def run_row(method: str, status: str, facts: Mapping[str, object], seconds: float | None) -> tuple[str, ...]:
+    """Cells under RUN_HEAD: the largest angle error up to the horizon, the largest energy error of its scale, run time.
+
+    facts: metrics by their stored names; seconds: None where nothing was integrated.
+    """
+    time = "read" if seconds is None else f"{seconds:.3g}"
+    return (method, status, _short(facts.get("angle_error_max")), _short(facts.get("energy_drift_max")), time)
+
+
+def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]) -> TextTable:
+    """A row for each of the `wanted` runs and their references; of many runs, one for each method."""
+    runs = [
+        scenes[name].runs[method]
+        for name, methods in wanted.items()
+        if name in scenes
+        for method in (REFERENCE, *methods)
+        if method in scenes[name].runs
+    ]
+    if len(runs) > _MOST_ROWS:
+        return method_table(run for run in runs if run.method != REFERENCE)
+    return TextTable(("scene", *RUN_HEAD), [(run.scene, *_row(run)) for run in runs])
+
+
+def method_table(runs: Iterable[StoredRun]) -> TextTable:
+    """A row for each method: how many of its runs are ok, and the largest numbers among those."""
+    by_method: dict[str, list[StoredRun]] = {}
+    for run in runs:
+        by_method.setdefault(run.method, []).append(run)
+    rows = []
+    for method in in_catalogue_order(by_method):
+        own = by_method[method]
+        ok = [run for run in own if run.status == "ok"]
+        worst = {name: _largest(ok, name) for name in ("angle_error_max", "energy_drift_max")}
+        rows.append(run_row(method, f"{len(ok)} of {len(own)} ok", worst, _largest(own, "run_time_s") or 0.0))
+    return TextTable(("method", "runs", "largest error (rad)", "largest drift", "longest (s)"), rows)
+
+
+def bench_table(curves: Sequence[Record]) -> TextTable:
+    """A row for each curve: how many settings are ok, the smallest error, and the run time to reach given errors."""
+    rows = []
+    for curve in curves:
+        errors, seconds = points(curve)
+        times = [time_to_reach(errors, seconds, target) for target in TARGETS_RAD]
+        count = f"{int(succeeded(curve).sum())} of {len(curve.statuses)}"
+        best = _short(float(errors.min())) if len(errors) else ""
+        rows.append((curve.scene, curve.name, count, best, *("" if t is None else f"{t:.2e}" for t in times)))
+    return TextTable(
+        ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e}" for target in TARGETS_RAD)), rows
+    )
+
+
+def finding_lines(facts: Finding, shares: ClaimShares | None) -> list[str]:
+    """The paper's numbers and claims, a line each; claims over many runs where `shares` has them."""
+    lines = []
+    if facts.numbers is not None:
+        corrected = facts.numbers_corrected
+        gives = f"; the corrected ones give {corrected.count or 'none'}" if corrected else ""
+        lines.append(
+            f"published numbers: {facts.numbers.count} of {facts.numbers.of} come out of the printed equations{gives}"
+        )
+    if shares is not None:
+        for method in shares.methods:
+            counts = [f"{n} {_VERBS.get(verdict, verdict)}" for verdict, n in shares.count(method).items() if n]
+            lines.append(f"claims in words, {method}: {', '.join(counts)}")
+    elif facts.claims_printed is not None:
+        tally = facts.claims_printed
+        lines.append(f"claims in words: {tally.count} of {tally.of} hold in the printed equations")
+    if facts.energy is not None:
+        rises = facts.energy.rises
+        lines.append(f"energy made from nothing by the printed equations: in {rises.count} of {rises.of} scenes")
+    return lines
+
+
+def _row(run: StoredRun) -> tuple[str, ...]:
+    facts = run.attributes
+    if run.method == REFERENCE:  # it has no error against itself
+        facts = {name: value for name, value in facts.items() if name != "angle_error_max"}
+    return run_row(run.method, run.status, facts, None if "frozen_with" in facts else facts.get("run_time_s", 0.0))
+
+
+def _largest(runs: Iterable[StoredRun], name: str) -> float | None:
+    return max((float(run.attributes[name]) for run in runs if name in run.attributes), default=None)
+
+
+def _short(value: object) -> str:
+    return f"{value:.1e}" if isinstance(value, float) and math.isfinite(value) else ""

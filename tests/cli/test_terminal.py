@@ -1,0 +1,62 @@
+"""Progress and tables on a terminal and in a log."""
+
+from __future__ import annotations
+
+import io
+import time
+
+import pytest
+
+from rotor_mbs.cli.terminal import ProgressLine, coloured, has_colour
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Outcome, Result
+from rotor_mbs.scenario.catalogue import find_scenes
+
+SCENE = find_scenes(["paper/fig05"])[0]
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def outcome(method: str = "lagrange/dop853", share: float = 0.5, **result: object) -> Outcome:
+    return Outcome(Case(SCENE, method), Result(**{"status": "ok", **result}), share)  # type: ignore[arg-type]
+
+
+def test_a_log_has_a_plain_line_for_each_case() -> None:
+    log = io.StringIO()
+    with ProgressLine(log) as progress:
+        progress(1, 2, outcome("reference", is_read=True))
+        progress(2, 2, outcome(status="diverged", message="not finite", seconds=1.5))
+    assert log.getvalue().splitlines() == [
+        "[1/2] paper/fig05 reference ok (read, not computed)",
+        "[2/2] paper/fig05 lagrange/dop853 diverged 1.500 s: not finite",
+    ]
+
+
+def test_a_terminal_shows_the_share_of_the_work_and_renews_itself_without_news(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    screen = Terminal()
+    with ProgressLine(screen) as progress:
+        progress(1, 100, outcome(share=0.25))
+        first = len(screen.getvalue())
+        assert " 25%, about" in screen.getvalue()
+        deadline = time.monotonic() + 10.0
+        while len(screen.getvalue()) == first and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert len(screen.getvalue()) > first
+        progress(2, 100, outcome(status="diverged", message="x" * 200))  # wider than any terminal: kept whole
+    assert "x" * 200 in screen.getvalue()
+    assert "\x1b[31mdiverged\x1b[0m" in screen.getvalue()
+
+
+def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert has_colour(Terminal())
+    assert not has_colour(io.StringIO())
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert not has_colour(Terminal())
+    assert coloured("17 of 17 ok") == "17 of 17 \x1b[32mok\x1b[0m"
