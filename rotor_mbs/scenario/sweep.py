@@ -107,6 +107,7 @@ class SweepTable(Table):
     samples: int | None = Field(None, ge=2, description="a whole number from 2 up")
     outputs: Outputs | None = Field(None, description=f"{OUTPUTS_ALLOWED}, or none: metrics alone")
     precision: Literal["float64", "float32"] = Field("float64", description='"float64" or "float32"')
+    amplification: bool = Field(False, description="true or false: error amplification and horizon of every run")
     combine: Literal["grid", "zip"] = Field("grid", description='"grid" or "zip"')
     draws: int | None = Field(None, ge=1, le=MAX_COUNT, description="a whole number from 1 up, with random axes")
     seed: int = Field(0, ge=0, le=2**63 - 1, description="a whole number from 0 up")

@@ -25,7 +25,7 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store import hdf5, sweep_layout
 from rotor_mbs.store.layout import Column
 from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns
-from rotor_mbs.store.sweep_layout import COLUMNS, CRC32, METRICS, SPLITS, SweepLayout
+from rotor_mbs.store.sweep_layout import COLUMNS, CRC32, SPLITS, SweepLayout
 
 _HEAD_BYTES = 1 << 17  # of a file beside its runs, at most: descriptions and texts
 
@@ -177,7 +177,7 @@ def _put_result_columns(file: Any, layout: SweepLayout) -> None:
         if name == "coordinate":
             hdf5.put_attributes(dataset, {"labels": layout.sweep.base.coordinate_labels})
     count, row = layout.last - layout.first, layout.row
-    for name, column in {**METRICS, **sweep_layout.trajectories(layout.sweep.outputs)}.items():
+    for name, column in {**layout.metrics, **sweep_layout.trajectories(layout.sweep.outputs)}.items():
         kind, shape = row[name].base, (count, *row[name].shape)
         if name == "message":
             kind, shape = np.dtype("u1"), (count, sweep_layout.MESSAGE_BYTES)

@@ -38,6 +38,11 @@ METRICS = {
     "pitch_max": Column(("run",), "rad", "largest pitch angle of any blade, either way"),
     "message": Column(("run", "message_byte"), "1", "why the run did not end well: UTF-8 bytes, then zeros"),
 }
+# Asked for by `amplification = true`: the variational equations cost a hundred times the run itself.
+AMPLIFICATION = {
+    "error_growth": Column(("run",), "1", "largest amplification of a small error of the initial state"),
+    "horizon_s": Column(("run",), "s", "last sample before the amplification reaches 1e5, or the end"),
+}
 CRC32 = Column(("run",), "1", "CRC-32 of the run's bytes in all other columns that are computed")
 _TYPES = {"status": "i1", "steps": "<i8", "rhs_evaluations": "<i8", "message": f"S{MESSAGE_BYTES}"}
 
@@ -68,7 +73,13 @@ class SweepLayout:
 
     @property
     def row(self) -> np.dtype[np.void]:
-        return row_type(self.sweep.base, self.sweep.outputs, self.sweep.table.precision)
+        table = self.sweep.table
+        return row_type(self.sweep.base, self.sweep.outputs, table.precision, amplification=table.amplification)
+
+    @property
+    def metrics(self) -> dict[str, Column]:
+        """The columns of numbers of a run that are stored."""
+        return {name: column for name, column in (METRICS | AMPLIFICATION).items() if name in (self.row.names or ())}
 
 
 def parameter_name(key: str) -> str:
@@ -92,11 +103,12 @@ def scales(scene: Scene, outputs: Sequence[str]) -> dict[str, tuple[NDArray[Any]
     return {name: (value, SCALES[name]) for name, value in quantities.scale_values(scene).items() if name in used}
 
 
-def row_type(scene: Scene, outputs: Sequence[str], precision: str) -> np.dtype[np.void]:
+def row_type(scene: Scene, outputs: Sequence[str], precision: str, *, amplification: bool = False) -> np.dtype[np.void]:
     """The results of one run: metrics, message, and trajectories in `precision`."""
+    metrics = [*METRICS, *(AMPLIFICATION if amplification else ())]
     lengths = {name: len(values) for name, (values, _) in scales(scene, outputs).items()}
     kind = {"float64": "<f8", "float32": "<f4"}[precision]
-    fields: list[Any] = [(name, _TYPES.get(name, "<f8")) for name in METRICS]
+    fields: list[Any] = [(name, _TYPES.get(name, "<f8")) for name in metrics]
     for name, column in trajectories(outputs).items():
         fields.append((name, kind, tuple(lengths[dimension] for dimension in column.dimensions[1:])))
     return np.dtype(fields)

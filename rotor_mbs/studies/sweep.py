@@ -38,7 +38,7 @@ _ENSEMBLE_RUNS = 128
 _LEAST_RUNS = 8
 _CHUNK_BYTES = 1 << 23
 
-_FORMAT = 3  # of rows and columns: a sweep begun by another version is not continued
+_FORMAT = 4  # of rows and columns: a sweep begun by another version is not continued
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 # From (runs stored, runs in all, statuses of those that have just been stored).
@@ -114,6 +114,7 @@ class SweepPlan:
             table.settings,
             sweep.outputs,
             table.precision,
+            table.amplification,
             [table.validation, table.test],
             table.seed,
             [self.first, self.last],

@@ -14,17 +14,18 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
+from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.judgement import clearly_ok, judge
-from rotor_mbs.solution.metrics import energy_drifts, largest
+from rotor_mbs.solution.metrics import energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance
-from rotor_mbs.solution.record import Array, Integration
+from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.sweep_columns import Rows, RunColumns
-from rotor_mbs.store.sweep_layout import MESSAGE_BYTES, METRICS, empty_rows
+from rotor_mbs.store.sweep_layout import AMPLIFICATION, MESSAGE_BYTES, METRICS, empty_rows
 
 ENSEMBLE_METHOD = "lagrange/taylor"
 
@@ -79,11 +80,23 @@ def rows_of(chunk: Chunk) -> Rows:
     """(runs, ...) columns of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
     scenes = _scenes(chunk)
     if chunk.method == ENSEMBLE_METHOD:
-        return _ensemble(chunk, scenes)
-    rows = empty_rows(len(scenes), chunk.row)
-    for i, scene in enumerate(scenes):
-        _put_run(rows, i, scene, _solved(chunk, scene))
+        rows = _ensemble(chunk, scenes)
+    else:
+        rows = empty_rows(len(scenes), chunk.row)
+        for i, scene in enumerate(scenes):
+            _put_run(rows, i, scene, _solved(chunk, scene))
+    if "error_growth" in rows:
+        for i, scene in enumerate(scenes):
+            _put_amplification(rows, i, scene)
     return rows
+
+
+def _put_amplification(rows: Rows, i: int, scene: Scene) -> None:
+    """Of the motion itself, whatever the method: from the variational equations of the closed form."""
+    angles = np.empty((scene.samples, 0))
+    time = np.linspace(0.0, scene.duration, scene.samples)
+    motion = Trajectory(time, angles, angles, error_growth=error_growth(scene))
+    rows["error_growth"][i], rows["horizon_s"][i] = running_growth(motion)[-1], horizon(motion)
 
 
 def _scenes(chunk: Chunk) -> list[Scene]:
@@ -150,7 +163,7 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
     angles = largest(block.angles.reshape(len(scenes), -1))
     ok = clearly_ok(scenes, chunk.method, block.integrations, block.samples, drifts, angles)
-    rows = empty_rows(len(scenes), chunk.row, METRICS)
+    rows = empty_rows(len(scenes), chunk.row, (METRICS | AMPLIFICATION).keys() & set(chunk.row.names or ()))
     for name in chunk.row.names or ():
         if name not in rows:
             values = errors if name == "energy_error" else _quantity(block, scenes, name)
