@@ -5,6 +5,7 @@ The bounds are written down here a second time: one that is widened tenfold in t
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import replace
 
@@ -244,6 +245,33 @@ def test_a_long_run_keeps_its_samples_when_ended(method: str) -> None:
     trajectory = solver.observe()
     assert 1 < len(trajectory.time) < one.samples
     assert np.isfinite(trajectory.angles).all()
+
+
+def test_a_limit_costs_no_look_at_the_clock_after_every_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And changes no bit of the run."""
+    solver = find_method("lagrange/taylor").build(scene("paper/fig11"), find_method("lagrange/taylor").settings())
+    solver.integrate()
+    free, looks, monotonic = solver.observe(), [], time.monotonic
+    monkeypatch.setattr(time, "monotonic", lambda: looks.append(1) or monotonic())
+    with time_limit(60.0):
+        steps = solver.integrate().steps
+    assert len(looks) < 5 < steps
+    assert np.array_equal(solver.observe().angles, free.angles)
+
+
+def test_where_there_is_no_signal_the_clock_is_read() -> None:
+    """Signals reach the main thread alone."""
+    one = replace(scene("extreme/pendulum-million"), duration=5e5, samples=200_001)
+    solver, found = find_method("lagrange/taylor").build(one, find_method("lagrange/taylor").settings()), []
+
+    def work() -> None:
+        with time_limit(0.3):
+            found.append(solver.integrate())
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found[0].out_of_time
 
 
 def test_the_limit_reaches_plain_python() -> None:

@@ -147,16 +147,10 @@ class Propagation:
             integrator.pars[self._torque :] = array_of([segment.offset, segment.slope], quad=kind != np.float64)
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
-        # Asked after every step, it costs a quarter of the run: only where there is a limit.
-        callback = _within_time if deadline.is_set() else None
         with deadline.polled():
-            outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=callback)
+            outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=deadline.step_callback())
         message = deadline.message() if deadline.is_over() else failure(outcome)
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
-
-
-def _within_time(_integrator: Any) -> bool:
-    return not deadline.is_over()
 
 
 class TaylorSolver:
