@@ -77,30 +77,6 @@ def escape_rate(scene: Scene) -> float | None:
     return math.sqrt(scene.gravity / min(arms))
 
 
-def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:
-    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s; constant where neither gravity nor torque acts.
-
-    Summed over hub and blades as L = J_hub Ω + Σ e·(J ω), e the shaft's direction and ω the blade's angular velocity,
-    both in the blade's own frame.
-    """
-    spin = rates[:, 0]
-    total = scene.hub_inertia * spin
-    for i, blade in enumerate(scene.blades):
-        s, c = np.sin(angles[:, 1 + i]), np.cos(angles[:, 1 + i])
-        shaft = np.stack([s, c, np.zeros_like(s)])
-        omega = shaft * spin
-        omega[2] = rates[:, 1 + i]
-        total = total + np.einsum("in,ij,jn->n", shaft, _inertia_about_hub(blade), omega)
-    return np.asarray(total)
-
-
-def _inertia_about_hub(blade: Blade) -> Array:
-    xx, yy, zz, xy, xz, yz = blade.inertia
-    r = np.array(blade.centre_of_mass)
-    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return np.asarray(own + blade.mass * (r @ r * np.eye(3) - np.outer(r, r)))
-
-
 def mirrored(scene: Scene) -> Scene:
     """The mirror image in the plane of rotation: pitches and the blades' y change sign, the rotor angle does not."""
     blades = []

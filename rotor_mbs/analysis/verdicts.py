@@ -169,6 +169,10 @@ def _of_corrected_model(run: StoredRun, bounds: Bounds, found: Rehydrated, traje
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
         look = "a force without its potential, a wrong mass matrix, or too long a step"
         yield _make("energy", run, "balance", drift, bounds, "of scale", look)
+    for channel in ("angular", "linear"):
+        if (name := f"{channel}_impulse_error_max") in metrics:
+            look = "momentum less the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
+            yield _make("impulse", run, channel, metrics[name], bounds, "of scale", look)
     yield from _of_quantities(run, bounds, scene, metrics)
     exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
     if exact is not None:

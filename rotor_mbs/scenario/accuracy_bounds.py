@@ -17,8 +17,9 @@ from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 CHECKS = (
-    "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "gap", "exact", "published",
-    "reference", "growth", "frozen", "symmetry", "order", "extrapolated", "printed", "rules", "speed",
+    "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "impulse", "loads", "gap",
+    "exact", "published", "reference", "growth", "frozen", "symmetry", "order", "extrapolated", "printed", "rules",
+    "speed",
 )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.record import Trajectory
 
@@ -79,7 +80,16 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
         metrics["energy_gain_J"] = float(energy.max())
     if reference is not None and scene.wants("angles"):
         metrics |= _angle_errors(run, reference)
-    return metrics | _of_quantities(scene, run, reference) | _peaks(scene, run)
+    return metrics | _impulse_errors(scene, run) | _of_quantities(scene, run, reference) | _peaks(scene, run)
+
+
+def _impulse_errors(scene: Scene, run: Trajectory) -> Metrics:
+    """What is left of the balances of momentum, of their scale; only of a run whose angles and rates are stored."""
+    if not (scene.wants("angles") and scene.wants("rates")):
+        return {}
+    with np.errstate(over="ignore", invalid="ignore"):
+        balances = {"angular": angular_balance(scene, run), "linear": linear_balance(scene, run)}
+    return {f"{name}_impulse_error_max": one.largest for name, one in balances.items() if one is not None}
 
 
 def _of_quantities(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:

@@ -12,18 +12,19 @@ import numpy as np
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.solution.quantities import BUILT_IN
+from rotor_mbs.solution.quantities import BUILT_IN, LOADS
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.read import OpenResults, StoredRun, open_results
 from rotor_mbs.store.write import put_datasets
 
-# What cannot be computed again from angles and rates, and the scales.
-_ARRAYS = ("time", "coordinate", "angles", "rates", "work", "angle_uncertainty", "error_growth")
+# What cannot be computed again from angles and rates as precisely, and the scales.
+_SCALES = ("time", "coordinate", "blade", "axis")
+_ARRAYS = (*_SCALES, "angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
 _ATTRIBUTES = ("settings", "steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s", "status")
 
 
 def freeze(source: Path, target: Path, date: str) -> None:
-    """Angles, rates, uncertainty and growth of every reference in `source` into `target`, atomically; digests too.
+    """Angles, rates, loads, uncertainty and growth of every reference in `source` into `target`; digests too.
 
     Tip and energies follow from angles and rates. The work is kept only where it does not. Raises StoreError.
     """

@@ -14,6 +14,7 @@ from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.impulse import angular_momentum
 from rotor_mbs.solution.metrics import energy_scale
 from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.record import Trajectory
@@ -77,6 +78,6 @@ def _symmetry(scene: Scene, method: str) -> dict[str, float]:
     back = _run(replace(scene, initial_angles=end[0], initial_rates=end[1]), method)
     found["reversal_error"] = float(np.abs(back.angles[-1] - np.array(scene.initial_angles)).max())
     if scene.gravity == 0.0 and not scene.has_torque:
-        momentum = theory.angular_momentum(scene, there.angles, there.rates)
+        momentum = angular_momentum(scene, there.angles, there.rates)
         found["angular_momentum_drift"] = float(np.abs(momentum - momentum[0]).max() / abs(momentum[0]))
     return found

@@ -14,6 +14,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import StoredRun, open_results
@@ -76,6 +77,7 @@ def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
     result = samples.trajectory(scene, stored.array("time"), np.hstack(states))
     result.angle_uncertainty = stored.array("angle_uncertainty")
     result.error_growth = stored.array("error_growth") if "error_growth" in stored else None
+    result.quantities |= {load.name: stored.array(load.name) for load in LOADS if load.name in stored}
     return result
 
 

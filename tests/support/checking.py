@@ -89,6 +89,8 @@ def with_wrong_start(scene: Scene, share: float) -> Scene:
 WRONG = {
     "agreement": with_wrong_offset,
     "energy": with_wrong_offset,
+    "impulse": with_wrong_offset,
+    "loads": with_wrong_mass,
     "exact": with_wrong_mass,
     "energies": with_wrong_mass,
     "tip": with_wrong_tip,

@@ -45,7 +45,7 @@ class OdeSolver:
         scene: Scene,
         integrator: Integrator,
         times: Array | None = None,
-        accelerations: Accelerations = closed_form.accelerations,
+        accelerations: Accelerations | None = None,
     ) -> None:
         self._scene = scene
         self._accelerations = accelerations
@@ -76,9 +76,10 @@ def right_hand_side(
     segment: TorqueSegment,
     *,
     with_work: bool,
-    accelerations: Accelerations = closed_form.accelerations,
+    accelerations: Accelerations | None = None,
 ) -> RightHandSide:
     """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
+    equations = accelerations or closed_form.accelerations
     count = 1 + len(form.blades)
     offset, slope = float(segment.offset), float(segment.slope)
 
@@ -87,7 +88,7 @@ def right_hand_side(
         angles, rates = values[:count], values[count : 2 * count]
         torque = offset + slope * time
         try:
-            found = accelerations(angles, rates, form, torque, math.sin, math.cos)
+            found = equations(angles, rates, form, torque, math.sin, math.cos)
         except (ZeroDivisionError, ValueError, OverflowError):
             # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
             return [math.nan] * len(values)
