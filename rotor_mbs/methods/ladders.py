@@ -6,7 +6,7 @@ Knows numbers, no method.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 STEP, TOLERANCE = "step", "tolerance"
 
@@ -55,6 +55,11 @@ class Ladder:
     def curve(self) -> str:
         """Name of the curve: "model/integrator", and the variant."""
         return self.method + self.variant
+
+    @property
+    def short(self) -> Ladder:
+        """The same curve with every second value, without the coarsest third."""
+        return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def rungs(self, interval: float) -> tuple[Rung, ...]:
         """The ladder on a scene whose samples are `interval` s apart."""

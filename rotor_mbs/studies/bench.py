@@ -135,24 +135,30 @@ def _measure_scene(jobs: Sequence[Job]) -> list[Record]:
     short, reference = prepared_scene(case.scene, results)
     by_curve = {ladder.curve: ladder for ladder in ladders()}
     own = [by_curve[str(job.case.options["curve"])] for job in jobs]
-    points = [_points(ladder, short.duration / (short.samples - 1)) for ladder in own]
+    points = [points_of(ladder, short.duration / (short.samples - 1)) for ladder in own]
     scenes = {point: (short, reference) for curve in points for point in curve}
     measured = measure_points(scenes, points, case.options)
-    shared = {
-        "scene_hash": case.scene_hash,
-        "horizon_s": horizon(reference),
-        "uncertainty_rad": _uncertainty(reference),
-        "duration_s": case.scene.duration,
-        "samples": short.samples,
+    shared = facts_of(case, short, reference) | {
         "budget_s": case.options["budget_s"],
         "load_before": load_before,
         "load_after": os.getloadavg()[0],
         "pinned_core": -1 if last_core() is None else last_core(),
     }
     return [
-        _curve(job.case, ladder, measured.rows(chosen), shared | {"repeatable": measured.is_repeatable(chosen)})
+        curve_record(job.case, ladder, measured.rows(chosen), shared | {"repeatable": measured.is_repeatable(chosen)})
         for job, ladder, chosen in zip(jobs, own, points, strict=True)
     ]
+
+
+def facts_of(case: Case, short: Scene, reference: Trajectory) -> dict[str, Any]:
+    """Attributes that all curves of a scene have."""
+    return {
+        "scene_hash": case.scene_hash,
+        "horizon_s": horizon(reference),
+        "uncertainty_rad": _uncertainty(reference),
+        "duration_s": case.scene.duration,
+        "samples": short.samples,
+    }
 
 
 def _uncertainty(reference: Trajectory) -> float:
@@ -162,14 +168,16 @@ def _uncertainty(reference: Trajectory) -> float:
     return float(reference.angle_uncertainty[: max(horizon_samples(reference), 1)].max())
 
 
-def _points(ladder: Ladder, interval: float) -> list[Point]:
+def points_of(ladder: Ladder, interval: float) -> list[Point]:
+    """A point per rung, on a scene whose samples are `interval` s apart."""
     return [
         Point(ladder.curve, ladder.method, i, rung.setting, tuple(sorted(rung.settings.items())))
         for i, rung in enumerate(ladder.rungs(interval))
     ]
 
 
-def _curve(case: Case, ladder: Ladder, rows: Sequence[Mapping[str, Any]], shared: Mapping[str, Any]) -> Record:
+def curve_record(case: Case, ladder: Ladder, rows: Sequence[Mapping[str, Any]], shared: Mapping[str, Any]) -> Record:
+    """The record of a curve from the rows of its points."""
     arrays = arrays_of(rows)
     attributes: dict[str, Any] = {
         **shared,
@@ -205,6 +213,11 @@ class Measured:
     def is_repeatable(self, points: Sequence[Point]) -> bool:
         """Whether the last run of every point was bit for bit its first one."""
         return all(self.judged[point].same for point in points if point in self.judged)
+
+    def fail(self, point: Point, message: str) -> None:
+        """Takes note of a point that raised an error."""
+        self.unanswered[point] = ("solver_failed", message)
+        self.timings.warm[point] = Warm(float("nan"), returned=False)
 
     def rows(self, points: Sequence[Point]) -> list[dict[str, Any]]:
         """Every dataset's value at each point; NaN and 0 where there is none."""
