@@ -12,6 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.analysis.run_selection import corrected_runs
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
 
 Array = NDArray[np.float64]
@@ -132,6 +135,20 @@ def cost_exponent(sizes: Array, seconds: Array) -> float | None:
     if len(sizes) < 2:
         return None
     return float(np.polyfit(np.log(sizes[start:]), np.log(seconds[start:]), 1)[0])
+
+
+def own_points(scene: StoredScene) -> list[Record]:
+    """The scene's runs of corrected models that reached the end, each as a curve of one point."""
+    found = []
+    for name, run in corrected_runs(scene).items():
+        error, seconds = (run.attributes.get(one, math.nan) for one in ("angle_error_max", "run_time_s"))
+        if run.status in ("ok", "inaccurate") and seconds > 0.0:
+            numbers = dict.fromkeys(("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s"), seconds)
+            numbers |= {one: run.attributes.get(one, math.nan) for one in ("setup_time_s", "output_time_s")}
+            arrays = {one: np.array([value]) for one, value in {"angle_error_max": error, **numbers}.items()}
+            arrays["status"] = np.array([STATUSES.index("ok")])
+            found.append(Record("bench", scene.name, name, {"status_meanings": " ".join(STATUSES)}, arrays))
+    return found
 
 
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:

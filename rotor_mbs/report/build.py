@@ -11,6 +11,7 @@ from rotor_mbs.analysis import errata as errata_analysis
 from rotor_mbs.analysis import published, run_selection
 from rotor_mbs.analysis.claim_records import ClaimStudy, stored_claims
 from rotor_mbs.analysis.claims import Claim, claims
+from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import errata_methods
@@ -20,6 +21,7 @@ from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.paper_figures import PaperFigure, available
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import OpenResults, StoredScene, open_results
+from rotor_mbs.store.records import Record, read_records
 
 Part = str | PaperFigure  # a scene by its name, or a figure of the paper
 _GROUPS = 2  # per worker
@@ -30,7 +32,7 @@ _TIMEOUT_S = 600.0
 class Context:
     """What the page of a scene or a figure needs to know of the rest of the file.
 
-    files: the file name of each scene's page, in order
+    files: the file name of each scene's page, in order; curves: error against run time, by scene
     """
 
     results: Path
@@ -39,6 +41,7 @@ class Context:
     conditions: Mapping[str, str]
     has_errata: bool
     study: ClaimStudy | None
+    curves: Mapping[str, Sequence[Record]]
 
 
 def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
@@ -70,11 +73,14 @@ def _prepared(opened: OpenResults) -> tuple[Context, dict[str, str], tuple[Paper
     entries = errata_analysis.entries(opened)
     errata = published.errata() if entries or _has_printed_model(scenes) else ()
     figures = available(scenes)
-    index = index_page(opened, scenes, files, decided, conditions, errata, has_walk=bool(figures), study=study)
+    curves = by_scene(read_records(opened.path, "bench"))
+    index = index_page(
+        opened, scenes, files, decided, conditions, errata, has_walk=bool(figures), study=study, curves=curves
+    )
     pages = {INDEX: render("index", index)}
     if errata:
         pages[ERRATA] = render("errata", errata_page(errata, entries, scenes, files))
-    return Context(opened.path, files, decided, conditions, bool(errata), study), pages, figures
+    return Context(opened.path, files, decided, conditions, bool(errata), study, curves), pages, figures
 
 
 def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
@@ -117,6 +123,7 @@ def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, object]:
             page = scene_page(
                 opened.scenes[part], own, context.conditions,
                 has_errata=context.has_errata, previous=previous, following=following, study=context.study,
+                curves=context.curves.get(part, ()),
             )  # fmt: skip
             found[part] = render("scene", page)
     return found

@@ -31,7 +31,7 @@ class RunPlots:
         """Angles (rad) and rates (rad/s) over time (s): rotor and pitches."""
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
-        return time_histories.motion(Motion(_some(run.time), run.angles, run.rates), (), horizon_s)
+        return time_histories.motion(Motion(_some(run.time), run.angles, run.rates), horizon_s)
 
     def energy(self) -> Panels:
         """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
@@ -47,7 +47,8 @@ class RunPlots:
 
     def tips(self) -> Panels:
         """Paths of the blade tips (m). Raises InputError where the scene does not ask for them."""
-        return paths(_some(self._run.time), _quantity(self._run, "tip"))
+        _some(self._run.time)
+        return paths(_quantity(self._run, "tip"))
 
 
 class ComparisonPlots:

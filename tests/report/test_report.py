@@ -88,27 +88,25 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 # What is drawn
 
 
-def test_motion_draws_the_run_as_lines_and_the_others_as_marks_upon_them() -> None:
+def test_motion_gives_rotor_and_pitches_axes_of_their_own() -> None:
     angles, rates = SWING(TIME[::4]), np.cos(SWING(TIME[::4]))
-    run = figures.Motion(TIME[::4], angles, rates)
-    picture = figures.motion(run, [(run, LOOK)], horizon=6.0)
-    above, below = picture.axes
-    for axes, values in ((above, angles), (below, rates)):
-        lines = axes.get_lines()
-        for column in range(4):
-            np.testing.assert_array_equal(lines[column].get_xydata(), np.column_stack([TIME[::4], values[:, column]]))
-            marks = lines[4 + column].get_xydata()
-            assert 10 < len(marks) < 20
-            np.testing.assert_allclose(np.interp(marks[:, 0], TIME[::4], values[:, column]), marks[:, 1])
-        assert lines[-1].get_xdata() == [6.0, 6.0]
-    assert "rad/s" in below.get_ylabel()
+    picture = figures.motion(figures.Motion(TIME[::4], angles, rates), horizon=6.0)
+    assert [axes.get_ylabel() for axes in picture.axes] == [
+        "rotor angle (rad)", "pitch angle (rad)", "rotor rate (rad/s)", "pitch rate (rad/s)",
+    ]  # fmt: skip
+    for place, (values, first) in enumerate([(angles, 0), (angles, 1), (rates, 0), (rates, 1)]):
+        *lines, mark = picture.axes[place].get_lines()
+        columns = values[:, :1] if first == 0 else values[:, 1:]
+        assert len(lines) == columns.shape[1]
+        for i, (line, column) in enumerate(zip(lines, columns.T, strict=True)):
+            np.testing.assert_array_equal(line.get_xydata(), np.column_stack([TIME[::4], column]))
+            assert line.get_color() == coordinate_look(first + i).colour
+        assert mark.get_xdata() == [6.0, 6.0]
 
 
 def test_only_what_is_there_is_drawn() -> None:
-    assert len(figures.motion(figures.Motion(TIME, SWING(TIME), None)).axes) == 1
-    # Nothing leaves the plane of rotation: no panel that shows how far.
-    tip = np.stack([np.cos(TIME), 0.0 * TIME, np.sin(TIME)], axis=1)[:, None, :]
-    assert len(paths(TIME, tip).axes) == 1
+    assert len(figures.motion(figures.Motion(TIME, SWING(TIME), None)).axes) == 2
+    assert len(figures.motion(figures.Motion(TIME, SWING(TIME)[:, :1], None)).axes) == 1
 
 
 def test_thinning_loses_no_peak() -> None:
@@ -147,12 +145,11 @@ def test_rounding_is_not_blown_up_into_a_motion() -> None:
 
 def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
     tip = np.stack([30.0 * np.cos(TIME), 0.05 * np.sin(9.0 * TIME), 30.0 * np.sin(TIME)], axis=1)[:, None, :]
-    space, strip = paths(TIME, tip).axes
+    (space,) = paths(tip).axes
     assert space.get_aspect() == 1.0
     assert "10 m" in [text.get_text() for text in space.texts]
     axis = next(line.get_xydata() for line in space.get_lines() if len(line.get_xdata()) == 2 and _is_vertical(line))
     np.testing.assert_allclose(np.ptp(axis[:, 1]), 10.0 * np.cos(np.radians(14.0)))
-    np.testing.assert_allclose(strip.get_lines()[0].get_ydata().max(), 50.0, rtol=1e-3)  # mm
 
 
 def _is_vertical(line: Line2D) -> bool:
@@ -205,10 +202,10 @@ def test_colours_of_methods_and_of_coordinates_differ() -> None:
 
 def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> None:
     found = page(report)
-    assert found.sections == ["paper", "paths", "motion", "difference", "energy", "metrics", "file"]
+    assert found.sections == ["paper", "motion", "paths", "energy", "difference", "cost", "metrics", "file"]
     headings = [tag for tag in found.tags if re.fullmatch(r"h\d", tag)]
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
-    assert found.tags.count("figcaption") == found.tags.count("figure") == 3 + 1 + 3 + 2
+    assert found.tags.count("figcaption") == found.tags.count("figure") == 1 + 2 + 5 + 1 + 1 + 1
     images = [value for name, value in found.attributes if name == "role" and value == "img"]
     assert len(images) == found.tags.count("figure") + found.tags.count("canvas")
     assert (report / "paper-fig11.html").stat().st_size < 250_000

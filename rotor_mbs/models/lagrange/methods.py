@@ -134,7 +134,7 @@ METHODS = (
     Method(
         name="reference",
         label="reference, quad precision",
-        look=Look("#666666", "-", "*"),
+        look=Look(_BLUE, "-.", "*"),
         settings=ReferenceSettings,
         build=reference.build,
         items=samples.items,

@@ -138,6 +138,22 @@ def log_axis(axes: Any, lowest: float, highest: float) -> None:
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power(round(math.log10(value)))))
 
 
+def symmetric_log_axis(axes: Any, first: int, below: int | None, above: int) -> None:
+    """A vertical axis straight up to 10**first, logarithmic beyond, from -10**below (None: from 0) to 10**above."""
+    axes.set_yscale("symlog", linthresh=10.0**first)
+    axes.set_ylim(0.0 if below is None else -(10.0**below), 10.0**above)
+    every = max(1, math.ceil((above - first + 1) / 4))
+    lower = [] if below is None else [-(10.0**e) for e in range(first, below + 1, every)]
+    axes.set_yticks([*reversed(lower), 0.0, *(10.0**e for e in range(first, above + 1, every))])
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _decade(value)))
+
+
+def _decade(value: float) -> str:
+    sign = "−" if value < 0.0 else ""
+    return f"{sign}{power(round(math.log10(abs(value))))}" if value else "0"
+
+
 def svg_text(figure: Figure, name: str = "rotor_mbs") -> str:
     """The figure as matplotlib writes it, without a date; names inside it depend on `name`."""
     with style(), matplotlib.rc_context({"svg.hashsalt": name}):

@@ -11,15 +11,16 @@ from markupsafe import Markup
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, by_scene, fastest, left_out
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import model_label
-from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry, mark_entry
+from rotor_mbs.report.core.elements import Section
 from rotor_mbs.report.core.files import INDEX, page_names, render, write_pages
-from rotor_mbs.report.core.looks import label_of, look_of
+from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import bench_tables as tables
 from rotor_mbs.report.pages.bench_tables import target_text
+from rotor_mbs.report.pages.cost import cost_legend
 from rotor_mbs.report.pages.index import versions
-from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
+from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import COST_SCALING, Record, read_records
@@ -63,7 +64,7 @@ def _scene(name: str, curves: Curves, csv: str) -> dict[str, object]:
         "scene": name,
         "summary": summary(name, curves),
         "facts": curves[0].attributes,
-        "diagram": Section(pictures, _legend(curves)),
+        "diagram": Section(pictures, cost_legend(curves)),
         "reach": Section(tables=[tables.reach_table(curves)]),
         "order": Section(tables=[tables.order_table(curves)]),
         "failures": Section(tables=[tables.failure_table(curves)]),
@@ -86,7 +87,7 @@ def _index(
     return {
         "summary": overview(scenes),
         "fastest": Section(tables=[tables.overview_table(scenes, files)]),
-        "scenes": Section(pictures, _legend(list(one_of_each.values()))),
+        "scenes": Section(pictures, cost_legend(list(one_of_each.values()))),
         "scaling": [
             (name.rpartition("/")[2], Section(tables=[tables.scaling_table(curves)]))
             for name, curves in scaling.items()
@@ -94,15 +95,6 @@ def _index(
         "csv": "bench.csv",
         "versions": made_with,
     }
-
-
-def _legend(curves: Curves) -> list[LegendEntry]:
-    entries = [LegendEntry(label_of(curve.name), look_of(curve.name)) for curve in curves]
-    entries.append(line_entry("best of all (Pareto front)", FRONT_COLOUR, width=6.0))
-    entries.append(mark_entry("failed: drawn at its time", "x"))
-    if has_visible_uncertainty(curves):
-        entries.append(line_entry("uncertainty of the reference", width=8.0))
-    return entries
 
 
 def summary(scene: str, curves: Curves) -> list[str]:

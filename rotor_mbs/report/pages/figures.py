@@ -17,13 +17,13 @@ from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, with_unit
 from rotor_mbs.report.pages.claims import description_of, unit_of
+from rotor_mbs.report.pages.comparison_pictures import VISIBLE
 from rotor_mbs.report.pages.error_pictures import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.report.paper_figures import HEADINGS, PATHS, TORQUES, PaperFigure, compared_runs
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 _ROUNDING = 1e-9  # rad
 
 

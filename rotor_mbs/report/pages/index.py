@@ -13,10 +13,11 @@ from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reprod
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
-from rotor_mbs.report.pages import claim_study
+from rotor_mbs.report.pages import claim_study, glance
 from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.store.records import Record
 
 # Attributes of a results file that say what made it.
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
@@ -25,17 +26,21 @@ _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py"
 def index_page(
     results: OpenResults, scenes: Mapping[str, StoredScene], files: Mapping[str, str], claims: Sequence[Claim],
     conditions: Mapping[str, str], errata: Sequence[Erratum], *, has_walk: bool, study: ClaimStudy | None = None,
+    curves: Mapping[str, Sequence[Record]] | None = None,
 ) -> dict[str, object]:  # fmt: skip
     """scenes: in order; files: the file name of each scene's page; errata: empty where there is no such page.
 
     study: the claims on many runs, and the numbers under other conditions; None where there is none
+    curves: error against run time, by scene
     """
     shares = None if study is None else study.shares
     trials = [] if study is None else claim_study.trial_tables(study.numbers)[:1]
     notes = [] if shares is None else [claim_study.study_note(shares)]
     general = [text for key, text in conditions.items() if not key.startswith("fig")]
+    facts = finding(scenes, claims)
     return {
-        "finding": finding_sentences(finding(scenes, claims), study if _has_all(claims, shares) else None),
+        "glance": glance.glance(scenes, files, claims, curves or {}, facts),
+        "finding": finding_sentences(facts, study if _has_all(claims, shares) else None),
         "scenes": Section(tables=[scene_table(scenes, files)]),
         "numbers": Section(tables=[claim_tables.number_table(claims), *trials], notes=general),
         "claims": Section(tables=[claim_tables.claim_table(claims, shares)], notes=notes),

@@ -12,24 +12,24 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claim_records import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import claim_study, error_pictures, scene_tables
+from rotor_mbs.report.pages import claim_study, comparison_pictures, error_pictures, scene_tables
 from rotor_mbs.report.pages import claims as claim_tables
+from rotor_mbs.report.pages.cost import cost_section
 from rotor_mbs.report.pages.quantities import quantity_sections
 from rotor_mbs.report.pages.scene_tables import metric
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.paper_figures import HEADINGS
 from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.paths import paths
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
+from rotor_mbs.store.records import Record
 
 Array = NDArray[np.float64]
-_ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,21 @@ class DrawnRuns:
 def scene_page(
     scene: StoredScene, claims: Sequence[Claim], conditions: Mapping[str, str], *,
     has_errata: bool, previous: str, following: str, study: ClaimStudy | None = None,
+    curves: Sequence[Record] = (),
 ) -> dict[str, object]:  # fmt: skip
-    """claims: those of the paper about this scene; conditions: what the paper does not print, by key; previous and
-    following: file names of the neighbouring pages, or ""; study: the claims on many runs, None where there is none."""
+    """The content of the page of a scene.
+
+    claims               those of the paper about this scene
+    conditions           what the paper does not print, by key
+    previous, following  file names of the neighbouring pages, or ""
+    study                the claims on many runs; None where there is none
+    curves               error against run time on this scene
+    """
     drawn = DrawnRuns.of(scene)
     own = conditions.get(scene.name.rpartition("/")[2])
     figures = str(scene.attributes.get("figures", ""))
     sides = {label_of(run.method): run for run in drawn.sides.values()}
+    key = comparison_pictures.key_picture(list(drawn.sides.values()), claims, drawn.horizon)
     return {
         "name": scene.name,
         "title": scene.title,
@@ -89,11 +97,14 @@ def scene_page(
         "lead": _lead(drawn),
         "failures": scene_tables.failures(scene),
         "claims": _claims_section(claims, study, [own] if own else []),
-        "viewer": viewer(scene, sides) if drawn.sides_with("tip") else None,
-        "paths": paths_section(drawn),
+        "viewer": viewer(scene, sides),
+        "key": Section([key] if key is not None else []),
+        "paths": comparison_pictures.tips_section(scene, drawn.sides, drawn.horizon, _path_tables(drawn)),
         "motion": motion_section(drawn),
         "difference": difference_section(drawn),
         "energy": energy_section(drawn),
+        "drive": comparison_pictures.drive_section(scene, drawn.corrected),
+        "cost": cost_section(scene, curves),
         "quantities": quantity_sections(scene, drawn.all, drawn.horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
         "has_horizon": drawn.horizon is not None,
@@ -135,50 +146,17 @@ def _lead(drawn: DrawnRuns) -> list[str]:
     return found
 
 
-def paths_section(drawn: DrawnRuns) -> Section:
-    """Paths of the tips in space, the printed model beside the corrected one."""
-    runs = drawn.sides_with("tip")
-    if not runs:
-        return Section()
-    blades = next(iter(runs.values())).array("tip").shape[1]
-    legend = [line_entry(f"blade {i}", coordinate_look(i).colour) for i in range(1, blades + 1)]
-    legend += [
-        line_entry("blade at the start", line="--"),
-        line_entry("blade at the end"),
-        line_entry("shaft", width=4),
-    ]
-    pictures = [_path_picture(f"paths-{i}", run) for i, run in enumerate(runs.values())]
-    return Section(pictures, legend, [scene_tables.path_table(runs)])
-
-
-def _path_picture(name: str, run: StoredRun) -> Picture:
-    tip, label = run.array("tip"), label_of(run.method)
-    text = f"{label}: paths of the blade tips in space with the blades at the start and at the end"
-    if "angles" in run:
-        turned = float(run.array("angles")[-1, 0] - run.array("angles")[0, 0])
-        text += f"; the rotor ends {number(turned, 3)} rad from its start"
-    text += f"; tips leave the plane of rotation by up to {prefixed(float(np.abs(tip[:, :, 1]).max()), 'm')}."
-    return picture(paths(run.array("time"), tip), name, with_capital(label), text)
-
-
 def motion_section(drawn: DrawnRuns) -> Section:
-    """Angles above rates, as the paper plots them; the printed model beside the corrected ones."""
+    """Angles above rates, as the paper plots them; the printed model beside the corrected one."""
     runs = {heading: run for heading, run in drawn.sides.items() if "angles" in run or "rates" in run}
     if not runs:
         return Section()
-    pictures: list[Picture] = []
-    marked: dict[str, StoredRun] = {}
-    for i, run in enumerate(runs.values()):
-        if run is drawn.corrected:
-            marked = {n: other for n, other in drawn.others.items() if "angles" in other or "rates" in other}
-        pictures.append(_motion_picture(f"motion-{i}", run, marked, drawn.horizon))
+    pictures = [_motion_picture(f"motion-{i}", run, drawn.horizon) for i, run in enumerate(runs.values())]
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(next(iter(runs.values())).labels)]
-    legend += [mark_entry(label_of(name), look_of(name).marker) for name in marked]
-    pictures += _rotor_picture(drawn)
     return Section(pictures, [*legend, *_horizon_entry(drawn)], [scene_tables.range_table(runs)])
 
 
-def _motion_picture(name: str, run: StoredRun, marked: Mapping[str, StoredRun], horizon: float | None) -> Picture:
+def _motion_picture(name: str, run: StoredRun, horizon: float | None) -> Picture:
     motion = motion_of(run)
     notes = []
     for values, what, unit in ((motion.angles, "Angles", "rad"), (motion.rates, "Rates", "rad/s")):
@@ -186,34 +164,16 @@ def _motion_picture(name: str, run: StoredRun, marked: Mapping[str, StoredRun], 
             largest = with_unit(float(np.abs(values).max()), unit)
             notes.append(f"{what} beyond the axis are cut off; the largest is {largest}.")
     label = label_of(run.method)
-    caption = with_capital(label)
-    if marked:
-        caption += f", as lines; marks: {'; '.join(map(label_of, marked))}"
     angles = [] if motion.angles is None else zip(run.labels, motion.angles.T, strict=False)
     ranges = [f"{n} from {number(float(x.min()), 3)} to {number(float(x.max()), 3)} rad" for n, x in angles]
-    panels = histories.motion(motion, [(motion_of(other), look_of(n)) for n, other in marked.items()], horizon)
-    return picture(panels, name, caption, f"{label} over time: {'; '.join(ranges)}.", notes)
+    panels = histories.motion(motion, horizon)
+    return picture(panels, name, with_capital(label), f"{label} over time: {'; '.join(ranges)}.", notes)
 
 
 def motion_of(run: StoredRun) -> histories.Motion:
     """The run's time, angles and rates."""
     angles, rates = (run.array(name) if name in run else None for name in ("angles", "rates"))
     return histories.Motion(run.array("time"), angles, rates)
-
-
-def _rotor_picture(drawn: DrawnRuns) -> list[Picture]:
-    """The rotor's angle alone, where both sides have it: beside pitches of many turns it is a flat line."""
-    runs = drawn.sides_with("angles")
-    if len(runs) < 2:
-        return []
-    looks = (Look("#000000", "-", ""), Look("#0072b2", "--", ""))
-    curves = {
-        label_of(run.method): Series(run.array("time"), run.array("angles")[:, 0], look)
-        for run, look in zip(runs.values(), looks, strict=True)
-    }
-    solid, dashed = curves
-    caption = f"The rotor's angle alone: {solid}, solid black; {dashed}, dashed blue"
-    return [error_pictures.line_picture(curves, "rotor angle (rad)", "rotor", caption, drawn.horizon, "rad")]
 
 
 def difference_section(drawn: DrawnRuns) -> Section:
@@ -255,33 +215,17 @@ def difference_section(drawn: DrawnRuns) -> Section:
 
 
 def energy_section(drawn: DrawnRuns) -> Section:
-    """Energies of the printed and of the corrected model; energy error of every run."""
+    """Energy less work from its start, of every run."""
     runs = {name: run for name, run in drawn.all.items() if "energy_error" in run}
-    curves, relative = error_pictures.energy_errors(runs)
-    axis = "energy error / energy scale" if relative else "energy error (J)"
-    shown = error_pictures.error_picture(curves, axis, "energy-error", "Energy error of each method", drawn.horizon)
+    shown = comparison_pictures.energy_picture(list(runs.values()), drawn.horizon)
     if shown is None:
         return Section()
-    sides = drawn.sides_with(*_ENERGIES)
-    pictures = [_energy_picture(f"energy-{i}", drawn, run) for i, run in enumerate(sides.values())]
-    legend = [LegendEntry(name, look, width) for name, look, width in histories.ENERGY_LOOKS] if sides else []
-    legend += error_pictures.run_legend(list(error_pictures.visible(curves)))
-    return Section([*pictures, shown], [*legend, *_horizon_entry(drawn)], [scene_tables.energy_table(runs)])
+    return Section([shown], _horizon_entry(drawn), [scene_tables.energy_table(runs)])
 
 
-def _energy_picture(name: str, drawn: DrawnRuns, run: StoredRun) -> Picture:
-    kinetic, potential, work = (run.array(name) for name in _ENERGIES)
-    total = kinetic + potential - work
-    # The scale is the scene's: the energy of a run that diverges may be of any size.
-    scale = metric(drawn.corrected or run, "energy_scale_J") or 0.0
-    largest = max(float(np.abs(curve).max()) for curve in (kinetic, potential, total))
-    label, start, end = label_of(run.method), prefixed(float(total[0]), "J"), prefixed(float(total[-1]), "J")
-    notes = []
-    if 0.0 < 3.0 * scale < largest:
-        notes.append(f"Energies beyond the axis are cut off; the largest is {prefixed(largest, 'J')}.")
-    panels = histories.energies(run.array("time"), (kinetic, potential, total), scale)
-    described = f"{label}: total energy less work {start} at the start, {end} at the end."
-    return picture(panels, name, with_capital(label), described, notes)
+def _path_tables(drawn: DrawnRuns) -> list[PageTable]:
+    runs = drawn.sides_with("tip")
+    return [scene_tables.path_table(runs)] if runs else []
 
 
 def _horizon_entry(drawn: DrawnRuns) -> list[LegendEntry]:

@@ -11,23 +11,15 @@ from numpy.typing import NDArray
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.looks import GREY, coordinate_look
-from rotor_mbs.report.plots.time_histories import TIME_AXIS, thin
 
 Array = NDArray[Any]
 _AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the direction from which paths are seen
 
 
-def paths(time: Array, tip: Array) -> Panels:
-    """The paths of `tip` (n, blades, 3) m; where blades pitch, a panel below shows each tip's place along the shaft."""
-    off_plane = bool(np.abs(tip[:, :, 1]).max() > 1e-12 * np.linalg.norm(tip, axis=2).max())
-    panels = canvas.panels((4.1, 1.25) if off_plane else (4.1,), TIME_AXIS if off_plane else "", share_x=False)
+def paths(tip: Array) -> Panels:
+    """The paths of `tip` (n, blades, 3) m."""
+    panels = canvas.panels((4.1,), "")
     draw_paths(panels.axes[0], tip)
-    if off_plane:
-        strip = panels.axes[1]
-        for blade in range(tip.shape[1]):
-            look = coordinate_look(blade + 1)
-            strip.plot(*thin(time, 1e3 * tip[:, blade, 1]), color=look.colour, linestyle=look.line, linewidth=1.0)
-        strip.set_ylabel("tip y (mm)")
     return panels
 
 

@@ -23,7 +23,6 @@ _RUNAWAY = 8.0
 # A range (rad, rad/s; of energies, of their scale) that is rounding error.
 _ROUNDING = 1e-9
 _BINS = 130  # intervals of a curve that is drawn: one in some four pixels of a page
-_MARKS = 12  # per curve
 ENERGY_LOOKS = (
     ("kinetic", Look("#d55e00", "-", ""), 1.2),
     ("potential", Look("#0072b2", "--", ""), 1.2),
@@ -47,24 +46,24 @@ class Series(NamedTuple):
     look: Look
 
 
-def motion(run: Motion, marked: Sequence[tuple[Motion, Look]] = (), horizon: float | None = None) -> Panels:
-    """Angles above rates; `run` as lines, each run of `marked` as sparse markers."""
-    pairs = ((ANGLE_AXIS, 1, run.angles), (RATE_AXIS, 2, run.rates))
-    drawn = [(label, i, values) for label, i, values in pairs if values is not None]
-    panels = canvas.panels((2.0,) * len(drawn), TIME_AXIS)
-    for axes, (label, i, values) in zip(panels.axes, drawn, strict=True):
-        draw_coordinates(axes, run.time, values, label)
-        for place, (other, look) in enumerate(marked):
-            theirs = other[i]
-            if theirs is not None:
-                _draw_marks(axes, other.time, theirs, look, place / len(marked))
-        _draw_horizon(axes, run.time, horizon)
+def motion(run: Motion, horizon: float | None = None) -> Panels:
+    """Angles, then rates; the rotor has axes of its own: beside pitches of many turns it is a flat line."""
+    drawn: list[tuple[str, Array, int]] = []
+    for name, values in (("angle (rad)", run.angles), ("rate (rad/s)", run.rates)):
+        if values is not None:
+            drawn.append((f"rotor {name}", values[:, :1], 0))
+            if values.shape[1] > 1:
+                drawn.append((f"pitch {name}", values[:, 1:], 1))
+    panels = canvas.panels(tuple(1.45 if first else 1.1 for _, _, first in drawn), TIME_AXIS)
+    for axes, (label, values, first) in zip(panels.axes, drawn, strict=True):
+        draw_coordinates(axes, run.time, values, label, first)
+        mark_time(axes, float(run.time[-1]), horizon)
     return panels
 
 
-def draw_coordinates(axes: Any, time: Array, values: Array, label: str) -> None:
-    """A line per coordinate of `values` (n, coordinates)."""
-    draw_lines(axes, [Series(time, x, coordinate_look(i)) for i, x in enumerate(values.T)], label)
+def draw_coordinates(axes: Any, time: Array, values: Array, label: str, first: int = 0) -> None:
+    """A line per coordinate of `values` (n, coordinates), which begin with the coordinate number `first`."""
+    draw_lines(axes, [Series(time, x, coordinate_look(first + i)) for i, x in enumerate(values.T)], label)
     set_range(axes, values)
 
 
@@ -89,19 +88,8 @@ def lines(series: Sequence[Series], label: str, horizon: float | None) -> Panels
     """The curves on one axis."""
     panels = canvas.panels((2.3,), TIME_AXIS)
     draw_lines(panels.axes[0], series, label)
-    _draw_horizon(panels.axes[0], max((one.time for one in series), key=lambda time: float(time[-1])), horizon)
+    mark_time(panels.axes[0], max(float(one.time[-1]) for one in series), horizon)
     return panels
-
-
-def _draw_marks(axes: Any, time: Array, values: Array, look: Look, offset: float) -> None:
-    """Markers in each coordinate's colour; `offset` separates those of different runs."""
-    every = max(1, len(time) // _MARKS)
-    chosen = slice(int(offset * every), None, every)
-    for column, series in enumerate(values.T):
-        axes.plot(
-            time[chosen], series[chosen], linestyle="none", marker=look.marker, markersize=4.2,
-            markerfacecolor="none", markeredgecolor=coordinate_look(column).colour, markeredgewidth=0.8,
-        )  # fmt: skip
 
 
 def errors(series: Sequence[Series], label: str, horizon: float | None = None, lowest: float = 1.0) -> Panels:
@@ -121,7 +109,7 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, l
     canvas.log_axis(axes, max(min(low, lowest), LOWEST), min(high, _HIGHEST))
     axes.set_ylabel(label)
     if series:
-        _draw_horizon(axes, series[0].time, horizon)
+        mark_time(axes, float(series[0].time[-1]), horizon)
     return panels
 
 
@@ -189,7 +177,7 @@ def _peaks(time: Array, values: Array) -> tuple[Array, Array]:
     return time, np.where(values > LOWEST, np.minimum(values, _HIGHEST), np.nan)
 
 
-def _draw_horizon(axes: Any, time: Array, horizon: float | None) -> None:
-    """A vertical line where the horizon lies before the end of what is drawn."""
-    if horizon is not None and horizon < time[-1]:
+def mark_time(axes: Any, end: float, horizon: float | None) -> None:
+    """A vertical line where the horizon lies before the end (s) of what is drawn."""
+    if horizon is not None and horizon < end:
         axes.axvline(horizon, color=GREY, linestyle="--", linewidth=1.3)

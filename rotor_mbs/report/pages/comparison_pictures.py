@@ -1,0 +1,199 @@
+"""Pictures of a scene in which the printed model stands beside the corrected one: motion, energy, tips, drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotor_mbs.analysis.claims import Claim
+from rotor_mbs.analysis.published import Published
+from rotor_mbs.analysis.rehydrate import scene_of
+from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
+from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages.claims import description_of
+from rotor_mbs.report.pages.error_pictures import angle_difference
+from rotor_mbs.report.plots import comparisons, paths
+from rotor_mbs.report.plots.comparisons import Mark
+from rotor_mbs.report.plots.time_histories import Series
+from rotor_mbs.store.read import StoredRun, StoredScene
+
+VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
+_PUBLISHED = 2  # published values at most on one picture
+
+
+def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
+    """When the angles of both first differ by VISIBLE (s; None: never), and the largest difference (rad)."""
+    gap = angle_difference(printed, corrected)
+    apart = np.flatnonzero(gap > VISIBLE)
+    return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))
+
+
+def side_look(run: StoredRun) -> Look:
+    """Of a line among few: the printed model dashed upon the corrected one."""
+    look = look_of(run.method)
+    return Look(look.colour, "-" if run.method == REFERENCE or is_corrected(run.method) else "--", "")
+
+
+def key_picture(
+    sides: Sequence[StoredRun], claims: Sequence[Claim], horizon: float | None, name: str = "key"
+) -> Picture | None:
+    """The rotor's angle and the pitch that differs most, printed and corrected, with published values; None without."""
+    runs = [run for run in sides if "angles" in run]
+    if not runs:
+        return None
+    blade = _blade_to_show(runs)
+    labels = runs[0].labels
+    shown = [0, *([blade] if blade else [])]
+    panels_of = [
+        (
+            f"{labels[i]} angle (rad)",
+            [Series(r.array("time"), r.array("angles")[:, i], side_look(r)) for r in reversed(runs)],
+        )
+        for i in shown
+    ]
+    parted, largest = parting(runs[0], runs[1]) if len(runs) > 1 else (None, 0.0)
+    marks = published_marks(claims, shown)
+    panels = comparisons.departure(panels_of, marks, horizon, parted)
+    caption = " ".join([_parting_text(runs, parted, largest), *_published_texts(claims, shown)])
+    ranges = [
+        f"{label_of(r.method)}: {labels[i]} from {number(float(r.array('angles')[:, i].min()), 3)} to "
+        f"{number(float(r.array('angles')[:, i].max()), 3)} rad"
+        for r in runs for i in shown
+    ]  # fmt: skip
+    legend = [LegendEntry(label_of(r.method), side_look(r), 2.4 if side_look(r).line == "-" else 1.3) for r in runs]
+    if horizon is not None and horizon < float(runs[-1].array("time")[-1]):
+        legend.append(line_entry(f"horizon {with_unit(horizon, 's', 3)}", line="--"))
+    if marks:
+        legend.append(line_entry("published", line=":"))
+    return picture(panels, name, caption, f"{caption} {'; '.join(ranges)}.", legend=legend)
+
+
+def _angle_series(run: StoredRun, coordinate: int) -> Series:
+    return Series(run.array("time"), run.array("angles")[:, coordinate], side_look(run))
+
+
+def _blade_to_show(runs: Sequence[StoredRun]) -> int:
+    """The coordinate of the pitch that differs most, or moves most; 0 where no blade pitches."""
+    angles = [run.array("angles") for run in runs]
+    count = min(map(len, angles))
+    moved = np.abs(angles[0][:count] - angles[1][:count] if len(angles) > 1 else angles[0])[:, 1:].max(
+        axis=0, initial=0.0
+    )
+    if not moved.size or moved.max() < 1e-6:
+        moved = np.abs(angles[-1][:, 1:]).max(axis=0, initial=0.0)
+    return 1 + int(moved.argmax()) if moved.size and moved.max() > 1e-6 else 0
+
+
+def _parting_text(runs: Sequence[StoredRun], parted: float | None, largest: float) -> str:
+    if len(runs) < 2:
+        return f"{with_capital(label_of(runs[0].method))}: angles over time."
+    if parted is None:
+        return f"Printed and corrected model never differ visibly: by {with_unit(largest, 'rad')} at most."
+    when = "at the start" if parted == 0.0 else f"at {with_unit(parted, 's', 2)}"
+    return f"The models part visibly {when}; their angles differ by up to {with_unit(largest, 'rad')}."
+
+
+def _published_texts(claims: Sequence[Claim], shown: Sequence[int]) -> list[str]:
+    """A sentence per published number on the picture: what each model has."""
+    found = []
+    for claim in claims:
+        item = claim.published
+        if _is_height(item, shown):
+            values = (fixed(value, item.decimals) for value in (item.value, claim.printed.value, claim.corrected.value))
+            published, printed, corrected = values
+            what = f"{with_capital(description_of(item.of))}, rad" if item.of else item.id
+            found.append(f"{what}: published {published}, as printed {printed}, corrected {corrected}.")
+    return found[:_PUBLISHED]
+
+
+def _is_height(item: Published, shown: Sequence[int]) -> bool:
+    return item.is_number and item.of is not None and item.of.quantity == "angle" and item.of.coordinate in shown
+
+
+def published_marks(claims: Sequence[Claim], shown: Sequence[int]) -> list[Mark]:
+    """Published extremes of the angles of the coordinates `shown`, as heights in their panels."""
+    found = []
+    for claim in claims:
+        item = claim.published
+        if _is_height(item, shown) and item.of is not None:
+            text = f"published {fixed(item.value, item.decimals)} rad"
+            found.append(Mark(shown.index(item.of.coordinate), item.value, text))
+    return found[:_PUBLISHED]
+
+
+def energy_picture(runs: Sequence[StoredRun], horizon: float | None) -> Picture | None:
+    """Energy less work from its start, of each run that has energies; None without."""
+    series, legend, sizes = [], [], []
+    for run in runs:
+        if "energy_error" not in run:
+            continue
+        look = look_of(run.method)
+        series.append(Series(run.array("time"), run.array("energy_error"), look))
+        legend.append(LegendEntry(label_of(run.method), look))
+        sizes.append(f"{label_of(run.method)} up to {prefixed(float(np.abs(series[-1].values).max(initial=0.0)), 'J')}")
+    if not series:
+        return None
+    caption = "Energy that comes from nothing: total energy less the work done, from its start"
+    notes = ["The axis is straight about zero and logarithmic beyond."]
+    panels = comparisons.energy_from_start(series, horizon)
+    return picture(panels, "energy", caption, f"{caption}: {'; '.join(sizes)}.", notes, legend)
+
+
+def tips_section(
+    stored: StoredScene, sides: dict[str, StoredRun], horizon: float | None, tables: Sequence[PageTable]
+) -> Section:
+    """Paths in space as the paper draws them; offset over azimuth; distance of printed from corrected tips."""
+    runs = {heading: run for heading, run in sides.items() if "tip" in run}
+    if not runs:
+        return Section()
+    blades = next(iter(runs.values())).array("tip").shape[1]
+    pictures = [_path_picture(f"paths-{i}", run) for i, run in enumerate(runs.values())]
+    scene = scene_of(stored)
+    lines = [LegendEntry(f"blade {i}", coordinate_look(i)) for i in range(1, blades + 1)]
+    moved = any(float(np.abs(run.array("tip")[:, :, 1]).max()) > 1e-9 for run in runs.values())
+    if scene is not None and moved:
+        for i, run in enumerate(run for run in runs.values() if "angles" in run):
+            panels = comparisons.offsets_over_azimuth(run.array("angles"), run.array("tip"), scene.phases)
+            caption = f"{with_capital(label_of(run.method))}: tips out of the plane of rotation"
+            reach = prefixed(float(np.abs(run.array("tip")[:, :, 1]).max()), "m")
+            pictures.append(picture(panels, f"offset-{i}", caption, f"{caption}, by up to {reach}."))
+    if len(runs) > 1:
+        one, other = runs.values()
+        count = min(len(one.array("time")), len(other.array("time")))
+        panels = comparisons.tip_difference(
+            one.array("time")[:count], one.array("tip")[:count], other.array("tip")[:count], horizon
+        )
+        largest = float(np.linalg.norm(one.array("tip")[:count] - other.array("tip")[:count], axis=2).max())
+        caption = f"Distance of each printed tip from the corrected one: up to {prefixed(largest, 'm')}"
+        pictures.append(picture(panels, "tip-difference", caption, f"{caption}."))
+    ends = [line_entry("blade at the start", line="--"), line_entry("at the end"), line_entry("shaft", width=4)]
+    return Section(pictures, [*lines, *ends], tables)
+
+
+def _path_picture(name: str, run: StoredRun) -> Picture:
+    tip, label = run.array("tip"), label_of(run.method)
+    text = f"{label}: paths of the blade tips in space with the blades at the start and at the end"
+    if "angles" in run:
+        turned = float(run.array("angles")[-1, 0] - run.array("angles")[0, 0])
+        text += f"; the rotor ends {number(turned, 3)} rad from its start"
+    text += f"; tips leave the plane of rotation by up to {prefixed(float(np.abs(tip[:, :, 1]).max()), 'm')}."
+    return picture(paths.paths(tip), name, with_capital(label), text)
+
+
+def drive_section(stored: StoredScene, run: StoredRun | None) -> Section:
+    """Torque and power of the rotor's drive; empty where there is none."""
+    scene = scene_of(stored)
+    if scene is None or run is None or "rates" not in run or not scene.has_torque:
+        return Section()
+    time = run.array("time")
+    torque = np.array([scene.torque_at(float(t)) for t in time])
+    power = torque * run.array("rates")[:, 0]
+    work = float(np.trapezoid(power, time)) if len(time) > 1 else 0.0
+    caption = f"Rotor torque and its power; work {prefixed(work, 'J')}"
+    most = [prefixed(float(np.abs(x).max()), unit) for x, unit in ((torque, "N m"), (power, "W"))]
+    described = f"{caption}: torque up to {most[0]}, power up to {most[1]}."
+    return Section([picture(comparisons.drive(time, torque, power), "drive", caption, described)])

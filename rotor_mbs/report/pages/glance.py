@@ -1,0 +1,182 @@
+"""What the index opens with: the rotor, the published crest, energy from nothing, errors of all methods, their cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rotor_mbs.analysis import run_selection
+from rotor_mbs.analysis.claims import Claim
+from rotor_mbs.analysis.summary import ENERGY_RISE, Finding
+from rotor_mbs.report.core.elements import LegendEntry, Picture
+from rotor_mbs.report.core.looks import Look, label_of, look_of
+from rotor_mbs.report.core.numbers import number, prefixed, with_unit
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages.comparison_pictures import key_picture
+from rotor_mbs.report.pages.cost import cost_legend, cost_picture
+from rotor_mbs.report.pages.scene_tables import horizon, metric, status_text
+from rotor_mbs.report.pages.viewer import Viewer, viewer
+from rotor_mbs.report.plots import comparisons, paths
+from rotor_mbs.store.read import StoredRun, StoredScene
+from rotor_mbs.store.records import Record
+
+Scenes = Mapping[str, StoredScene]
+# Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
+_SHADES = (-12, -10, -8, -6, -4, -2)
+_MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
+_FAILED = "✗"
+
+
+@dataclass(frozen=True)
+class HeatCell:
+    """A run in the heat map: the shade's number, the error as text, the mark of its status, a text that is read out."""
+
+    shade: int
+    error: str
+    mark: str
+    spoken: str
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """Errors before the horizon: methods as (label, name), rows of (scene, page, cells), the marks that occur."""
+
+    methods: Sequence[tuple[str, str]]
+    rows: Sequence[tuple[str, str, Sequence[HeatCell | None]]]
+    key: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Glance:
+    """For the template; what the file has no data for is None."""
+
+    sentences: Sequence[str]
+    scene: str
+    viewer: Viewer | None
+    still: Picture | None
+    crest: Picture | None
+    energy: Picture | None
+    cost: Picture | None
+    heat: HeatMap | None
+
+
+def glance(
+    scenes: Scenes, files: Mapping[str, str], claims: Sequence[Claim], curves: Mapping[str, Sequence[Record]],
+    facts: Finding,
+) -> Glance:  # fmt: skip
+    """facts: the finding in numbers; curves: error against run time, by scene."""
+    name = _shown_scene(scenes, claims)
+    sides = _sides(scenes[name])
+    benched = next((one for one in curves if one in scenes), "")
+    tips = next((run for run in reversed(sides) if "tip" in run), None)
+    own = [claim for claim in claims if name in claim.published.scenes]
+    return Glance(
+        short_sentences(facts),
+        name,
+        viewer(scenes[name], {label_of(run.method): run for run in sides}),
+        None if tips is None else picture(paths.paths(tips.array("tip")), "still", name, f"{name}: paths of the tips"),
+        key_picture(sides, own, horizon(scenes[name]), "crest"),
+        _energy(scenes),
+        _cost(benched, curves.get(benched, ())),
+        heat_map(scenes, files),
+    )
+
+
+def _shown_scene(scenes: Scenes, claims: Sequence[Claim]) -> str:
+    """The scene with a published extreme that is no rounding error; else one with both models; else the first."""
+    for claim in claims:
+        item = claim.published
+        if item.is_number and not item.rounding and item.of is not None and item.of.scene in scenes:
+            return item.of.scene
+    return next((name for name, scene in scenes.items() if len(_sides(scene)) > 1), next(iter(scenes)))
+
+
+def _sides(scene: StoredScene) -> list[StoredRun]:
+    """The printed run and the one that stands for the corrected model."""
+    found = (run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene))
+    return [run for run in found if run is not None]
+
+
+def short_sentences(facts: Finding) -> list[str]:
+    """Three at most: what the paper's numbers come from, what is wrong with that, and how well it is known."""
+    found = []
+    numbers, corrected = facts.numbers, facts.numbers_corrected
+    if numbers is not None:
+        other = "" if corrected is None else f"; corrected, they give {corrected.count or 'none'} of them"
+        found.append(
+            f"The equations as printed give {numbers.count} of the paper's {numbers.of} published numbers{other}."
+        )
+    if facts.energy is not None and facts.energy.rises.count:
+        most = f", up to {prefixed(facts.energy.gain, 'J')}" if facts.energy.scene else ""
+        rises = facts.energy.rises
+        found.append(f"As printed they make energy from nothing in {rises.count} of {rises.of} scenes{most}.")
+    known = [one.angle_error for one in facts.agreement if one.angle_error is not None]
+    if known:
+        best = with_unit(min(known), "rad")
+        count = len({one.method.partition("/")[0] for one in facts.agreement})
+        models = "The corrected model agrees" if count == 1 else f"{count} independent corrected models agree"
+        worst = "" if len(known) == 1 else f", the least accurate of them to {with_unit(max(known), 'rad')}"
+        found.append(f"{models} with a quad-precision reference to {best}{worst}, up to each scene's horizon.")
+    return found
+
+
+def _energy(scenes: Scenes) -> Picture | None:
+    """A mark per scene for the printed model's gain, and for the worst corrected model's drift."""
+    rows: dict[str, list[tuple[float, Look]]] = {}
+    drawn: dict[str, Look] = {}
+    made = 0
+    for name, scene in scenes.items():
+        marks = []
+        for run in scene.methods.values():
+            gain, scale = metric(run, "energy_gain_J"), metric(run, "energy_scale_J")
+            is_printed = run.method == run_selection.PRINTED
+            if gain is None or not scale or not (is_printed or run.method in run_selection.corrected_runs(scene)):
+                continue
+            value = gain / scale if is_printed else metric(run, "energy_drift_max")
+            if value is not None and math.isfinite(value):
+                marks.append((value, look_of(run.method)))
+                drawn[run.method] = look_of(run.method)
+                made += is_printed and value > ENERGY_RISE
+        if marks:
+            rows[name.removeprefix("paper/")] = marks
+    if run_selection.PRINTED not in drawn:
+        return None
+    caption = f"Energy made from nothing: the printed equations, more than a thousandth in {made} of {len(rows)} scenes"
+    legend = [LegendEntry(label_of(name), Look(look.colour, "", look.marker)) for name, look in drawn.items()]
+    return picture(comparisons.energy_of_scenes(rows), "energy-scenes", caption, f"{caption}.", legend=legend)
+
+
+def _cost(scene: str, curves: Sequence[Record]) -> Picture | None:
+    if not curves:
+        return None
+    shown = cost_picture(curves, f"Error against run time of all methods, {scene}")
+    return None if shown is None else Picture(shown.svg, shown.caption, shown.notes, cost_legend(curves))
+
+
+def heat_map(scenes: Scenes, files: Mapping[str, str]) -> HeatMap | None:
+    """Scene by method: the largest angle error before the horizon; None where no run was compared with a reference."""
+    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
+    methods = run_selection.in_catalogue_order(names)
+    if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):
+        methods.insert(0, run_selection.PRINTED)
+    rows = [
+        (name, files[name], [_heat_cell(scene.methods.get(method)) for method in methods])
+        for name, scene in scenes.items()
+    ]
+    if not any(cell and cell.error for _, _, cells in rows for cell in cells):
+        return None
+    used = {cell.mark: cell.spoken.rpartition(", ")[2] for _, _, cells in rows for cell in cells if cell and cell.mark}
+    return HeatMap([(label_of(name), name) for name in methods], rows, sorted(used.items()))
+
+
+def _heat_cell(run: StoredRun | None) -> HeatCell | None:
+    if run is None:
+        return None
+    error = metric(run, "angle_error_max")
+    mark = _MARKS.get(run.status, _FAILED)
+    text = "" if error is None else number(error)
+    spoken = f"{label_of(run.method)}: {text or 'no error known'}, {status_text(run.status)}"
+    if error is None or not math.isfinite(error):
+        return HeatCell(len(_SHADES), text, mark, spoken)
+    return HeatCell(sum(error > 10.0**e for e in _SHADES), text, mark, spoken)

@@ -1,0 +1,71 @@
+"""Error against run time at a few settings of each method, beside other runs: curves of seconds, not of minutes.
+
+A bench takes one process on one core and rounds over all points; here each curve is a job of the pool, and a point is
+run once. Its errors are those of a bench, its times are good to a factor.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rotor_mbs.errors import RotorError
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
+from rotor_mbs.execution.pool import one_line
+from rotor_mbs.methods.catalogue import ladders
+from rotor_mbs.methods.ladders import Ladder
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.results_file import ResultsStore
+from rotor_mbs.studies.bench import BENCH, SOURCES, Measured, curve_record, facts_of, points_of, store_curve
+from rotor_mbs.studies.bench_worker import PointTimer, prepared_scene
+from rotor_mbs.studies.run import able_methods, reference_case
+
+_SOURCES = (*SOURCES, "studies/short_ladders.py")
+_LONGEST_S = 0.4  # a run longer than this is the last of its curve
+
+
+def run_short_ladders(
+    scene: Scene, output: Path, *, workers: int, timeout_s: float, on_progress: OnProgress = ignore_progress
+) -> list[Outcome]:
+    """A short curve of each method on `scene` into the results file `output`, which has its reference.
+
+    What it has already is kept. Raises StoreError.
+    """
+    chosen = [ladder.short for ladder in ladders() if not ladder.variant]
+    able, _ = able_methods(scene, [ladder.method for ladder in chosen])
+    cases = [_case(scene, ladder) for ladder in chosen if ladder.method in able]
+    return execute(cases, in_pool(perform_ladder, workers, timeout_s), ResultsStore(output), on_progress)
+
+
+def _case(scene: Scene, ladder: Ladder) -> Case:
+    options = {"curve": ladder.curve, "values": list(ladder.values)}
+    return Case(scene, ladder.method, {}, BENCH, options, reference_case(scene).key, _SOURCES)
+
+
+def perform_ladder(job: Job) -> Result:
+    """Runs, judges and stores one curve, in a worker process."""
+    assert job.reference is not None  # every case of a ladder has a reference
+    case = job.case
+    short, reference = prepared_scene(case.scene, job.reference)
+    ladder = next(one.short for one in ladders() if one.curve == case.options["curve"])
+    points = points_of(ladder, short.duration / (short.samples - 1))
+    timer = PointTimer(dict.fromkeys(points, (short, reference)))
+    found, longest = Measured(), 0.0
+    for point in points:
+        if longest > _LONGEST_S:
+            found.timings.left_out[point] = f"not run: the setting before took {longest:.2g} s"
+            continue
+        try:
+            prepared = timer.prepare(point)
+            found.prepared[point], found.timings.times[point] = prepared, [prepared.run_s]
+            found.judged[point] = timer.judge(point)
+            longest = prepared.run_s
+        except RotorError as exc:
+            found.fail(point, str(exc))
+        except Exception as exc:
+            found.fail(point, one_line(exc))
+    shared = facts_of(case, short, reference) | {
+        "budget_s": _LONGEST_S, "load_before": os.getloadavg()[0], "pinned_core": -1, "is_short": True,
+    }  # fmt: skip
+    return store_curve(job, curve_record(case, ladder, found.rows(points), shared))
