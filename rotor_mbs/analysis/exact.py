@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.time_table import Table
 from rotor_mbs.solution.record import Array
 
 
@@ -38,7 +39,8 @@ def _stays_at_zero_pitch(scene: Scene) -> bool:
     """Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the rotor."""
     mirrored = all(b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0 for b in scene.blades)
     at_zero = not any(scene.initial_angles[1:]) and not any(scene.initial_rates[1:])
-    return mirrored and at_zero and scene.shaft_damping == 0.0
+    driven = any(table for i in range(len(scene.blades)) for table in scene.pitch_load(i))
+    return mirrored and at_zero and not driven and scene.shaft_damping == 0.0
 
 
 def _about_shaft(blade: Blade) -> float:
@@ -68,11 +70,12 @@ def escape_rate(scene: Scene) -> float | None:
     """1/s: sqrt(g/c) of the fastest blade, a pendulum about its pitch axis that stands upside down (below the shaft).
 
     c is a point mass' distance from the pitch axis, g gravity. None for blades with inertia of their own, for bearings
-    with springs or dampers, and where nothing makes the pitch unstable.
+    with springs, dampers or torques, and where nothing makes the pitch unstable.
     """
     arms = [arm for blade in scene.blades if (arm := math.hypot(*blade.centre_of_mass[:2])) > 0.0]
     is_rigid = not all(blade.is_point_mass for blade in scene.blades)
-    if is_rigid or scene.bearing_stiffness or scene.bearing_damping or scene.gravity <= 0.0 or not arms:
+    in_bearing = scene.bearing_stiffness or scene.bearing_damping or scene.pitch_torque
+    if is_rigid or in_bearing or scene.gravity <= 0.0 or not arms:
         return None
     return math.sqrt(scene.gravity / min(arms))
 
@@ -89,7 +92,13 @@ def mirrored(scene: Scene) -> Scene:
         blades=tuple(blades),
         initial_angles=(scene.initial_angles[0], *(-angle for angle in scene.initial_angles[1:])),
         initial_rates=(scene.initial_rates[0], *(-rate for rate in scene.initial_rates[1:])),
+        pitch_torque=tuple(map(_negative, scene.pitch_torque)),
+        bearing_rest=tuple(map(_negative, scene.bearing_rest)),
     )
+
+
+def _negative(table: Table) -> Table:
+    return tuple((time, -value) for time, value in table)
 
 
 def mirror_error(one: Array, other: Array) -> float:
@@ -108,6 +117,8 @@ def relabelled(scene: Scene) -> Scene:
         initial_rates=(scene.initial_rates[0], *_rolled(scene.initial_rates[1:])),
         bearing_stiffness=_rolled(scene.bearing_stiffness),
         bearing_damping=_rolled(scene.bearing_damping),
+        pitch_torque=_rolled(scene.pitch_torque),
+        bearing_rest=_rolled(scene.bearing_rest),
     )
 
 

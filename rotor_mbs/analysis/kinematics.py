@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.record import Array
 
 
@@ -31,21 +32,26 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
     return total
 
 
-def potential_energy(scene: Scene, angles: Array) -> Array:
-    """(n,) J: of weights, zero at the shaft's height, and of bearing springs (a pitch that cannot move has none)."""
+def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
+    """(n,) J: of weights, zero at the shaft's height, and of bearing springs (a pitch that cannot move has none).
+
+    time (n,) s, for rest angles that move
+    """
     total = np.zeros(len(angles))
     for i, blade in enumerate(scene.blades):
         total += blade.mass * scene.gravity * _rotated(_frames(scene, angles, i), blade.centre_of_mass)[:, 2]
         if scene.bearing_stiffness and blade.has_pitch_inertia:
-            total += 0.5 * scene.bearing_stiffness[i] * angles[:, 1 + i] ** 2
+            rest = np.array([value_at(scene.pitch_load(i)[1], t) for t in time.tolist()])
+            total += 0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - rest) ** 2
     return total
 
 
-def work_of_constant_torque(scene: Scene, angles: Array) -> Array | None:
-    """(n,) J; None where the torque changes or there is damping: there the work is no function of the angles."""
-    if scene.has_damping or not scene.has_constant_torque:
+def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
+    """(n,) J; None where a load changes or there is damping: there the work is no function of the angles."""
+    if scene.has_damping or not scene.has_constant_loads:
         return None
-    return scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
+    torques = [scene.torque_at(0.0), *(value_at(scene.pitch_load(i)[0], 0.0) for i in range(len(scene.blades)))]
+    return np.asarray((angles - np.array(scene.initial_angles)) @ np.array(torques))
 
 
 def _frames(scene: Scene, angles: Array, blade: int) -> Array:

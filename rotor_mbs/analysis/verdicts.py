@@ -145,8 +145,8 @@ def _energies_off(scene: Scene, trajectory: Trajectory) -> dict[str, float]:
     kinetic = kinematics.kinetic_energy(scene, angles, rates)
     formulas: dict[str, tuple[Array | None, Array | None]] = {
         "kinetic energy": (trajectory.kinetic_energy, kinetic),
-        "potential energy": (trajectory.potential_energy, kinematics.potential_energy(scene, angles)),
-        "work": (trajectory.work, kinematics.work_of_constant_torque(scene, angles)),
+        "potential energy": (trajectory.potential_energy, kinematics.potential_energy(scene, trajectory.time, angles)),
+        "work": (trajectory.work, kinematics.work_of_constant_loads(scene, angles)),
         "work at the start": (None if trajectory.work is None else trajectory.work[:1], np.zeros(1)),
     }
     scale = max(energy_scale(scene, trajectory), float(np.abs(kinetic).max())) or 1.0

@@ -54,7 +54,7 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> Choice:
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:
-    """(rad/s, 1/s): fastest swing of a pitch (spring, gravity, turning and driven rotor), fastest decay by a damper."""
+    """(rad/s, 1/s): fastest swing of a pitch (spring, torque, gravity, turning and driven rotor), fastest decay."""
     swing = abs(scene.initial_rates[0])
     driven = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0) / _rotor_inertia(scene)
     decay = scene.shaft_damping / _rotor_inertia(scene) if scene.shaft_damping else 0.0
@@ -64,7 +64,8 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
         x, y, z = blade.centre_of_mass
         inertia = blade.inertia[2] + blade.mass * (x * x + y * y)
         stiffness, damping = scene.bearing(i)
-        moment = stiffness + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
+        torque = max((abs(value) for _, value in scene.pitch_load(i)[0]), default=0.0)
+        moment = stiffness + torque + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)
         swing = max(swing, math.sqrt(moment / inertia), abs(scene.initial_rates[1 + i]))
         decay = max(decay, damping / inertia)
     return swing, decay
@@ -99,5 +100,5 @@ def _is_nearly_singular(scene: Scene) -> bool:
 def _leaves_zero_pitch(scene: Scene) -> bool:
     """Whether the pitch moves, and no spring holds it short of a right angle."""
     _, y, _ = scene.blades[0].centre_of_mass
-    still = y == 0.0 and scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0
+    still = y == 0.0 and scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0 and not scene.pitch_torque
     return not still and not any(scene.bearing_stiffness)

@@ -10,11 +10,12 @@ import functools
 import hashlib
 import json
 import math
-from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 from typing import Any, Literal
+
+from rotor_mbs.scenario.time_table import Table, is_constant, value_at
 
 DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
 OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
@@ -33,15 +34,22 @@ def known_outputs() -> tuple[str, ...]:
 
 
 def file_key(
-    path: str, unit: str = "1", part: Part = "rotor", *, per_blade: bool = False, added: bool = False
+    path: str,
+    unit: str = "1",
+    part: Part = "rotor",
+    *,
+    per_blade: bool = False,
+    over_time: bool = False,
+    added: bool = False,
 ) -> dict[str, Any]:
     """Metadata of a field of Scene that is read from the key `path` of the scene file ("" for none).
 
     part        label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
-    per_blade   the file may have one number for all blades
+    per_blade   the file may have one value for all blades
+    over_time   a value may be a table over time
     added       the key is younger than the stored hashes: at its default it does not enter them
     """
-    return {"key": path, "unit": unit, "part": part, "per_blade": per_blade, "added": added}
+    return {"key": path, "unit": unit, "part": part, "per_blade": per_blade, "over_time": over_time, "added": added}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +83,10 @@ class Scene:
     """A rotor and what happens to it. Blade i hangs at phase 2π(i-1)/len(blades) about the shaft (+y); z is up.
 
     initial_angles, initial_rates   (1 + blades,) rad, rad/s: rotor, then a pitch per blade
-    rotor_torque                    ((t, τ), ...) s, N m: linear between, constant outside; () where there is none;
-                                    two rows with equal t are a jump
-    bearing_stiffness, _damping     (blades,) N m/rad, N m s/rad, about pitch 0
+    rotor_torque                    a table over time (see time_table), N m
+    pitch_torque                    (blades,) tables over time, N m, between hub and blade; positive as the pitch is
+    bearing_stiffness, _damping     (blades,) N m/rad, N m s/rad; of the pitch and of its rate
+    bearing_rest                    (blades,) tables over time, rad: pitch at which the spring is unloaded
     shaft_damping                   N m s/rad
     text                            the TOML text it was read from
     """
@@ -93,7 +102,7 @@ class Scene:
     hub_inertia: float = field(metadata=file_key("hub.inertia", "kg m^2"))
     initial_angles: tuple[float, ...] = field(metadata=file_key("initial.angles", "rad", "start"))
     initial_rates: tuple[float, ...] = field(metadata=file_key("initial.rates", "rad/s", "start"))
-    rotor_torque: tuple[tuple[float, float], ...] = field(default=(), metadata=file_key("torque.rotor", "N m"))
+    rotor_torque: Table = field(default=(), metadata=file_key("torque.rotor", "N m", over_time=True))
     bearing_stiffness: tuple[float, ...] = field(
         default=(), metadata=file_key("bearing.stiffness", "N m/rad", per_blade=True)
     )
@@ -101,6 +110,12 @@ class Scene:
         default=(), metadata=file_key("bearing.damping", "N m s/rad", per_blade=True)
     )
     shaft_damping: float = field(default=0.0, metadata=file_key("shaft.damping", "N m s/rad"))
+    pitch_torque: tuple[Table, ...] = field(
+        default=(), metadata=file_key("torque.pitch", "N m", per_blade=True, over_time=True, added=True)
+    )
+    bearing_rest: tuple[Table, ...] = field(
+        default=(), metadata=file_key("bearing.rest", "rad", per_blade=True, over_time=True, added=True)
+    )
     text: str = field(default="", metadata=file_key("", part="label"))
 
     @property
@@ -114,7 +129,17 @@ class Scene:
 
     @property
     def has_constant_torque(self) -> bool:
-        return len({torque for _, torque in self.rotor_torque}) <= 1
+        return is_constant(self.rotor_torque)
+
+    @property
+    def load_tables(self) -> tuple[Table, ...]:
+        """Everything that may change over time: rotor torque, then the torque and the rest angle of each pitch."""
+        pitches = (self.pitch_load(blade) for blade in range(len(self.blades)))
+        return (self.rotor_torque, *(table for pair in pitches for table in pair))
+
+    @property
+    def has_constant_loads(self) -> bool:
+        return all(map(is_constant, self.load_tables))
 
     @property
     def has_damping(self) -> bool:
@@ -133,6 +158,14 @@ class Scene:
         """Stiffness (N m/rad) and damping (N m s/rad) of the pitch bearing of a blade, counted from 0."""
         stiffness = self.bearing_stiffness[blade] if self.bearing_stiffness else 0.0
         return stiffness, self.bearing_damping[blade] if self.bearing_damping else 0.0
+
+    def pitch_load(self, blade: int) -> tuple[Table, Table]:
+        """Torque (N m) and rest angle (rad) over time of the pitch bearing of a blade, counted from 0.
+
+        A spring without stiffness has no rest angle.
+        """
+        torque = self.pitch_torque[blade] if self.pitch_torque else ()
+        return torque, self.bearing_rest[blade] if self.bearing_rest and self.bearing(blade)[0] else ()
 
     @property
     def rotor_key(self) -> tuple[object, ...]:
@@ -163,12 +196,7 @@ class Scene:
 
     def torque_at(self, time: float) -> float:
         """Rotor torque in N m at `time` in s; at a jump, the value after it."""
-        rows = self.rotor_torque
-        following = bisect_right(rows, time, key=itemgetter(0))
-        if following in (0, len(rows)):
-            return rows[max(following - 1, 0)][1] if rows else 0.0
-        (t0, tau0), (t1, tau1) = rows[following - 1 : following + 1]
-        return tau0 + (tau1 - tau0) * (time - t0) / (t1 - t0)
+        return value_at(self.rotor_torque, time)
 
 
 def scene_fields(*parts: Part) -> Iterator[Field[Any]]:

@@ -61,7 +61,9 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
         for name in names:
             table = table.setdefault(name, {})
         if one.metadata["per_blade"] and len(set(value)) == 1:
-            table[last] = value[0]
+            table[last] = _listed(value[0])
+        elif one.metadata["per_blade"] and one.metadata["over_time"]:
+            table[last] = [_listed(rows) if rows else 0.0 for rows in value]
         else:
             table[last] = _blade_tables(scene) if one.name == "blades" else _listed(value)
     return {"blades": len(scene.blades), **tables}

@@ -14,6 +14,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 from rotor_mbs.errors import nearest
 from rotor_mbs.scenario import scene
 from rotor_mbs.scenario.accuracy_bounds import CHECKS
+from rotor_mbs.scenario.time_table import Table as TimeTable
+from rotor_mbs.scenario.time_table import is_one_table
 from rotor_mbs.scenario.validation import Line, NotNegative, Number, PerBlade, Table, Text, Vector, invalid
 
 MAX_BLADES = 10_000
@@ -46,7 +48,7 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
 
 
 def wrong_times(rows: Sequence[Sequence[float]]) -> str | None:
-    """What is wrong with the times (s) of rows (t, torque), or None; two rows with one time are a jump."""
+    """What is wrong with the times (s) of rows (t, value), or None; two rows with one time are a jump."""
     times = [row[0] for row in rows]
     if times[0] < 0.0:
         return "the first time is below 0"
@@ -97,6 +99,8 @@ def _context(info: ValidationInfo) -> dict[str, Any]:
 def _one_per_blade(value: object, info: ValidationInfo, others: int, link: str) -> object:
     """Of a list with a number for each blade and for `others` besides."""
     blades = _context(info).get("blades")
+    if isinstance(value, list) and value and others == 0 and is_one_table(value):
+        return value
     if isinstance(value, list) and blades is not None and len(value) != others + blades:
         raise invalid(f"{counted(len(value), 'number')} {link} {counted(blades, 'blade')}")
     return value
@@ -157,13 +161,51 @@ class ShaftTable(Table):
     damping: NotNegative = Field(description="a number of at least 0 (N m s/rad)")
 
 
+def _as_rows(value: object) -> object:
+    """A constant as one row at t = 0, since a load is constant outside a table's times."""
+    return value if isinstance(value, list) else [[0.0, value]]
+
+
+def _goes_forward(rows: list[list[float]]) -> list[list[float]]:
+    wrong = wrong_times(rows)
+    if wrong:
+        raise invalid(wrong)
+    return rows
+
+
+def _as_tables(value: object) -> object:
+    """One table for all blades, or one for each, of a number, rows [t, value], or a list of numbers and rows."""
+    if not isinstance(value, list) or is_one_table(value):
+        return [_as_rows(value)]
+    return [_as_rows(entry) for entry in value]
+
+
+_Row = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Rows = Annotated[list[_Row], Field(min_length=1), BeforeValidator(_as_rows), AfterValidator(_goes_forward)]
+Tables = Annotated[list[Rows], BeforeValidator(_as_tables)]
+_ROWS = "rows [t, {}] with t from 0 s upwards, at most two rows with one t"
+_TABLES = "a number ({}), rows [t, {}] with t from 0 s upwards, or a list with one or the other for each blade"
+
+
+def _bare_pitches_acted_on(tables: Sequence[bool], info: ValidationInfo) -> None:
+    """Raises where one of the blades without pitch inertia is acted on; tables: for each blade, or one for all."""
+    acted_on = [i for i in _context(info).get("bare_pitches", ()) if tables[i if len(tables) > 1 else 0]]
+    if acted_on:
+        raise invalid(f"acts on {_blades_named(acted_on)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
+
+
+def _not_zero(rows: list[list[float]]) -> bool:
+    return any(value != 0.0 for _, value in rows)
+
+
 class BearingTable(Table):
-    """[bearing]: one number for every pitch bearing or, an extension of the contract, a list with one per blade."""
+    """[bearing]: one value for every pitch bearing, or a list with one per blade."""
 
     stiffness: PerBlade = Field([0.0], description="a number of at least 0 (N m/rad), or a list with one per blade")
     damping: PerBlade = Field([0.0], description="a number of at least 0 (N m s/rad), or a list with one per blade")
+    rest: Tables = Field([[[0.0, 0.0]]], description=_TABLES.format("rad", "angle"))
 
-    @field_validator("stiffness", "damping", mode="before")
+    @field_validator("stiffness", "damping", "rest", mode="before")
     @classmethod
     def _has_one_per_blade(cls, value: object, info: ValidationInfo) -> object:
         return _one_per_blade(value, info, 0, "in a list for")
@@ -171,33 +213,32 @@ class BearingTable(Table):
     @field_validator("stiffness", "damping")
     @classmethod
     def _acts_on_inertia(cls, value: list[float], info: ValidationInfo) -> list[float]:
-        acted_on = [i for i in _context(info).get("bare_pitches", ()) if value[i if len(value) > 1 else 0] != 0.0]
-        if acted_on:
-            raise invalid(f"acts on {_blades_named(acted_on)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
+        _bare_pitches_acted_on([number != 0.0 for number in value], info)
         return value
 
-
-def _as_rows(value: object) -> object:
-    return value if isinstance(value, list) else [[0.0, value]]
+    @field_validator("rest")
+    @classmethod
+    def _rests_on_inertia(cls, tables: list[list[list[float]]], info: ValidationInfo) -> list[list[list[float]]]:
+        _bare_pitches_acted_on([_not_zero(rows) for rows in tables], info)
+        return tables
 
 
 class TorqueTable(Table):
-    """[torque]: a constant is one row at t = 0, since torque is constant outside a table's times."""
+    """[torque]"""
 
-    rotor: Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]], BeforeValidator(_as_rows)] = (
-        Field(
-            min_length=1,
-            description="a number (N m), or rows [t, torque] with t from 0 s upwards, at most two rows with one t",
-        )
-    )
+    rotor: Rows = Field([[0.0, 0.0]], description=f"a number (N m), or {_ROWS.format('torque')}")
+    pitch: Tables = Field([[[0.0, 0.0]]], description=_TABLES.format("N m", "torque"))
 
-    @field_validator("rotor")
+    @field_validator("pitch", mode="before")
     @classmethod
-    def _goes_forward(cls, rows: list[list[float]]) -> list[list[float]]:
-        wrong = wrong_times(rows)
-        if wrong:
-            raise invalid(wrong)
-        return rows
+    def _has_one_per_blade(cls, value: object, info: ValidationInfo) -> object:
+        return _one_per_blade(value, info, 0, "in a list for")
+
+    @field_validator("pitch")
+    @classmethod
+    def _acts_on_inertia(cls, tables: list[list[list[float]]], info: ValidationInfo) -> list[list[list[float]]]:
+        _bare_pitches_acted_on([_not_zero(rows) for rows in tables], info)
+        return tables
 
 
 class InitialTable(Table):
@@ -235,9 +276,9 @@ class SceneTable(Table):
     samples: int = Field(ge=2, le=MAX_SAMPLES, description=f"a whole number from 2 to {MAX_SAMPLES}")
     blade: list[BladeTable] = Field(description="one [blade] table for all blades, or a [[blade]] table for each")
     hub: HubTable | None = Field(None, description="a table with inertia")
-    bearing: BearingTable | None = Field(None, description="a table with stiffness, damping")
+    bearing: BearingTable | None = Field(None, description="a table with stiffness, damping, rest")
     shaft: ShaftTable | None = Field(None, description="a table with damping")
-    torque: TorqueTable | None = Field(None, description="a table with rotor")
+    torque: TorqueTable | None = Field(None, description="a table with rotor, pitch")
     initial: InitialTable = Field(description="a table with angles, rates")
 
     @field_validator("blades")
@@ -290,7 +331,6 @@ class SceneTable(Table):
 
     def to_scene(self, name: str, text: str) -> scene.Scene:
         """The scene as plain numbers. What is zero throughout (torque, springs, dampers) is left out."""
-        rows = self.torque.rotor if self.torque else []
         return scene.Scene(
             name=name,
             title=self.title,
@@ -303,10 +343,12 @@ class SceneTable(Table):
             hub_inertia=self.hub.inertia if self.hub else 0.0,
             initial_angles=tuple(self.initial.angles),
             initial_rates=tuple(self.initial.rates),
-            rotor_torque=tuple((t, torque) for t, torque in rows) if any(torque for _, torque in rows) else (),
+            rotor_torque=_table(self.torque.rotor) if self.torque else (),
             bearing_stiffness=_unless_zero(self.bearing.stiffness, self.blades) if self.bearing else (),
             bearing_damping=_unless_zero(self.bearing.damping, self.blades) if self.bearing else (),
             shaft_damping=self.shaft.damping if self.shaft else 0.0,
+            pitch_torque=_tables(self.torque.pitch, self.blades) if self.torque else (),
+            bearing_rest=_tables(self.bearing.rest, self.blades) if self.bearing else (),
             text=text,
         )
 
@@ -318,6 +360,17 @@ def _for_each(values: list[T], blades: int) -> tuple[T, ...]:
 
 def _unless_zero(values: list[float], blades: int) -> tuple[float, ...]:
     return _for_each(values, blades) if any(values) else ()
+
+
+def _table(rows: list[list[float]]) -> TimeTable:
+    """() where it is zero at all times."""
+    return tuple((time, value) for time, value in rows) if _not_zero(rows) else ()
+
+
+def _tables(tables: list[list[list[float]]], blades: int) -> tuple[TimeTable, ...]:
+    """One for every blade, () where all are zero at all times."""
+    each = _for_each([_table(rows) for rows in tables], blades)
+    return each if any(each) else ()
 
 
 def _in_order(outputs: Collection[str]) -> tuple[str, ...]:

@@ -341,5 +341,6 @@ def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, .
 
 def _is_interval(key: str) -> bool:
     path = parse_key(key)
-    is_constant_torque = path == ("torque", "rotor")
-    return path[0] in _INTERVALS or path[-1] == "mass" or "tip" in path or is_constant_torque
+    if path[0] == "torque" or path[:2] == ("bearing", "rest"):
+        return not any(isinstance(part, int) for part in path[3:])  # a constant, not a row of a table
+    return path[0] in _INTERVALS or path[-1] == "mass" or "tip" in path

@@ -17,6 +17,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.scenario.expression import ALLOWED, ExpressionError, evaluate
+from rotor_mbs.scenario.time_table import is_one_table
 from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError, find_lines, line_of
 
 MAX_NUMBER = 1e300
@@ -36,7 +37,10 @@ _WRONG_KINDS = {
     "less_than": "out of range",
     "less_than_equal": "out of range",
 }
-_ENTRY_NAMES = {"blade": "blade", "rotor": "row", "axis": "axis", "bound": "bound"}
+_TABLES = ("blade", "row")  # of keys that have a table over time for each blade, or one for all
+_ENTRY_NAMES = {
+    "blade": ("blade",), "rotor": ("row",), "pitch": _TABLES, "rest": _TABLES, "axis": ("axis",), "bound": ("bound",),
+}  # fmt: skip
 
 
 class Table(BaseModel):
@@ -115,10 +119,10 @@ Line = Annotated[Text, AfterValidator(_one_line)]
 
 
 def _problem(details: ErrorDetails, tables: Mapping[str, Any], root: type[BaseModel]) -> KeyProblem:
-    path, value = _in_tables(details["loc"], tables)
+    path, value, for_all = _in_tables(details["loc"], tables)
     model, description = _field(details["loc"], root)
     wrong, allowed = _explained(details, model, _shown(value))
-    message = f"{_shown_key(path)}: {wrong}; allowed: {allowed or description}"
+    message = f"{_shown_key(path, for_all=for_all)}: {wrong}; allowed: {allowed or description}"
     return KeyProblem(path, message, details["type"] == "extra_forbidden")
 
 
@@ -150,33 +154,39 @@ def _field(loc: KeyPath, root: type[BaseModel]) -> tuple[type[BaseModel], str]:
     return model, (field.description or "") if field else ""
 
 
-def _in_tables(loc: KeyPath, tables: Mapping[str, Any]) -> tuple[KeyPath, object]:
-    """Where in the tables `loc` is, and the value that stands there (None where the key is missing).
+def _in_tables(loc: KeyPath, tables: Mapping[str, Any]) -> tuple[KeyPath, object, bool]:
+    """Where in the tables `loc` is, the value that stands there (None where the key is missing), and for_all.
 
-    Left out are the entries of lists that the model made of single values ([blade], a constant torque).
+    Left out are the entries of lists that the model made of single values ([blade], a constant torque), and the blade
+    (for_all) where one table over time is for all blades.
     """
     path: KeyPath = ()
     here: Any = tables
+    for_all = False
     for part in loc:
         if isinstance(part, int) and isinstance(here, list):
+            if not for_all and _ENTRY_NAMES.get(str(path[-1])) == _TABLES and is_one_table(here):
+                for_all = True
+                continue
             here = here[part]
         elif isinstance(part, str) and isinstance(here, Mapping):
             here = here.get(part)
         else:
             continue
         path = (*path, part)
-    return path, here
+    return path, here, for_all
 
 
-def _shown_key(path: KeyPath) -> str:
+def _shown_key(path: KeyPath, *, for_all: bool = False) -> str:
     """'blade.tip (blade 2, entry 3)' for ("blade", 1, "tip", 2): counted from 1, as blades are."""
-    names = ".".join(_shown_name(part) for part in path if isinstance(part, str))
-    numbers = [
-        f"{_ENTRY_NAMES.get(str(path[i - 1]), 'entry')} {part + 1}"
-        for i, part in enumerate(path)
-        if isinstance(part, int)
-    ]
-    return f"{names} ({', '.join(numbers)})" if numbers else names
+    names, numbers, following = [], [], list[str]()
+    for part in path:
+        if isinstance(part, str):
+            names.append(_shown_name(part))
+            following = [name for name in _ENTRY_NAMES.get(part, ()) if not (for_all and name == "blade")]
+        else:
+            numbers.append(f"{following.pop(0) if following else 'entry'} {part + 1}")
+    return f"{'.'.join(names)} ({', '.join(numbers)})" if numbers else ".".join(names)
 
 
 def _shown_name(name: str) -> str:

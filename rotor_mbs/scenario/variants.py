@@ -16,6 +16,7 @@ from typing import Any
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.scenario.scene_file import scene_tables, scene_toml, validated_scene
+from rotor_mbs.scenario.time_table import is_one_table
 from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError
 
 KEY_FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (entries counted from 0)"
@@ -25,6 +26,7 @@ _UNITS: dict[str, str] = {one.metadata["key"]: one.metadata["unit"] for one in f
     f"blade.{one.name}": one.metadata["unit"] for one in fields(Blade)
 }
 _PER_BLADE = frozenset(one.metadata["key"] for one in fields(Scene) if one.metadata["per_blade"])
+_OVER_TIME = frozenset(one.metadata["key"] for one in fields(Scene) if one.metadata["over_time"])
 _START = {one.metadata["key"]: one.name for one in scene_fields("start")}
 
 # Rotors that are kept validated: more than a chunk of runs, or an axis of a usual map, has.
@@ -45,15 +47,16 @@ def parse_key(text: str) -> KeyPath:
 
 def unit_of(path: KeyPath) -> str:
     """The unit of the number at `path`, "1" where it has none."""
-    if path[:2] == ("torque", "rotor") and len(path) == 4 and path[3] == 0:  # the time of a row
+    name = _names(path)
+    if name in _OVER_TIME and len(path) == (5 if name in _PER_BLADE else 4) and path[-1] == 0:  # the time of a row
         return "s"
-    return _UNITS.get(_names(path), "1")
+    return _UNITS.get(name, "1")
 
 
 def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
     """Sets the value at `path` in the tables of a scene; tables that are missing are made, keys are not checked.
 
-    One [blade] for all, or one number for every bearing, becomes one for each where the path names one of them.
+    One [blade] for all, or one number or table for every bearing, becomes one for each where the path names one.
     Raises TableError where the path goes through something that has no such entry.
     """
     here: Any = tables
@@ -74,8 +77,9 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     blades = tables.get("blades", 0)
     if path == ("blade",) and isinstance(value, dict):
         return [copy.deepcopy(value) for _ in range(blades)]
-    if _names(path) in _PER_BLADE and not isinstance(value, list):
-        return [0.0 if value is None else value] * blades
+    is_for_all = not isinstance(value, list) or is_one_table(value)
+    if isinstance(path[-1], str) and _names(path) in _PER_BLADE and is_for_all:
+        return [copy.deepcopy(0.0 if value is None else value) for _ in range(blades)]
     # Whether a list that is missing could be there is for the schema to say.
     return [0.0] * (last + 1) if value is None else value
 

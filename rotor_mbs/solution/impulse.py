@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.quantities import Array, Samples
 
 # Samples that one polynomial goes through; a narrower one shows how much is left open between samples.
@@ -58,12 +59,15 @@ def angular_balance(scene: Scene, run: Samples) -> Balance | None:
 def linear_balance(scene: Scene, run: Samples) -> Balance | None:
     """In space, relative to the largest momentum and what the weights give in a fall.
 
-    Returns None where the run has no force of the bearing, where a torque has a kink (the force jumps there), or where
+    Returns None where the run has no force of the bearing, where a load has a kink (the force jumps there), or where
     the samples do not resolve the motion or the oscillations of a stiff bearing.
     """
     force = run.get("shaft_force")
-    has_kink = any(0.0 < time < scene.duration for time, _ in scene.rotor_torque) and not scene.has_constant_torque
-    if force is None or has_kink or not _is_resolved(scene, run, _fastest_bearing(scene)):
+    if (
+        force is None
+        or knots(scene.load_tables, scene.duration)
+        or not _is_resolved(scene, run, _fastest_bearing(scene))
+    ):
         return None
     momentum, mass = np.zeros(force.shape), sum(blade.mass for blade in scene.blades)
     for i, blade in enumerate(scene.blades):
@@ -100,11 +104,11 @@ def _arm(blade: Blade) -> float:
 def _torque_impulse(scene: Scene, times: Array) -> Array:
     """(n,) N m s of the rotor torque from the first of `times` (s) to each; exact."""
     kinks = [time for time, _ in scene.rotor_torque if times[0] < time < times[-1]]
-    knots = np.unique(np.concatenate([times, kinks]))
-    middle = 0.5 * (knots[1:] + knots[:-1])
+    ends = np.unique(np.concatenate([times, kinks]))
+    middle = 0.5 * (ends[1:] + ends[:-1])
     torque = np.array([scene.torque_at(time) for time in middle.tolist()])
-    total = np.concatenate([[0.0], np.cumsum(torque * np.diff(knots))])
-    return np.asarray(total[np.searchsorted(knots, times)])
+    total = np.concatenate([[0.0], np.cumsum(torque * np.diff(ends))])
+    return np.asarray(total[np.searchsorted(ends, times)])
 
 
 def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:

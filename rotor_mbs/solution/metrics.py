@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.record import Trajectory
@@ -60,7 +61,8 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
     """
     weights = sum(b.mass * scene.gravity * float(np.linalg.norm(b.centre_of_mass)) for b in scene.blades)
     springs = sum(
-        0.5 * k * angle**2 for k, angle in zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False)
+        0.5 * k * (angle - value_at(scene.pitch_load(i)[1], 0.0)) ** 2
+        for i, (k, angle) in enumerate(zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False))
     )
     kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0
     work = float(np.abs(run.work).max(initial=0.0)) if run.work is not None else 0.0

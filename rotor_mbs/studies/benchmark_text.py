@@ -29,7 +29,7 @@ def description(scene: Scene, reference: Trajectory) -> str:
         hub=repr(float(scene.hub_inertia)),
         shaft=repr(float(scene.shaft_damping)),
         bearings="\n".join(_bearing_row(scene, number) for number in range(len(scene.blades))),
-        torque=_torque(scene),
+        loads=_loads(scene),
         initial="\n".join(
             f"| {label} | {angle!r} | {rate!r} |"
             for label, angle, rate in zip(
@@ -56,14 +56,24 @@ def _bearing_row(scene: Scene, blade: int) -> str:
     return f"| {blade + 1} | {stiffness!r} | {damping!r} |"
 
 
-def _torque(scene: Scene) -> str:
-    if not scene.has_torque:
+def _loads(scene: Scene) -> str:
+    """What drives rotor and pitches, a table over time each."""
+    tables = {"torque on the rotor about +y, N m": scene.rotor_torque}
+    for number in range(1, 1 + len(scene.blades)):
+        torque, rest = scene.pitch_load(number - 1)
+        tables[f"torque on pitch {number}, N m"] = torque
+        tables[f"pitch {number} at which its spring is unloaded, rad"] = rest
+    given = {name: table for name, table in tables.items() if table}
+    if not given:
         return "None."
-    rows = "\n".join(f"| {float(time)!r} | {float(torque)!r} |" for time, torque in scene.rotor_torque)
-    return (
-        "On the rotor, about +y, linear between the rows, constant before the first and after the last; two rows with\n"
-        f"one time are a jump.\n\n| time, s | torque, N m |\n|---|---|\n{rows}"
-    )
+    parts = [
+        "linear between the rows, constant before the first and after the last; two rows with one time are a jump. A\n"
+        "torque on a pitch acts between hub and blade."
+    ]
+    for name, table in given.items():
+        rows = "\n".join(f"| {float(time)!r} | {float(value)!r} |" for time, value in table)
+        parts.append(f"| time, s | {name} |\n|---|---|\n{rows}")
+    return "\n\n".join(parts)
 
 
 def evaluation_program(scene: Scene) -> str:
@@ -99,13 +109,13 @@ $blades
 
 Hub: inertia about the shaft $hub kg m²; damping of the shaft $shaft N m s/rad.
 
-| pitch bearing | stiffness, N m/rad (unloaded at pitch 0) | damping, N m s/rad |
+| pitch bearing | stiffness, N m/rad (unloaded at pitch 0, or as below) | damping, N m s/rad |
 |---|---|---|
 $bearings
 
 ## Forces
 
-Gravity, springs and dampers as above. Torque: $torque
+Gravity, springs and dampers as above. Loads over time: $loads
 
 ## Initial conditions
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
@@ -20,7 +21,7 @@ from rotor_mbs.models.printed.matrices import AS_PRINTED, CORRECTED, Errata
 from rotor_mbs.scenario.scene import Blade, Scene
 
 _SEED, _STATES = 2020, 5
-_TORQUE = 1.7  # N m, with masses and lengths of order one
+_TORQUES = (1.7, -0.9, 0.6, 1.1)  # N m, with masses and lengths of order one
 
 
 def differences() -> Iterator[tuple[str, float, str]]:
@@ -65,24 +66,25 @@ def _phases(blades: int) -> list[float]:
 
 
 def _accelerations(blades: int) -> float:
+    torques = _TORQUES[: 1 + blades]
     text = literal.one_blade_accelerations if blades == 1 else literal.three_blade_accelerations
     found = []
     for angles, rates, constants in _random(blades):
         for gravity in (constants[3], 0.0):
             own = (*constants[:3], gravity)
-            derived = DerivedRotor(*own, _phases(blades), AS_PRINTED).accelerations(_TORQUE, angles, rates)
-            found.append(_off(text(*own, _TORQUE, [*angles, *rates]), derived))
+            derived = DerivedRotor(*own, _phases(blades), AS_PRINTED).accelerations(torques, angles, rates)
+            found.append(_off(text(*own, torques, [*angles, *rates]), derived))
     return float(np.max(found))  # NaN where one is
 
 
 def _corrected(blades: int) -> float:
     """Each erratum that changes nothing by itself is left in: E3 where E2 is corrected."""
-    found = []
+    found, torques = [], _TORQUES[: 1 + blades]
     for angles, rates, (m, c, d, g) in _random(blades):
         form = rotor_form(_scene(blades, m, c, d, g))
-        exact = closed_form.accelerations(angles, rates, form, _TORQUE, math.sin, math.cos)
+        exact = closed_form.accelerations(angles, rates, form, LoadValues(torques[0], torques[1:]), math.sin, math.cos)
         for errata in (CORRECTED, Errata(e1=False, e2=False, e3=True)):
-            derived = DerivedRotor(m, c, d, g, _phases(blades), errata).accelerations(_TORQUE, angles, rates)
+            derived = DerivedRotor(m, c, d, g, _phases(blades), errata).accelerations(torques, angles, rates)
             found.append(_off(derived, exact))
     return float(np.max(found))  # NaN where one is
 
@@ -92,8 +94,8 @@ def _fixed_pitch() -> float:
     for angles, rates, (m, _, d, g) in _random(3):
         for gravity in (g, 0.0):
             form = rotor_form(_scene(1, m, 0.0, d, gravity))
-            exact = closed_form.accelerations(angles[:1], rates[:1], form, _TORQUE, math.sin, math.cos)
-            printed = literal.fixed_pitch_acceleration(m, d, gravity, _TORQUE, angles[0] - 0.7, [0.7])
+            exact = closed_form.accelerations(angles[:1], rates[:1], form, LoadValues(_TORQUES[0]), math.sin, math.cos)
+            printed = literal.fixed_pitch_acceleration(m, d, gravity, _TORQUES[0], angles[0] - 0.7, [0.7])
             found.append(_off([printed], exact))
     return float(np.max(found))  # NaN where one is
 

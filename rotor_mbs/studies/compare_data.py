@@ -150,7 +150,7 @@ def _as_run(scene: Scene, data: ForeignData, reference: Trajectory, tolerance: f
     count = states.shape[1] // 2
     scene = replace(scene, duration=float(data.time[-1]), samples=len(data.time), outputs=("angles", "rates"))
     trajectory = Trajectory(data.time, states[:, :count], states[:, count:])
-    if set(data.columns) == set(range(2 * count)) and scene.has_constant_torque and not scene.has_damping:
+    if set(data.columns) == set(range(2 * count)) and scene.has_constant_loads and not scene.has_damping:
         moving = scene.moving_coordinates
         columns = [*moving, *(count + i for i in moving)]
         scene = replace(scene, outputs=("angles", "rates", "energy"))

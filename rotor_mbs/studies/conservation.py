@@ -1,6 +1,6 @@
 """Conservation: each method on a scene, on its images and backwards in time; perturbed starts for the energy drift.
 
-The scene must be without damping and without a torque that changes.
+The scene must be without damping and without a load that changes.
 """
 
 from __future__ import annotations

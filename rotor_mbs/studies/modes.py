@@ -30,6 +30,7 @@ from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execut
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Table, value_at
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.store.layout import KEY_ATTRIBUTE, TOGETHER
 from rotor_mbs.store.records import write_records
@@ -87,9 +88,10 @@ def compute_modes(
     """All modes of `scene`: at rest under gravity; in steady rotation without gravity at `speeds` (rad/s); multipliers
     of a turn under gravity at those above 0; their stability chart over `stiffnesses` (N m/rad) of the bearings.
 
-    The torque of the scene is left out: the drive holds the rotor's speed.
+    The torque on the rotor is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
     """
     notes: list[str] = []
+    scene = replace(scene, pitch_torque=_at_start(scene.pitch_torque), bearing_rest=_at_start(scene.bearing_rest))
     speeds, stiffnesses = (
         np.array(_increasing(given, name)) for given, name in ((speeds, "speeds"), (stiffnesses, "stiffnesses"))
     )
@@ -107,6 +109,11 @@ def compute_modes(
     return SceneModes(scene.name, title, blades, scene.gravity, rest, rotation, table, chart, tuple(notes))
 
 
+def _at_start(tables: tuple[Table, ...]) -> tuple[Table, ...]:
+    """Constant at the values that they have at t = 0."""
+    return tuple(((0.0, value_at(table, 0.0)),) if table else () for table in tables)
+
+
 def linearizing_methods() -> dict[str, Method]:
     """By model, the method that linearizes it, of those that are installed; the closed form first."""
     return {method.model: method for method in methods() if method.linearize is not None and method.is_installed}
@@ -114,7 +121,8 @@ def linearizing_methods() -> dict[str, Method]:
 
 def is_isotropic(scene: Scene, pitches: Array) -> bool:
     """Whether all blades and bearings are equal, move and stand at equal pitches, and no gravity tells them apart."""
-    same = all(len(set(values)) <= 1 for values in (scene.blades, scene.bearing_stiffness, scene.bearing_damping))
+    bearings = scene.bearing_stiffness, scene.bearing_damping, scene.bearing_rest, scene.pitch_torque
+    same = all(len(set(values)) <= 1 for values in (scene.blades, *bearings))
     return same and scene.blades[0].has_pitch_inertia and scene.gravity == 0.0 and bool(np.ptp(pitches) < 1e-9)
 
 

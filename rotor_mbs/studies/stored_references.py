@@ -71,10 +71,9 @@ def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
 
     angles, rates = stored.array("angles"), stored.array("rates")
     moving = scene.moving_coordinates
-    states = [angles[:, moving], rates[:, moving]]
+    result = samples.trajectory(scene, stored.array("time"), np.hstack([angles[:, moving], rates[:, moving]]))
     if "work" in stored:
-        states.append(stored.array("work")[:, None])
-    result = samples.trajectory(scene, stored.array("time"), np.hstack(states))
+        result.work = stored.array("work")
     result.angle_uncertainty = stored.array("angle_uncertainty")
     result.error_growth = stored.array("error_growth") if "error_growth" in stored else None
     result.quantities |= {load.name: stored.array(load.name) for load in LOADS if load.name in stored}

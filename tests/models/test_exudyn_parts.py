@@ -84,7 +84,7 @@ def test_the_tree_is_told_nothing_that_is_not_there(scene, absent) -> None:
     from rotor_mbs.models.exudyn import tree
 
     chosen = SCENES[scene]
-    told = next(p for p in tree.parts(chosen, timetable.RotorTorque(chosen)) if p.type == "ObjectKinematicTree")
+    told = next(p for p in tree.parts(chosen, timetable.Loads(chosen)) if p.type == "ObjectKinematicTree")
     assert not set(absent) & set(told.parameters)
 
 
@@ -260,9 +260,9 @@ def test_quaternion_and_rotation_vector_are_those_of_the_rotation() -> None:
 
 def test_integration_intervals_meet_samples_and_kinks() -> None:
     scene = replace(BARE, duration=1.0, samples=11, rotor_torque=((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0)))
-    pieces = timetable.torque_segments(scene)
-    assert [(p.start, p.torque_start) for p in pieces] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
-    assert pieces[1].at(0.47) == pytest.approx(2.0)
+    pieces = timetable.load_segments(scene)
+    assert [(p.start, p.values[0]) for p in pieces] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
+    assert pieces[1].at(timetable.ROTOR, 0.47) == pytest.approx(2.0)
     parts = timetable.integration_intervals(scene, pieces, every_sample=False)
     ends = [interval.end for interval in parts]
     assert np.allclose(ends, [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])

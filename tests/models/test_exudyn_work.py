@@ -26,7 +26,7 @@ def work_at_unit_rate(time: Array) -> Array:
     scene = driven()
     angles, rates = np.zeros((len(time), 2)), np.zeros((len(time), 2))
     angles[:, 0], rates[:, 0] = time, 1.0
-    return energy.work(scene, timetable.torque_segments(scene), time, angles, rates)
+    return energy.work(scene, timetable.load_segments(scene), time, angles, rates)
 
 
 def exact_work(time: Array) -> Array:

@@ -13,6 +13,7 @@ from support.scenes import ARM, GRAVITY, MASS, OFFSET, general, paper
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -91,8 +92,8 @@ def test_equals_lagranges_equations_derived_by_machine(scene: Scene) -> None:
     random = np.random.default_rng(7)
     for _ in range(50):
         q, w = random.uniform(-4, 4, count), random.uniform(-3, 3, count)
-        found = np.array(closed_form.accelerations(list(q), list(w), form, 0.0, math.sin, math.cos))
-        driven = closed_form.accelerations(list(q), list(w), form, 1e6, math.sin, math.cos)
+        found = np.array(closed_form.accelerations(list(q), list(w), form, LoadValues(0.0), math.sin, math.cos))
+        driven = closed_form.accelerations(list(q), list(w), form, LoadValues(1e6), math.sin, math.cos)
         schur = 1e6 / (driven[0] - found[0])
         share = schur / sum(b.mass * float(np.dot(b.centre_of_mass, b.centre_of_mass)) for b in scene.blades)
         right = derived(np.concatenate([q, w]))
@@ -152,7 +153,7 @@ def test_angular_momentum_about_the_shaft_is_kept_without_gravity() -> None:
     def momentum(row: int) -> float:
         angles, rates = list(found.angles[row]), list(found.rates[row])
         more, less = [rates[0] + 1, *rates[1:]], [rates[0] - 1, *rates[1:]]
-        kinetic = [closed_form.energies(angles, r, form, math.sin, math.cos)[0] for r in (more, less)]
+        kinetic = [closed_form.energies(angles, r, form, LoadValues(0.0), math.sin, math.cos)[0] for r in (more, less)]
         return (kinetic[0] - kinetic[1]) / 2
 
     values = [momentum(row) for row in range(0, scene.samples, 50)]

@@ -101,7 +101,12 @@ def test_a_point_mass_off_the_pitch_axis_swings_once_a_turn():
     assert cosine_and_sine == pytest.approx([1.2, 1.2], rel=1e-9)
 
 
+DRIVEN = replace(
+    DAMPED, pitch_torque=(((0.0, 300.0),), (), ((0.0, -200.0),)), bearing_rest=((), ((0.0, 0.2),), ((0.0, -0.1),))
+)
 SOURCES = [
+    (DRIVEN, 0.0),
+    (DRIVEN, 1.2),
     (DAMPED, 0.0),
     (DAMPED, 1.2),
     (DAMPED, 8.0),

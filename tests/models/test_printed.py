@@ -43,13 +43,13 @@ def test_literal_text_is_the_derivation_with_nothing_mended(blades):
     for _ in range(50):
         angles, rates = random_motion(rng, blades)
         m, c, d, g = constants(rng)
-        torque = rng.uniform(-1.0, 1.0)
+        torques = rng.uniform(-1.0, 1.0, 1 + blades).tolist()
         rotor = DerivedRotor(m, c, d, g, phases(blades), AS_PRINTED)
-        derived = np.array(rotor.accelerations(torque, angles, rates))
+        derived = np.array(rotor.accelerations(torques, angles, rates))
         # Rounding, some 1e-15, times the condition of the mass matrix, which is singular at a pitch of ±π/2.
         bound = 1e-14 * np.linalg.cond(mass_matrix(rotor, angles)) * max(1.0, np.abs(derived).max())
         assert bound < 1e-2 * max(1.0, np.abs(derived).max())
-        np.testing.assert_allclose(text(m, c, d, g, torque, angles + rates), derived, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(text(m, c, d, g, torques, angles + rates), derived, rtol=0.0, atol=bound)
 
 
 def positions(angles, c, d, phases):
@@ -98,20 +98,20 @@ def test_all_mended_are_lagranges_equations(blades):
     for _ in range(10):
         angles, rates = random_motion(rng, blades)
         chosen = constants(rng)
-        torque = rng.uniform(-1.0, 1.0)
+        torques = rng.uniform(-1.0, 1.0, 1 + blades)
         rotor = DerivedRotor(*chosen, phases(blades), CORRECTED)
-        accelerations = np.array(rotor.accelerations(torque, angles, rates))
+        accelerations = np.array(rotor.accelerations(torques.tolist(), angles, rates))
         forces = Lagrangian(*chosen, phases(blades)).forces(np.array(angles), np.array(rates), accelerations)
         # Differences cut off 1e-10 of terms as large as the accelerations.
         scale = max(1.0, np.abs(accelerations).max())
-        np.testing.assert_allclose(forces / scale, [torque / scale, *[0.0] * blades], atol=1e-7)
+        np.testing.assert_allclose(forces / scale, torques / scale, atol=1e-7)
 
 
 @pytest.mark.parametrize("errata", [Errata(True, False, False), Errata(False, True, False), AS_PRINTED])
 def test_a_fault_left_in_breaks_lagranges_equations(errata):
     angles, rates = [0.3, 0.8, -0.5, 1.1], [0.7, -1.2, 0.4, 0.9]
     chosen = 1.3, 0.9, 1.1, 1.7
-    accelerations = np.array(DerivedRotor(*chosen, THIRDS, errata).accelerations(0.0, angles, rates))
+    accelerations = np.array(DerivedRotor(*chosen, THIRDS, errata).accelerations([0.0] * 4, angles, rates))
     forces = Lagrangian(*chosen, THIRDS).forces(np.array(angles), np.array(rates), accelerations)
     assert np.abs(forces).max() > 0.1
 
@@ -125,7 +125,10 @@ def test_third_erratum_alone_changes_nothing():
     for _ in range(10):
         angles, rates = random_motion(rng, 3)
         np.testing.assert_allclose(
-            alone.accelerations(0.0, angles, rates), none.accelerations(0.0, angles, rates), rtol=1e-10, atol=1e-10
+            alone.accelerations([0.0] * 4, angles, rates),
+            none.accelerations([0.0] * 4, angles, rates),
+            rtol=1e-10,
+            atol=1e-10,
         )
 
 

@@ -106,7 +106,7 @@ def test_figure_11_crest_is_lost_by_any_other_reading(changed, settings):
 
 def test_figure_11_with_the_third_erratum_mended_passes_4_rad():
     mended = DerivedRotor(M, C, D, 9.8, FIG11.phases, Errata(e3=False))
-    f = right_hand_side(FIG11, lambda torque, y: mended.accelerations(torque, y[:4], y[4:]), moving=4)
+    f = right_hand_side(FIG11, lambda torques, y: mended.accelerations(torques, y[:4], y[4:]), moving=4)
     result = ode45(f, 10.0, [*FIG11.initial_angles, *FIG11.initial_rates], 1e-6, 1e-9)
     assert result.refined()[1][:, 0].max() > 4.0
 

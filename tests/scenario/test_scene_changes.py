@@ -31,6 +31,10 @@ CHANGES: dict[str, tuple[Any, str]] = {
     "initial.angles[1]": ("deg(20)", "initial_angles"),
     "initial.rates": ((1, 2, 3, 4), "initial_rates"),
     "torque.rotor": (5.0, "rotor_torque"),
+    "torque.pitch": ([1.0, [[0.5, 2.0], [0.5, 3.0]], 0], "pitch_torque"),
+    "torque.pitch[1]": ("2*pi", "pitch_torque"),
+    "bearing.rest": ([[0.5, 0.0], [0.5, "deg(5)"]], "bearing_rest"),
+    "bearing.rest[0]": ([[0.5, 0.0], [0.7, 0.1]], "bearing_rest"),
     "bearing.stiffness": (7.0, "bearing_stiffness"),
     "bearing.damping[2]": (0.5, "bearing_damping"),
     "shaft.damping": (np.float64(0.1), "shaft_damping"),
@@ -64,6 +68,18 @@ def test_a_change_reaches_its_field_alone_and_the_text(general: Scene, key: str)
     assert differing == {field, "text"}
     assert (scene_hash(changed) != scene_hash(general)) == (field not in ("title", "figures"))
     assert parse_scene(changed.text, changed.name) == changed
+
+
+def test_a_table_for_all_blades_and_one_for_each(general: Scene) -> None:
+    step = ((1.0, 0.0), (1.0, 0.1))
+    every = general.replace(**{"bearing.rest": step})
+    assert every.bearing_rest == (step,) * 3
+    assert every.replace(**{"bearing.rest[1]": 0}).bearing_rest == (step, (), step)
+    assert every.replace(**{"bearing.rest[2][1][1]": 0.2}).bearing_rest == (step, step, ((1.0, 0.0), (1.0, 0.2)))
+    mixed = general.replace(**{"torque.pitch": [step, 3, 0]})
+    assert mixed.pitch_torque == (step, ((0.0, 3.0),), ())
+    assert not mixed.has_constant_loads
+    assert general.replace(**{"torque.pitch": 0, "bearing.rest": [0, 0, 0], "torque.rotor": 0}).has_constant_loads
 
 
 def test_several_changes_at_once_and_the_original_stays(general: Scene) -> None:

@@ -104,6 +104,10 @@ def test_a_sweep_without_a_file_is_that_of_its_text(tmp_path: Path) -> None:
         ("bearing.stiffness", "N m/rad"),
         ("torque.rotor[1][0]", "s"),
         ("torque.rotor[1][1]", "N m"),
+        ("torque.pitch[1]", "N m"),
+        ("torque.pitch[1][0][0]", "s"),
+        ("bearing.rest", "rad"),
+        ("bearing.rest[1][0][1]", "rad"),
         ("gravity", "m/s^2"),
     ],
 )

@@ -20,7 +20,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_l
 from rotor_mbs.models.exudyn import adapter, chain, sensor_samples
 from rotor_mbs.models.exudyn.methods import MultibodySolver
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.models.exudyn.timetable import Loads
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution import judgement
@@ -165,10 +165,10 @@ def test_a_body_that_falls_free_of_its_joints() -> None:
     """
     rod = Blade(15000.0, (0.0, 0.0, 15.42), (1e5, 1e5, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 33.38))
     one = paper("fig03", duration=1.0, samples=11, blades=(rod,), hub_inertia=1e3)
-    torque = RotorTorque(one)
+    loads = Loads(one)
     scheme = Scheme("RK44", 4, {"explicit.eliminateConstraints": False}, step=1e-3)
-    parts = chain.parts(one, torque, "rotation_vector")
-    solver = MultibodySolver(one, parts, torque, scheme, sensor_samples.chain_trajectory, rows_between=True)
+    parts = chain.parts(one, loads, "rotation_vector")
+    solver = MultibodySolver(one, parts, loads, scheme, sensor_samples.chain_trajectory, rows_between=True)
     integration = solver.integrate()
     found = Solution(one, "exudyn_chain/newmark_index2", solver.observe(), integration)
     verdict = caught(one, found)

@@ -10,7 +10,7 @@ from support.rotors import FIG08
 from support.scenes import paper
 
 from rotor_mbs.models.exudyn import tree
-from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.models.exudyn.timetable import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Integration, Trajectory
@@ -52,5 +52,5 @@ BARE = replace(FIG08, gravity=0.0)
     ],
 )
 def test_the_tree_is_listed_with_what_it_has(scene: Scene, words: str) -> None:
-    parts = tree.parts(scene, RotorTorque(scene))
+    parts = tree.parts(scene, Loads(scene))
     assert next(part.detail for part in parts if part.type == "ObjectKinematicTree") == words

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.models.lagrange.heyoka_adapter import heyoka
-from rotor_mbs.models.lagrange.parameters import torque_segments
+from rotor_mbs.models.lagrange.parameters import load_segments
 from rotor_mbs.models.lagrange.system import build_system, set_parameters
 from rotor_mbs.scenario.scene import Scene
 
@@ -25,9 +25,9 @@ def moving_angles(scene: Scene) -> Any:
     integrator = heyoka().taylor_adaptive(system.equations, state=start, compact_mode=True, **kind)
     set_parameters(integrator, _numbers(system.parameters.values))
     times, rows = np.linspace(0.0, scene.duration, scene.samples), [start[None, :]]
-    for segment in torque_segments(scene):
-        if not scene.has_constant_torque:
-            integrator.pars[-2:] = _numbers([segment.offset, segment.slope])
+    for segment in load_segments(scene):
+        if numbers := [number for i in system.changing for number in segment.lines[i]]:
+            integrator.pars[-len(numbers) :] = _numbers(numbers)
         inside = times[(times > segment.start) & (times <= segment.end)]
         end = [] if len(inside) and inside[-1] == segment.end else [segment.end]
         states = integrator.propagate_grid(_numbers([segment.start, *inside, *end]))[-1]

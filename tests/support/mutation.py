@@ -69,13 +69,23 @@ class Mutant:
 _M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
 _J = "rotor_mbs.models.mujoco"
 _TARGETS = (
-    Target("lagrange", f"{_L}.closed_form", ("accelerations", "power", "energies", "_kinetic", "point_path")),
+    Target(
+        "lagrange", f"{_L}.closed_form", ("accelerations", "power", "rest_energy", "energies", "_kinetic", "point_path")
+    ),
     Target(
         "lagrange",
         f"{_L}.parameters",
-        ("rotor_form", "_inertia_about_hub", "_rotor_inertia", "_coefficients", "_cosine_of_turn", "torque_segments"),
+        (
+            "rotor_form",
+            "_inertia_about_hub",
+            "_rotor_inertia",
+            "_coefficients",
+            "_cosine_of_turn",
+            "load_segments",
+            "_line",
+        ),
     ),
-    Target("lagrange", f"{_L}.samples", ("trajectory", "_constant_work")),
+    Target("lagrange", f"{_L}.samples", ("trajectory", "_put_energies", "constant_work")),
     Target("printed", f"{_P}.literal", ("*",)),
     Target("printed", f"{_P}.matrices", ("*",)),
     Target("printed", f"{_P}.derivation", ("*",)),
@@ -96,9 +106,9 @@ _TARGETS = (
     ),
     # About the common centre of mass, which a change moves to second order alone.
     Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
-    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_rotor_torque", "_tip_sensor")),
+    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_torque", "_tip_sensor")),
     Target("multibody", f"{_M}.energy", ("*",)),
-    Target("multibody", f"{_M}.timetable", ("at", "torque_segments", "integration_intervals")),
+    Target("multibody", f"{_M}.timetable", ("at", "load_segments", "_line", "pitch_terms", "integration_intervals")),
     Target("multibody", f"{_M}.sensor_samples", ("_fields", "_add_energies")),
     Target("chain", f"{_M}.geometry", ("quaternion", "quaternion_rate"), 1e-2),
     Target(
@@ -112,6 +122,7 @@ _TARGETS = (
             "_on_ground",
             "_on_body",
             "_pitch_spring",
+            "_spring_torque",
             "_rotor_torque",
             "_tip_sensor",
         ),
@@ -122,7 +133,7 @@ _TARGETS = (
     Target(
         "mujoco", f"{_J}.mjcf", ("moving", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
     ),
-    Target("mujoco", f"{_J}.loads", ("at", "loaded", "segments", "_line", "intervals", "steps_and_rows"), 1e-3),
+    Target("mujoco", f"{_J}.loads", ("at", "loads_of", "segments", "_line", "intervals", "steps_and_rows"), 1e-3),
     Target(
         "mujoco",
         f"{_J}.solver",
@@ -134,6 +145,8 @@ _TARGETS = (
             "_work_needs_rows",
             "_dampings",
             "_spring_energy",
+            "_springs",
+            "_work_of_rests",
         ),
         1e-3,
     ),

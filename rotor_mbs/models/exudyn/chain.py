@@ -7,7 +7,8 @@ system is regular, and no inertia has to be invented for it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,8 +28,9 @@ from rotor_mbs.models.exudyn.geometry import (
     rotation_z,
 )
 from rotor_mbs.models.exudyn.loads import chain_sensors
-from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.models.exudyn.timetable import ROTOR, Loads, Moment, constant_rest, is_driven, pitch_terms
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import is_constant
 from rotor_mbs.solution.record import Array
 
 NODES = ("euler_parameters", "rotation_vector")
@@ -64,7 +66,7 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     return out
 
 
-def parts(scene: Scene, torque: RotorTorque, node: str = NODES[0]) -> list[Part]:
+def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
     """Everything the engine holds for this scene, in the order it is built; `node` is one of NODES."""
     hub, *blades = placed_bodies(scene)
     built = [Part("object", "ground", "ObjectGround")]
@@ -76,11 +78,11 @@ def parts(scene: Scene, torque: RotorTorque, node: str = NODES[0]) -> list[Part]
     for i, blade in zip(pitching(scene), blades, strict=True):
         seat = _on_body(hub, f"at bearing {i + 1}", mounting(i, len(scene.blades)))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
-        built += _pitch_spring(scene, i, seat.name, f"{blade.name} at bearing")
+        built += _pitch_spring(scene, loads, i, seat.name, f"{blade.name} at bearing")
     if scene.shaft_damping:
         built.append(_spring("shaft damper", "ground at shaft", "hub at shaft", damping=scene.shaft_damping))
     if scene.has_torque:
-        built.append(_rotor_torque(scene, torque))
+        built.append(_rotor_torque(scene, Moment(loads, ((ROTOR, 1.0),))))
     return built + _sensors(scene, [hub, *blades])
 
 
@@ -135,14 +137,39 @@ def _bearing(name: str, first: Part, second: Part) -> list[Part]:
     return [first, second, Part("object", name, "ObjectJointRevoluteZ", {"markerNumbers": markers})]
 
 
-def _pitch_spring(scene: Scene, blade: int, seat: str, root: str) -> list[Part]:
+def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) -> list[Part]:
+    """Spring, damper and torque between hub and blade; the engine adds `torque` to what resists."""
     stiffness, damping = scene.bearing(blade)
-    name = f"pitch spring {blade + 1}"
-    if not stiffness:
-        return [_spring(name, seat, root, damping=damping)] if damping else []
-    turns = {"initialCoordinates": [scene.initial_angles[1 + blade]], "numberOfDataCoordinates": 1}
-    counter = Part("node", f"turns of {name}", "NodeGenericData", turns, "the angle over many turns")
-    return [counter, _spring(name, seat, root, counter.name, stiffness=stiffness, damping=damping)]
+    name, moment = f"pitch spring {blade + 1}", Moment(loads, pitch_terms(scene, blade))
+    constants = {"stiffness": stiffness, "damping": damping, "offset": constant_rest(scene, blade)}
+    if all(map(is_constant, scene.pitch_load(blade))):
+        constants["torque"] = -moment.at(0.0)
+    constants = {key: value for key, value in constants.items() if value}
+    if not is_driven(scene, blade):
+        return []
+    built, counter = [], ""
+    if stiffness:
+        counter = f"turns of {name}"
+        turns = {"initialCoordinates": [scene.initial_angles[1 + blade]], "numberOfDataCoordinates": 1}
+        built.append(Part("node", counter, "NodeGenericData", turns, "the angle over many turns"))
+    spring = _spring(name, seat, root, counter, **constants)
+    if "torque" not in constants and moment.terms:
+        parameters = {**spring.parameters, "springTorqueUserFunction": _spring_torque(moment)}
+        detail = f"{spring.detail}, torque over time".removeprefix(", ")
+        spring = replace(spring, parameters=parameters, detail=detail)
+    return [*built, spring]
+
+
+def _spring_torque(moment: Moment) -> Callable[..., float]:
+    """The spring's law as the engine asks for it: N m that resist a rotation (rad) and its rate (rad/s)."""
+
+    def torque(
+        _system: object, time: float, _item: int, rotation: float, rate: float,
+        stiffness: float, damping: float, offset: float,
+    ) -> float:  # fmt: skip
+        return stiffness * (rotation - offset) + damping * rate - moment.at(time)
+
+    return torque
 
 
 def _spring(name: str, first: str, second: str, counter: str = "", **constants: float) -> Part:
@@ -153,13 +180,13 @@ def _spring(name: str, first: str, second: str, counter: str = "", **constants: 
     return Part("object", name, "ObjectConnectorTorsionalSpringDamper", parameters, detail)
 
 
-def _rotor_torque(scene: Scene, torque: RotorTorque) -> Part:
+def _rotor_torque(scene: Scene, moment: Moment) -> Part:
     load: dict[str, object] = {
         "markerNumber": Ref("marker", "hub at shaft"),
         "loadVector": [0.0, scene.rotor_torque[0][1], 0.0],
     }
     if not scene.has_constant_torque:
-        load["loadVectorUserFunction"] = torque.vector
+        load["loadVectorUserFunction"] = moment.about_y
     detail = "constant" if scene.has_constant_torque else "over time"
     return Part("load", "rotor torque", "LoadTorqueVector", load, detail)
 

@@ -1,4 +1,4 @@
-"""Energy of the bearing springs, and the work done on the rotor.
+"""Energy of the bearing springs, and the work of the loads.
 
 Knows no engine and no equations of motion.
 """
@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.models.exudyn.geometry import pitching
-from rotor_mbs.models.exudyn.timetable import TorqueSegment
+from rotor_mbs.models.exudyn.timetable import ROTOR, LoadSegment, pitch_terms, rest_of, sample_times
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import is_constant, value_at
 from rotor_mbs.solution.record import Array
 
 # Points of the local polynomial that stands in for the power between rows.
@@ -19,23 +20,37 @@ _POINTS = 6
 
 
 def spring_energy(scene: Scene, angles: Array) -> Array:
-    """(n,) J of the bearing springs, from (n, 1 + blades) rad."""
+    """(n,) J of the bearing springs at the first n samples, from (n, 1 + blades) rad."""
     total = np.zeros(len(angles))
     if scene.bearing_stiffness:
         for i in pitching(scene):
-            total += 0.5 * scene.bearing_stiffness[i] * angles[:, 1 + i] ** 2
+            total += (
+                0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - _over_samples(scene, rest_of(i), angles)) ** 2
+            )
     return total
 
 
+def _over_samples(scene: Scene, load: int, angles: Array) -> Array:
+    table = scene.load_tables[load]
+    return np.array([value_at(table, t) for t in sample_times(scene)[: len(angles)].tolist()])
+
+
 def work_needs_rows(scene: Scene) -> bool:
-    """Whether the work has to be integrated along the path: it is exact for a constant torque without dampers."""
-    return scene.has_damping or (scene.has_torque and not scene.has_constant_torque)
+    """Whether the work has to be integrated along the path: it is exact for constant loads without dampers."""
+    return scene.has_damping or not scene.has_constant_loads
 
 
-def work(scene: Scene, segments: Sequence[TorqueSegment], time: Array, angles: Array, rates: Array) -> Array:
-    """(n,) J of the rotor torque less what the dampers took, from rows of time s, angles rad, rates rad/s."""
+def work(scene: Scene, segments: Sequence[LoadSegment], time: Array, angles: Array, rates: Array) -> Array:
+    """(n,) J of the torques less what the dampers took, from rows of time s, angles rad, rates rad/s.
+
+    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `work_of_rests`.
+    """
+    drives = _drives(scene)
     if not work_needs_rows(scene):
-        exact: Array = scene.torque_at(0.0) * (angles[:, 0] - angles[:1, 0])
+        exact = np.zeros(len(time))
+        for column, terms in drives:
+            for load, _ in terms:
+                exact = exact + segments[0].values[load] * (angles[:, column] - angles[:1, column])
         return exact
     losses = _losses(scene, rates)
     out, done = np.zeros(len(time)), 0.0
@@ -45,10 +60,34 @@ def work(scene: Scene, segments: Sequence[TorqueSegment], time: Array, angles: A
         if last - first < 2:
             break
         inside = slice(first, last)
-        power = segment.at(time[inside]) * rates[inside, 0] - losses[inside]
+        power = -losses[inside]
+        for column, terms in drives:
+            for load, factor in terms:
+                power = power + factor * segment.at(load, time[inside]) * rates[inside, column]
         out[inside] = done + cumulative_integral(time[inside], power)
         done = out[last - 1]
     return out
+
+
+def _drives(scene: Scene) -> list[tuple[int, tuple[tuple[int, float], ...]]]:
+    """(coordinate, (load, factor) of what drives it)."""
+    rotor: tuple[tuple[int, float], ...] = ((ROTOR, 1.0),) if scene.has_torque else ()
+    return [(0, rotor), *((1 + i, pitch_terms(scene, i)) for i in pitching(scene))]
+
+
+def work_of_rests(scene: Scene, angles: Array) -> Array:
+    """(n,) J: what `work` leaves out at the first n samples, from (n, 1 + blades) rad.
+
+    With the spring's energy ½ k (θ - r)², a rest angle r that moves does the work -∫ k (θ - r) dr, jumps included.
+    That is ∫ k r dθ, which `work` has, and the change of ½ k r (r - 2θ).
+    """
+    total = np.zeros(len(angles))
+    for i in pitching(scene):
+        if not is_constant(scene.pitch_load(i)[1]):
+            rest = _over_samples(scene, rest_of(i), angles)
+            energy = 0.5 * scene.bearing_stiffness[i] * rest * (rest - 2.0 * angles[:, 1 + i])
+            total += energy - energy[:1]
+    return total
 
 
 def _losses(scene: Scene, rates: Array) -> Array:

@@ -18,7 +18,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.adapter import Linearized, System
 from rotor_mbs.models.exudyn.geometry import pitching, quaternion
-from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.models.exudyn.timetable import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.record import Array
@@ -33,7 +33,7 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
     Raises MethodRefusal where the engine does not take the scene.
     """
     state = _at(scene, angles, speed, torque)
-    system = System(tree.parts(state, RotorTorque(state)))
+    system = System(tree.parts(state, Loads(state)))
     found = _extrapolated(system.linearized)
     inverse = np.asarray(np.linalg.inv(found.M), dtype=np.float64)
     return Linearization(inverse @ found.K, inverse @ found.D, inverse @ system.forces())
@@ -47,7 +47,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array) -> Linearizat
     Raises MethodRefusal where the engine does not take the scene, or the state is not at rest.
     """
     state = _at(scene, angles, 0.0, 0.0)
-    system = System(chain.parts(state, RotorTorque(state), "euler_parameters"))
+    system = System(chain.parts(state, Loads(state), "euler_parameters"))
     found = _extrapolated(system.linearized)
     force = system.forces()
     multipliers = np.asarray(np.linalg.lstsq(found.C, force, rcond=None)[0], dtype=np.float64)

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
 from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, blade_body, fixed_blade_rotation, mounting, pitching
-from rotor_mbs.models.exudyn.timetable import TorqueSegment
+from rotor_mbs.models.exudyn.timetable import ROTOR, LoadSegment, is_driven
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
 
@@ -68,7 +68,7 @@ def newton_euler(scene: Scene, blade: BladeOnBody, sampled: Sampled) -> tuple[Ar
     return force, moment, frames
 
 
-def tree_loads(scene: Scene, segments: Sequence[TorqueSegment], time: Array, sampled: Sampled) -> dict[str, Array]:
+def tree_loads(scene: Scene, segments: Sequence[LoadSegment], time: Array, sampled: Sampled) -> dict[str, Array]:
     """Of the kinematic tree: every blade by Newton and Euler, and their sum with the hub's share at the shaft.
 
     The moment of a pitch actuator is what they leave about the pitch axis.
@@ -110,7 +110,7 @@ def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
     found = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
     for i in range(len(scene.blades)):
         if i in pitching(scene):
-            found += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if any(scene.bearing(i)) else "")
+            found += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else "")
             continue
         blade = blade_on_body(scene, i)
         point, body = list(blade.rotation @ blade.body.com - hub.com), Ref("object", "hub")
@@ -139,7 +139,7 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
             continue
         frames = _matrices(sampled(f"blade {i + 1} rotation"))
         force, moment = _joint_reaction(f"pitch bearing {i + 1}", hub @ mounting(i, len(scene.blades)), frames, sampled)
-        if any(scene.bearing(i)):
+        if is_driven(scene, i):
             actuators[:, i] = -sampled(f"pitch spring {i + 1} torque")[:, 0]
         along = actuators[:, i, None] * [0.0, 0.0, 1.0]
         roots.append((_in_frames(frames, force), _in_frames(frames, moment) + along))
@@ -170,10 +170,10 @@ def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> t
     return force, multipliers[:, :1] * np.cross(z, x) + multipliers[:, 1:2] * np.cross(z, y)
 
 
-def torque_before(segments: Sequence[TorqueSegment], time: Array) -> Array:
+def torque_before(segments: Sequence[LoadSegment], time: Array) -> Array:
     """(n,) N m on the rotor; at a jump the value before it, at 0 the one after."""
     which = np.searchsorted([segment.end for segment in segments[:-1]], time * (1.0 - 1e-12))
-    return np.array([segments[k].at(float(t)) for k, t in zip(which, time, strict=True)])
+    return np.array([segments[k].at(ROTOR, float(t)) for k, t in zip(which, time, strict=True)])
 
 
 def _matrices(rows: Array) -> Array:

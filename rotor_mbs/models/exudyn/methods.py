@@ -20,7 +20,7 @@ from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
 from rotor_mbs.models.exudyn.energy import work_needs_rows
 from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, ExtrapolatedSolver
-from rotor_mbs.models.exudyn.timetable import RotorTorque, TorqueSegment, integration_intervals
+from rotor_mbs.models.exudyn.timetable import Loads, LoadSegment, integration_intervals
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.record import Array, Integration, Trajectory
@@ -29,7 +29,7 @@ from rotor_mbs.solution.record import Array, Integration, Trajectory
 _SHORTEST_INTERVAL = 1e-8
 _MOST_STEPS = 1e9
 
-Reading = Callable[[Scene, Sequence[TorqueSegment], Callable[[str], Array]], Trajectory]
+Reading = Callable[[Scene, Sequence[LoadSegment], Callable[[str], Array]], Trajectory]
 
 
 _NODE = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
@@ -59,34 +59,34 @@ class MultibodySolver:
         self,
         scene: Scene,
         parts: Sequence[blueprint.Part],
-        torque: RotorTorque,
+        loads: Loads,
         scheme: schemes.Scheme,
         reading: Reading,
         rows_between: bool,
     ) -> None:
         from rotor_mbs.models.exudyn.adapter import System
 
-        self._scene, self._torque, self._scheme, self._reading = scene, torque, scheme, reading
+        self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
-        self._intervals = integration_intervals(scene, torque.segments, every_sample=scheme.step is None)
+        self._intervals = integration_intervals(scene, loads.segments, every_sample=scheme.step is None)
         self.system = System(parts)
 
     def integrate(self) -> Integration:
         """From the initial state, every time; bit for bit the same."""
-        return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._torque.enter)
+        return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._loads.enter)
 
     def observe(self) -> Trajectory:
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._reading(self._scene, self._torque.segments, self.system.rows)
+            return self._reading(self._scene, self._loads.segments, self.system.rows)
 
 
 def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
-    scheme, torque = _scheme(scene, settings), RotorTorque(scene)
+    scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
     between = scene.wants("energy") and work_needs_rows(scene)
-    return MultibodySolver(scene, tree.parts(scene, torque), torque, scheme, sensor_samples.tree_trajectory, between)
+    return MultibodySolver(scene, tree.parts(scene, loads), loads, scheme, sensor_samples.tree_trajectory, between)
 
 
 def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
@@ -98,10 +98,10 @@ def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettin
         )
 
     def build(refinement: int = 1) -> Solver:
-        torque = RotorTorque(scene)
-        parts, finer = chain.parts(scene, torque, settings.node), replace(scheme, refinement=refinement)
+        loads = Loads(scene)
+        parts, finer = chain.parts(scene, loads, settings.node), replace(scheme, refinement=refinement)
         # Its angles are unwrapped from row to row, so rows are kept between samples.
-        return MultibodySolver(scene, parts, torque, finer, sensor_samples.chain_trajectory, rows_between=True)
+        return MultibodySolver(scene, parts, loads, finer, sensor_samples.chain_trajectory, rows_between=True)
 
     if settings.extrapolation == RICHARDSON:
         return ExtrapolatedSolver(build, settings.newton_relative_tolerance)
@@ -137,7 +137,7 @@ def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
     in_tree = model == "exudyn_tree"
 
     def items(scene: Scene) -> list[BuiltItem]:
-        return blueprint.items((tree if in_tree else chain).parts(scene, RotorTorque(scene)))
+        return blueprint.items((tree if in_tree else chain).parts(scene, Loads(scene)))
 
     return Method(
         name=f"{model}/{integrator}",

@@ -14,7 +14,7 @@ import numpy as np
 from rotor_mbs.models.exudyn import tree
 from rotor_mbs.models.exudyn.blueprint import Part, Ref
 from rotor_mbs.models.exudyn.geometry import pitching
-from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.models.exudyn.timetable import Loads, Moment
 from rotor_mbs.scenario.scene import Scene
 
 STEP = 6.7e-4  # s: the default of exudyn_tree/rk67
@@ -24,15 +24,14 @@ _KINDS = ("node", "object", "marker", "load")
 _COMMENTS = {
     "node": "joint angles (rad) and rates (rad/s) that move, and their initial values",
     "object": "hub and blades: kg, m, inertia about centres of mass kg m^2; springs N m/rad, dampers N m s/rad",
-    "marker": "where the torque acts",
+    "marker": "where a torque acts",
     "load": "torque, N m",
 }
 
 
 def exudyn_script(scene: Scene, step: float = STEP) -> str:
     """The text of the script. step: largest time step in s."""
-    torque = RotorTorque(scene)
-    parts = [part for part in tree.parts(scene, torque) if part.kind in _KINDS]
+    parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _KINDS]
     moving = [0, *(1 + i for i in pitching(scene))]
     return _SCRIPT.substitute(
         title=(scene.title or scene.name).replace("\\", "/").replace('"', "'"),
@@ -40,7 +39,7 @@ def exudyn_script(scene: Scene, step: float = STEP) -> str:
         types=", ".join(dict.fromkeys(part.type for part in parts)),
         duration=repr(float(scene.duration)),
         samples=scene.samples,
-        torque=_value([list(map(float, row)) for row in scene.rotor_torque]),
+        loads=_value([[list(map(float, row)) for row in table] for table in scene.load_tables]),
         labels=_value(list(scene.coordinate_labels)),
         angles=_value(list(map(float, scene.initial_angles))),
         rates=_value([float(rate) if i in moving else 0.0 for i, rate in enumerate(scene.initial_rates)]),
@@ -55,11 +54,13 @@ def _lines(part: Part) -> str:
     return f"# {_COMMENTS[part.kind]}\n{call}\n{arguments}))"
 
 
-def _argument(key: str, value: object) -> str:
+def _argument(key: str, value: Any) -> str:
     if isinstance(value, Ref):
         return f"number[{value.kind!r}, {value.name!r}]"
     if callable(value):
-        return "lambda system, time, load: now.torque + now.slope * (time - now.start)"
+        moment: Moment = value.__self__
+        sums = (f"{'' if factor == 1.0 else f'{factor!r} * '}now({load}, time)" for load, factor in moment.terms)
+        return f"lambda system, time, load: {' + '.join(sums)}"
     return _TYPES.get(key, "{}").format(_joint_types(value) if key == "jointTypes" else _value(value))
 
 
@@ -111,16 +112,28 @@ from exudyn.itemInterface import $types
 DURATION, SAMPLES = $duration, $samples  # s, both ends included
 STEP = $step  # s, largest time step of Butcher's Runge-Kutta method of order 6 with 7 stages
 
-# Rotor torque, N m, over time, s: linear between rows, constant outside; two rows with one time are a jump.
-TORQUE = $torque
+# Rotor torque (N m), then torque (N m) and rest angle of the spring (rad) of each pitch, over time, s: linear between
+# rows, constant outside; two rows with one time are a jump.
+LOADS = $loads
 
 LABELS = $labels
 MOVING = $moving  # coordinates that move; a blade without inertia about its pitch axis stays at its initial pitch
 INITIAL_ANGLES = $angles  # rad
 INITIAL_RATES = $rates  # rad/s
 
-# The torque of the segment that is being integrated.
-now = SimpleNamespace(start=0.0, torque=0.0, slope=0.0)
+# The interval that is being integrated, s.
+interval = SimpleNamespace(start=0.0, end=DURATION)
+
+
+def now(number, time):
+    """Load at `time`, as it is inside the interval: no row of a table lies there."""
+    before = [row for row in LOADS[number] if row[0] <= interval.start]
+    after = [row for row in LOADS[number] if row[0] >= interval.end]
+    if not before or not after:
+        return (before[-1] if before else after[0])[1]
+    (t0, load0), (t1, load1) = before[-1], after[0]
+    return load0 + (load1 - load0) / (t1 - t0) * (time - t0)
+
 
 system = exu.SystemContainer()
 mbs = system.AddSystem()
@@ -131,23 +144,9 @@ $parts
 mbs.Assemble()
 
 
-def line(start, end):
-    """Torque at `start`, and its slope until `end`; no row of the table lies between them."""
-    before = [row for row in TORQUE if row[0] <= start]
-    after = [row for row in TORQUE if row[0] >= end]
-    if not TORQUE:
-        return 0.0, 0.0
-    if not before or not after:
-        return (before[-1] if before else after[0])[1], 0.0
-    (t0, torque0), (t1, torque1) = before[-1], after[0]
-    slope = (torque1 - torque0) / (t1 - t0)
-    return torque0 + slope * (start - t0), slope
-
-
 def advance(start, end):
-    """From one stop to the next: samples and kinks of the torque, over which no step may run."""
-    now.start = start
-    now.torque, now.slope = line(start, end)
+    """From one stop to the next: samples and kinks of the loads, over which no step may run."""
+    interval.start, interval.end = start, end
     integration.startTime, integration.endTime = start, end
     integration.numberOfSteps = max(1, math.ceil((end - start) / STEP * (1.0 - 1e-9)))
     # The end of one interval is the start of the next.
@@ -174,7 +173,8 @@ integration.explicit.useLieGroupIntegration = False
 
 samples = np.linspace(0.0, DURATION, SAMPLES).tolist()
 spacing = DURATION / (SAMPLES - 1)
-kinks = {time for time, _ in TORQUE if 0.0 < time < DURATION and min(time % spacing, -time % spacing) > 1e-6 * spacing}
+times = {time for rows in LOADS for time, _ in rows}
+kinks = {time for time in times if 0.0 < time < DURATION and min(time % spacing, -time % spacing) > 1e-6 * spacing}
 stops = sorted({*samples, *kinks})
 
 rows = [[0.0, *INITIAL_ANGLES, *INITIAL_RATES]]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rotor_mbs.models.exudyn import chain, energy, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
 from rotor_mbs.models.exudyn.loads import chain_loads, tree_loads
-from rotor_mbs.models.exudyn.timetable import TorqueSegment, sample_times
+from rotor_mbs.models.exudyn.timetable import LoadSegment, sample_times
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Trajectory
 
@@ -41,7 +41,7 @@ class _Reader:
         return self.all(name)[self.samples]
 
 
-def tree_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: Callable[[str], Array]) -> Trajectory:
+def tree_trajectory(scene: Scene, segments: Sequence[LoadSegment], recorded: Callable[[str], Array]) -> Trajectory:
     """The kinematic tree's own coordinates; `recorded` gives (n, 1 + k) rows of a sensor, time first."""
     read = _Reader(scene, recorded, ("angles", "rates"))
     angles = _all_blades(scene, read.all("angles"), scene.initial_angles)
@@ -53,7 +53,7 @@ def tree_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: C
     return _cut(scene, fields)
 
 
-def chain_trajectory(scene: Scene, segments: Sequence[TorqueSegment], recorded: Callable[[str], Array]) -> Trajectory:
+def chain_trajectory(scene: Scene, segments: Sequence[LoadSegment], recorded: Callable[[str], Array]) -> Trajectory:
     """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps."""
     placed = chain.placed_bodies(scene)
     bodies = [(each.name, each.body) for each in placed]
@@ -119,7 +119,7 @@ def _largest_gap(read: _Reader, bodies: Sequence[tuple[str, Body]]) -> Array:
 
 def _fields(
     scene: Scene,
-    segments: Sequence[TorqueSegment],
+    segments: Sequence[LoadSegment],
     read: _Reader,
     angles: Array,
     rates: Array,
@@ -131,7 +131,8 @@ def _fields(
         tips = [read.sampled(f"tip {i + 1}") for i in range(len(scene.blades))]
         fields["tip"] = np.stack(tips, axis=1)
     if scene.wants("energy"):
-        fields["work"] = energy.work(scene, segments, read.time, angles, rates)[read.samples]
+        done = energy.work(scene, segments, read.time, angles, rates)[read.samples]
+        fields["work"] = done + energy.work_of_rests(scene, fields["angles"])
         fields["potential_energy"] = energy.spring_energy(scene, fields["angles"])
         fields["kinetic_energy"] = np.zeros(len(read.samples))
         for name, body in bodies:

@@ -17,19 +17,24 @@ from rotor_mbs.models.exudyn.geometry import (
     pitching,
 )
 from rotor_mbs.models.exudyn.loads import tree_sensors
-from rotor_mbs.models.exudyn.timetable import RotorTorque
+from rotor_mbs.models.exudyn.timetable import ROTOR, Loads, Moment, constant_rest, pitch_terms
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import is_constant
 from rotor_mbs.solution.record import Array
 
 _TREE = Ref("object", "rotor")
 _NODE = Ref("node", "joint angles")
 
 
-def parts(scene: Scene, torque: RotorTorque) -> list[Part]:
+def parts(scene: Scene, loads: Loads) -> list[Part]:
     """Everything the engine holds for this scene, in the order it is built."""
     built = [_node(scene), _tree(scene)]
     if scene.has_torque:
-        built += _rotor_torque(scene, torque)
+        built += _torque("rotor torque", "rotor angle", 0, Moment(loads, ((ROTOR, 1.0),)), scene.has_constant_torque)
+    for number, blade in enumerate(pitching(scene), start=1):
+        if terms := pitch_terms(scene, blade):
+            name, is_fixed = f"{blade + 1}", all(map(is_constant, scene.pitch_load(blade)))
+            built += _torque(f"pitch torque {name}", f"pitch angle {name}", number, Moment(loads, terms), is_fixed)
     built += [
         sensor("angles", "SensorNode", "Coordinates", "joint angles", nodeNumber=_NODE),
         sensor("rates", "SensorNode", "Coordinates_t", "joint rates", nodeNumber=_NODE),
@@ -83,7 +88,7 @@ def _tree(scene: Scene) -> Part:
         detail += ", gravity"
     if any(stiffness := [scene.bearing(i)[0] for i in blades]):
         parameters["jointPControlVector"] = [0.0, *stiffness]
-        parameters["jointPositionOffsetVector"] = [0.0 for _ in links]
+        parameters["jointPositionOffsetVector"] = [0.0, *(constant_rest(scene, i) for i in blades)]
         detail += ", bearing stiffness"
     damping = [scene.shaft_damping, *(scene.bearing(i)[1] for i in blades)]
     if any(damping):
@@ -93,13 +98,13 @@ def _tree(scene: Scene) -> Part:
     return Part("object", _TREE.name, "ObjectKinematicTree", parameters, detail)
 
 
-def _rotor_torque(scene: Scene, torque: RotorTorque) -> list[Part]:
-    marker = Part("marker", "rotor angle", "MarkerNodeCoordinate", {"nodeNumber": _NODE, "coordinate": 0})
-    load: dict[str, object] = {"markerNumber": Ref("marker", marker.name), "load": scene.rotor_torque[0][1]}
-    if not scene.has_constant_torque:
-        load["loadUserFunction"] = torque.scalar
-    detail = "constant" if scene.has_constant_torque else "over time"
-    return [marker, Part("load", "rotor torque", "LoadCoordinate", load, detail)]
+def _torque(name: str, where: str, coordinate: int, moment: Moment, is_fixed: bool) -> list[Part]:
+    """A load on a coordinate of the tree."""
+    marker = Part("marker", where, "MarkerNodeCoordinate", {"nodeNumber": _NODE, "coordinate": coordinate})
+    load: dict[str, object] = {"markerNumber": Ref("marker", marker.name), "load": moment.at(0.0)}
+    if not is_fixed:
+        load["loadUserFunction"] = moment.scalar
+    return [marker, Part("load", name, "LoadCoordinate", load, "constant" if is_fixed else "over time")]
 
 
 def _tip_sensor(scene: Scene, blade: int) -> Part:

@@ -6,13 +6,14 @@ together with a sine and a cosine for that kind, and contains no branch on a val
 Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ.
 T = ½ J_hub Ω² + ½ Σ ω·J ω with ω = (Ω s, Ω c, θ̇) and J the blade's inertia about the hub centre, so
 T = ½ (J_hub + Σ a) Ω² + Σ b Ω θ̇ + ½ Σ Jzz θ̇²,  a = Jxx s² + Jyy c² + 2 Jxy s c,  b = Jxz s + Jyz c,
-V = Σ m g (z cos φ - (x c - y s) sin φ) + ½ k θ².
+V = Σ m g (z cos φ - (x c - y s) sin φ) + ½ k (θ - r)², r the rest angle of the spring.
 The mass matrix is an arrowhead; eliminating the pitches leaves the Schur complement S = J_hub + Σ (a - b²/Jzz).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rotor_mbs.models.lagrange.parameters import BladeForm, Number, RotorForm
@@ -20,31 +21,50 @@ from rotor_mbs.models.lagrange.parameters import BladeForm, Number, RotorForm
 Function = Callable[[Any], Any]
 
 
+@dataclass(frozen=True, slots=True)
+class LoadValues:
+    """Loads at one time, or over time as arrays.
+
+    rotor     N m on the rotor
+    pitches   (form.blades,) N m between hub and blade; () for none
+    rests     (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
+    """
+
+    rotor: Number
+    pitches: Sequence[Number] = ()
+    rests: Sequence[Number] = ()
+
+
+def load_values(values: Sequence[Any]) -> LoadValues:
+    """From one number for each of `parameters.load_tables`."""
+    blades = len(values) // 2
+    return LoadValues(values[0], values[1 : 1 + blades], values[1 + blades :])
+
+
 def accelerations(
-    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, torque: Number, sin: Function, cos: Function
+    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> list[Number]:
     """Rotor, then pitch accelerations in rad/s².
 
     angles, rates   1 + len(form.blades) numbers, rad and rad/s: rotor, then the pitches that move
-    torque          N m on the rotor
 
     Source: Lagrange's equations of T - V above. Singular where S = 0: point-mass blades all at ±π/2 on a massless hub.
     """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
     schur = form.inertia
-    moment = torque - form.shaft_damping * spin
+    moment = loads.rotor - form.shaft_damping * spin
     for weight, cos_phase, sin_phase in form.fixed:
         moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
     # s and c stand outside: an integrator that works with series pays for every product of two of them.
     pitches = []
-    for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
+    for blade, theta, rate, torque, rest in _pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
         s_turn, c_turn = s * (spin * spin), c * (spin * spin)
         ratio = blade.ratio_s * s + blade.ratio_c * c  # b / Jzz
-        resistance = blade.stiffness * theta + blade.damping * rate
+        resistance = blade.stiffness * (theta - rest) + blade.damping * rate - torque
         # ½ ∂a/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
         on_s = blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
         on_c = blade.half_slope_cs * c_turn - blade.weight_y * sin_phi
@@ -66,17 +86,37 @@ def accelerations(
     return found
 
 
-def power(rates: Sequence[Number], form: RotorForm, torque: Number) -> Number:
-    """W: of the torque, less what shaft and bearing dampers take."""
+def _pitches(
+    form: RotorForm, angles: Sequence[Number], rates: Sequence[Number], loads: LoadValues
+) -> Iterator[tuple[BladeForm, Number, Number, Number, Number]]:
+    """Of each pitch that moves: blade, angle, rate, torque, rest angle."""
+    nothing = (0.0,) * len(form.blades)
+    return zip(form.blades, angles[1:], rates[1:], loads.pitches or nothing, loads.rests or nothing, strict=True)
+
+
+def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number:
+    """W: of the torques and of the moments k r of springs at rest at r, less what shaft and bearing dampers take.
+
+    The work of a spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of
+    `rest_energy`.
+    """
     spin = rates[0]
-    total = torque * spin - form.shaft_damping * (spin * spin)
-    for blade, rate in zip(form.blades, rates[1:], strict=True):
-        total = total - blade.damping * (rate * rate)
+    total = loads.rotor * spin - form.shaft_damping * (spin * spin)
+    for blade, rate, _, torque, rest in _pitches(form, rates, rates, loads):
+        total = total + (torque + blade.stiffness * rest) * rate - blade.damping * (rate * rate)
     return total
 
 
+def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Number]) -> Number:
+    """J: what springs with these rest angles hold more than springs that are unloaded at 0, ½ k r (r - 2θ)."""
+    return sum(
+        0.5 * blade.stiffness * (rest * (rest - 2.0 * theta))
+        for blade, theta, rest in zip(form.blades, angles[1:], rests, strict=True)
+    )
+
+
 def energies(
-    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, sin: Function, cos: Function
+    angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> tuple[Number, Number]:
     """Kinetic and potential energy in J (gravity about the shaft's height, and bearing springs)."""
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
@@ -85,13 +125,13 @@ def energies(
     potential = 0.0 * sin_q
     for weight, cos_phase, sin_phase in form.fixed:
         potential = potential + weight * (cos_q * cos_phase - sin_q * sin_phase)
-    for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
+    for blade, theta, rate, _, rest in _pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
         kinetic = kinetic + _kinetic(blade, s, c, spin, rate)
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
         height = cos_phi * blade.weight_z - sin_phi * (blade.weight_x * c - blade.weight_y * s)
-        potential = potential + height + 0.5 * blade.stiffness * (theta * theta)
+        potential = potential + height + 0.5 * blade.stiffness * ((theta - rest) * (theta - rest))
     return kinetic, potential
 
 

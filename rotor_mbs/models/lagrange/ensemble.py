@@ -18,6 +18,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
+from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.models.lagrange.system import (
     build_system,
     compiled,
@@ -117,7 +118,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
     rotors: dict[tuple[object, ...], _RotorNumbers] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
     for i, scene in enumerate(scenes):
-        if not scene.has_constant_torque:
+        if not scene.has_constant_loads:
             _solve_alone(block, i, scene, tolerance)
             continue
         key = scene.rotor_key
@@ -131,7 +132,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
 
 
 def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
-    """A torque that changes is integrated segment by segment, which runs side by side would do at different times."""
+    """A load that changes is integrated segment by segment, which runs side by side would do at different times."""
     run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
     n = len(run.trajectory.time)
     for name, values in block.quantities.items():
@@ -172,7 +173,7 @@ def _observables(example: Scene) -> Any:
     """
     engine = heyoka()
     parameters = Parameters()
-    form, _ = equation_numbers(example, parameters)
+    form, loads = equation_numbers(example, parameters)
     points = _tip_numbers(example, parameters)
     angles, rates = state_symbols(form)
     moving = dict(zip(example.moving_coordinates, angles, strict=True))
@@ -182,7 +183,7 @@ def _observables(example: Scene) -> Any:
         azimuth = angles[0] + example.phases[i]
         found += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos)
     if example.wants("energy"):
-        found += closed_form.energies(angles, rates, form, engine.sin, engine.cos)
+        found += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
     # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
     rows = [engine.expression(0.0) + row for row in found]
     return engine.cfunc(rows, [*angles, *rates], compact_mode=is_compact(example)) if rows else None
@@ -269,17 +270,11 @@ class _Group:
         if block.kinetic_energy is not None and block.potential_energy is not None and block.work is not None:
             block.kinetic_energy[places], block.potential_energy[places] = found[rows], found[rows + 1]
             has_work = len(states) > 2 * count
-            block.work[places] = states[2 * count] if has_work else _constant_work(scenes, states[0])
+            for i, place in enumerate(places):
+                block.work[place] = states[2 * count, i] if has_work else constant_work(scenes[i], block.angles[place])
         samples = states.shape[2] - np.isnan(states[0]).sum(axis=1)
         for i, integration, n in zip(places, integrations, samples.tolist(), strict=True):
             block.end(i, integration, n)
-
-
-def _constant_work(scenes: Sequence[Scene], angles: Array) -> Array:
-    """Of constant torques: τ·(q2 - q2(0)), exact."""
-    torques = np.array([scene.torque_at(0.0) for scene in scenes])
-    work: Array = torques[:, None] * (angles - angles[:, :1])
-    return work
 
 
 def _propagate(block: Block, group: _Group) -> None:

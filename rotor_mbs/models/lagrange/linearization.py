@@ -15,7 +15,9 @@ import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
+from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.record import Array
@@ -94,7 +96,9 @@ def linearize(
 ) -> Linearization:
     """The closed form linearized about `angles` (1 + blades,) rad and `rates` rad/s, under `torque` N m on the rotor.
 
-    Its coordinates are `moving_coordinates(scene)`. Raises ZeroDivisionError at the singular configuration.
+    Its coordinates are `moving_coordinates(scene)`. Pitch torques and rest angles are those at t = 0.
+
+    Raises ZeroDivisionError at the singular configuration.
 
     Examples
     --------
@@ -106,7 +110,8 @@ def linearize(
     form, columns = rotor_form(scene), moving_coordinates(scene)
     n = len(columns)
     state = Jet.variables([*(angles[i] for i in columns), *(rates[i] for i in columns)])
-    found = closed_form.accelerations(state[:n], state[n:], form, torque, sine, cosine)
+    loads = loads_at_start(scene, torque)
+    found = closed_form.accelerations(state[:n], state[n:], form, loads, sine, cosine)
     slopes = np.array([each.slope for each in found])
     return Linearization(-slopes[:, :n], -slopes[:, n:], np.array([each.value for each in found]))
 
@@ -119,8 +124,8 @@ def holding_torque(scene: Scene, speed: float) -> float:
 def steady_rotation(scene: Scene, speed: float) -> Array:
     """(1 + blades,) rad: angles at which the rotor turns steadily at `speed` rad/s, no gravity acting.
 
-    The pitches are stationary points of the amended potential V - ½ Ω² a, found from the scene's initial pitches
-    downhill; where those are stationary already, stable or not, they are kept. The drive holds the speed.
+    The pitches are stationary points of the amended potential V - ½ Ω² a - Σ τ θ, found downhill from the scene's
+    initial pitches; where those are stationary already, stable or not, they are kept. The drive holds the speed.
 
     Raises InputError where there is none within 200 steps.
     """
@@ -139,22 +144,22 @@ def equilibrium(scene: Scene) -> Array:
 
 def _stationary(scene: Scene, speed: float, *, fixed_rotor: bool) -> Array:
     """Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes downhill."""
-    form, columns = rotor_form(scene), list(moving_coordinates(scene))
+    form, columns, loads = rotor_form(scene), list(moving_coordinates(scene)), loads_at_start(scene)
     angles = np.array(scene.initial_angles, dtype=float)
     free = slice(1, None) if fixed_rotor else slice(None)
     changed = columns[free]
     for _ in range(_STEPS):
-        potential = amended_potential(form, angles[columns], speed)
+        potential = amended_potential(form, angles[columns], speed, loads)
         step = _newton_step(form, potential, free, downhill=True)
         if np.abs(step).max(initial=0.0) < _CLOSE:
             for _ in range(3):
-                potential = amended_potential(form, angles[columns], speed)
+                potential = amended_potential(form, angles[columns], speed, loads)
                 angles[changed] += _newton_step(form, potential, free, downhill=False)
             return _steady(scene, angles, speed)
         trial = angles.copy()
         for halving in range(30):
             trial[changed] = angles[changed] + 0.5**halving * step
-            if _is_lower(amended_potential(form, trial[columns], speed), potential, step, free):
+            if _is_lower(amended_potential(form, trial[columns], speed, loads), potential, step, free):
                 break
         angles = trial
     raise InputError(f"{scene.name}: no steady state at {speed:g} rad/s found in {_STEPS} steps from its start")
@@ -169,11 +174,16 @@ def _is_lower(trial: Jet, start: Jet, step: Array, free: slice) -> bool:
     return trial.value <= allowed and bool(trial.slope[free] @ step <= -0.8 * (start.slope[free] @ step))
 
 
-def amended_potential(form: RotorForm, angles: Sequence[float] | Array, speed: float) -> Jet:
-    """V - T in J, the pitches at rest and the rotor turning at `speed` rad/s, with its derivatives by the angles."""
+def amended_potential(form: RotorForm, angles: Sequence[float] | Array, speed: float, loads: LoadValues) -> Jet:
+    """V - T in J, the pitches at rest and the rotor turning at `speed` rad/s, with its derivatives by the angles.
+
+    V has the potential of the constant pitch torques, too; the rotor's torque is left out.
+    """
     variables = Jet.variables(list(angles))
     rates = [speed, *(0.0 for _ in form.blades)]
-    kinetic, potential = closed_form.energies(variables, rates, form, sine, cosine)
+    kinetic, potential = closed_form.energies(variables, rates, form, loads, sine, cosine)
+    for pitch, torque in zip(variables[1:], loads.pitches, strict=True):
+        potential = potential - torque * pitch
     return potential - kinetic  # type: ignore[no-any-return]
 
 

@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, heyoka
-from rotor_mbs.models.lagrange.parameters import Convert, Number, phase_of, rotor_form, torque_before
+from rotor_mbs.models.lagrange.parameters import Convert, Number, load_tables, loads_before, phase_of, rotor_form
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array
 
@@ -92,15 +93,15 @@ def loads(
     motion: Motion,
     hub_inertia: Number,
     gravity: Number,
-    torque: Number,
+    applied: LoadValues,
     sin: Function,
     cos: Function,
 ) -> Loads:
-    """All loads of a motion; hub_inertia in kg m², gravity in m/s², torque on the rotor in N m."""
+    """All loads of a motion; hub_inertia in kg m², gravity in m/s²; applied: of every blade, pitching or not."""
     sin_q, cos_q = sin(motion.angles[0]), cos(motion.angles[0])
     forces, moments, actuators = [], [], []
     shaft_force: Vector = (0.0 * sin_q,) * 3
-    shaft_moment: Vector = (0.0, hub_inertia * motion.accelerations[0] - torque, 0.0)
+    shaft_moment: Vector = (0.0, hub_inertia * motion.accelerations[0] - applied.rotor, 0.0)
     for i, body in enumerate(bodies, start=1):
         azimuth = (
             sin_q * body.cos_phase + cos_q * body.sin_phase,
@@ -111,7 +112,8 @@ def loads(
         force, moment = root_load(body, azimuth, pitch, turning, gravity)
         forces.append(force)
         moments.append(moment)
-        actuators.append(-(body.stiffness * motion.angles[i]) - body.damping * motion.rates[i])
+        deflection = motion.angles[i] - applied.rests[i - 1]
+        actuators.append(applied.pitches[i - 1] - body.stiffness * deflection - body.damping * motion.rates[i])
         shaft_force = _sum(shaft_force, _in_base_frame(force, azimuth, pitch))
         shaft_moment = _sum(shaft_moment, _in_base_frame(moment, azimuth, pitch))
     return Loads(forces, moments, shaft_force, shaft_moment, actuators)
@@ -160,16 +162,17 @@ def _applied(inertia: Sequence[Number], v: Vector) -> Vector:
 
 def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
     """The load quantities at the samples, in double precision; angles and rates (n, 1 + blades) rad, rad/s."""
-    moving, torque = scene.moving_coordinates, torque_before(scene, times)
+    moving, applied = scene.moving_coordinates, load_values(loads_before(scene, times))
     accelerations: list[Any] = [0.0] * angles.shape[1]
     with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
         found = closed_form.accelerations(
-            list(angles[:, moving].T), list(rates[:, moving].T), rotor_form(scene), torque, np.sin, np.cos
+            list(angles[:, moving].T), list(rates[:, moving].T), rotor_form(scene), applied, np.sin, np.cos
         )
         for column, values in zip(moving, found, strict=True):
             accelerations[column] = values
         motion = Motion(list(angles.T), list(rates.T), accelerations)
-        numbers = loads(blade_bodies(scene), motion, scene.hub_inertia, scene.gravity, torque, np.sin, np.cos).numbers()
+        every = _of_every_blade(scene, applied)
+        numbers = loads(blade_bodies(scene), motion, scene.hub_inertia, scene.gravity, every, np.sin, np.cos).numbers()
     return _named(scene, np.array([np.broadcast_to(values, times.shape) for values in numbers]))
 
 
@@ -178,9 +181,11 @@ def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
     engine, parameters = heyoka(), Parameters()
     form, moving = rotor_form(scene, parameters), scene.moving_coordinates
     count = len(moving)
-    names = [*(f"q{i}" for i in range(count)), *(f"w{i}" for i in range(count)), "torque"]
-    *state, torque = engine.make_vars(*names)
-    found = closed_form.accelerations(state[:count], state[count:], form, torque, engine.sin, engine.cos)
+    tables = load_tables(scene)
+    names = [f"{letter}{i}" for letter, n in (("q", count), ("w", count), ("load", len(tables))) for i in range(n)]
+    symbols = engine.make_vars(*names)
+    state, applied = symbols[: 2 * count], load_values(symbols[2 * count :])
+    found = closed_form.accelerations(state[:count], state[count:], form, applied, engine.sin, engine.cos)
     angles = [parameters.own(Fraction(angle)) for angle in scene.initial_angles]
     rates, accelerations = [0.0] * len(angles), [0.0] * len(angles)
     for i, column in enumerate(moving):
@@ -188,15 +193,31 @@ def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
     bodies = blade_bodies(scene, parameters)
     hub, gravity = parameters(Fraction(scene.hub_inertia)), parameters(Fraction(scene.gravity))
     numbers = loads(
-        bodies, Motion(angles, rates, accelerations), hub, gravity, torque, engine.sin, engine.cos
+        bodies,
+        Motion(angles, rates, accelerations),
+        hub,
+        gravity,
+        _of_every_blade(scene, applied),
+        engine.sin,
+        engine.cos,
     ).numbers()
     rows = [engine.expression(0.0) + number for number in numbers]
-    function = engine.cfunc(rows, [*state, torque], fp_type=engine.real128, compact_mode=True)
-    torques = array_of([Fraction(value) for value in torque_before(scene, times).tolist()], quad=True)
-    inputs = np.ascontiguousarray(np.vstack([states[:, : 2 * count].T, torques]))
+    function = engine.cfunc(rows, symbols, fp_type=engine.real128, compact_mode=True)
+    values = [
+        array_of([Fraction(x) for x in over_time.tolist()], quad=True) for over_time in loads_before(scene, times)
+    ]
+    inputs = np.ascontiguousarray(np.vstack([states[:, : 2 * count].T, *values]))
     pars = array_of(parameters.values, quad=True)
     spread = np.ascontiguousarray(np.repeat(pars[:, None], len(times), axis=1))
     return _named(scene, function(inputs, pars=spread).astype(float))
+
+
+def _of_every_blade(scene: Scene, applied: LoadValues) -> LoadValues:
+    """Zero where the pitch does not move."""
+    torques, rests = ([0.0] * len(scene.blades) for _ in range(2))
+    for column, torque, rest in zip(scene.moving_coordinates[1:], applied.pitches, applied.rests, strict=True):
+        torques[column - 1], rests[column - 1] = torque, rest
+    return LoadValues(applied.rotor, torques, rests)
 
 
 def _named(scene: Scene, numbers: Array) -> dict[str, Array]:

@@ -13,14 +13,15 @@ from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
+from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.parameters import (
+    LoadSegment,
     RotorForm,
-    TorqueSegment,
+    load_segments,
     rotor_form,
-    torque_segments,
     work_is_integrated,
 )
-from rotor_mbs.models.lagrange.samples import Advance, over_segments
+from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
@@ -34,7 +35,7 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per segment of the torque.
+    """Any integrator over the scene, one call per segment of the loads.
 
     times           as of `system.Propagation`
     accelerations   the equations, where they are not the closed form as it is
@@ -51,7 +52,7 @@ class OdeSolver:
         self._accelerations = accelerations
         self._integrator = integrator
         self._form = rotor_form(scene)
-        self._segments = torque_segments(scene)
+        self._segments = load_segments(scene)
         self._has_work = work_is_integrated(scene)
         columns = scene.moving_coordinates
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
@@ -63,8 +64,10 @@ class OdeSolver:
         self._states, integration = over_segments(self._times, self._segments, self._initial, self._advance)
         return integration
 
-    def _advance(self, segment: TorqueSegment, state: Array, times: Array) -> Advance:
-        function = right_hand_side(self._form, segment, with_work=self._has_work, accelerations=self._accelerations)
+    def _advance(self, segment: LoadSegment, state: Array, times: Array) -> Advance:
+        function = right_hand_side(
+            self._scene, self._form, segment, with_work=self._has_work, accelerations=self._accelerations
+        )
         return self._integrator(function, segment.start, segment.end, state, times)
 
     def observe(self) -> Trajectory:
@@ -72,8 +75,9 @@ class OdeSolver:
 
 
 def right_hand_side(
+    scene: Scene,
     form: RotorForm,
-    segment: TorqueSegment,
+    segment: LoadSegment,
     *,
     with_work: bool,
     accelerations: Accelerations | None = None,
@@ -81,18 +85,20 @@ def right_hand_side(
     """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
     equations = accelerations or closed_form.accelerations
     count = 1 + len(form.blades)
-    offset, slope = float(segment.offset), float(segment.slope)
+    lines = [(float(offset), float(slope)) for offset, slope in segment.lines]
+    start = load_values([offset for offset, _ in lines])
+    constant = start if not any(slope for _, slope in lines) else None
 
     def derivative(time: float, state: Sequence[float]) -> list[float]:
         values = state.tolist() if isinstance(state, np.ndarray) else state
         angles, rates = values[:count], values[count : 2 * count]
-        torque = offset + slope * time
+        loads = constant or load_values([offset + slope * time for offset, slope in lines])
         try:
-            found = equations(angles, rates, form, torque, math.sin, math.cos)
+            found = equations(angles, rates, form, loads, math.sin, math.cos)
         except (ZeroDivisionError, ValueError, OverflowError):
             # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
             return [math.nan] * len(values)
-        work = [closed_form.power(rates, form, torque)] if with_work else []
+        work = [closed_form.power(rates, form, at_constant_rests(scene, loads))] if with_work else []
         return [*rates, *found, *work]
 
     return derivative

@@ -1,4 +1,4 @@
-"""A scene's numbers as the closed form needs them: coefficients, torque segments, units of rates.
+"""A scene's numbers as the closed form needs them: coefficients, load segments, units of rates.
 
 Coefficients and segments are in exact rational arithmetic until the last step. Why: for a point mass the coefficients
 Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating point they leave a rounding remainder, and near
@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.time_table import Table, is_constant, knots
 from rotor_mbs.solution.record import Array
 
 # A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic parameter.
@@ -162,42 +163,60 @@ def _cosine_of_turn(turn: Fraction) -> Fraction:
     return Fraction(total, _ONE).limit_denominator(10**50)
 
 
-class TorqueSegment(NamedTuple):
-    """From `start` to `end` (s) the torque is offset + slope·t (N m, N m/s; exact)."""
+class LoadSegment(NamedTuple):
+    """From `start` to `end` (s) load i is lines[i] = (offset, slope): offset + slope·t (N m or rad, per s; exact).
+
+    The loads are those of `load_tables`.
+    """
 
     start: float
     end: float
-    offset: Fraction
-    slope: Fraction
+    lines: tuple[tuple[Fraction, Fraction], ...]
 
 
-def torque_segments(scene: Scene) -> list[TorqueSegment]:
-    """The whole duration, cut where the torque has a kink or a jump; one segment where it is constant."""
-    table = [(Fraction(t), Fraction(torque)) for t, torque in scene.rotor_torque]
-    if scene.has_constant_torque:
-        return [TorqueSegment(0.0, scene.duration, table[0][1] if table else Fraction(0), Fraction(0))]
-    end = Fraction(scene.duration)
-    rows = [(Fraction(0), table[0][1]), *table, (max(end, table[-1][0]), table[-1][1])]
-    segments = []
-    for (t0, torque0), (t1, torque1) in itertools.pairwise(rows):
-        if t0 < min(t1, end):
-            slope = (torque1 - torque0) / (t1 - t0)
-            segments.append(TorqueSegment(float(t0), float(min(t1, end)), torque0 - slope * t0, slope))
-    return segments
+def load_tables(scene: Scene) -> tuple[Table, ...]:
+    """Loads over time: rotor torque, then the torque of each pitch that moves, then the rest angle of each."""
+    pitches = [scene.pitch_load(column - 1) for column in scene.moving_coordinates[1:]]
+    return (scene.rotor_torque, *(torque for torque, _ in pitches), *(rest for _, rest in pitches))
 
 
-def torque_before(scene: Scene, times: Array) -> Array:
-    """(n,) N m on the rotor at `times` (s); at a jump the value before it, at 0 the one after."""
-    segments = torque_segments(scene)
+def changing_loads(scene: Scene) -> tuple[int, ...]:
+    """Which of `load_tables` change over time."""
+    return tuple(i for i, table in enumerate(load_tables(scene)) if not is_constant(table))
+
+
+def load_segments(scene: Scene) -> list[LoadSegment]:
+    """The whole duration, cut where a load has a kink or a jump; one segment where all are constant."""
+    tables = load_tables(scene)
+    cuts = [0.0, *knots(tables, scene.duration), scene.duration]
+    return [
+        LoadSegment(start, end, tuple(_line(table, start, end) for table in tables))
+        for start, end in itertools.pairwise(cuts)
+    ]
+
+
+def _line(table: Table, start: float, end: float) -> tuple[Fraction, Fraction]:
+    """Offset and slope of a table that has no kink between `start` and `end`."""
+    if is_constant(table):
+        return Fraction(table[0][1] if table else 0), Fraction(0)
+    before = [row for row in table if row[0] <= start] or [table[0]]
+    after = [row for row in table if row[0] >= end] or [table[-1]]
+    (t0, value0), (t1, value1) = (map(Fraction, row) for row in (before[-1], after[0]))
+    slope = (value1 - value0) / (t1 - t0) if t1 > t0 and value1 != value0 else Fraction(0)
+    return value0 - slope * t0, slope
+
+
+def loads_before(scene: Scene, times: Array) -> list[Array]:
+    """(n,) of each of `load_tables` at `times` (s): at a jump the value before it, at 0 the one after."""
+    segments = load_segments(scene)
     which = np.searchsorted([segment.end for segment in segments[:-1]], times)
-    offsets, slopes = (np.array([float(segment[k]) for segment in segments]) for k in (2, 3))
-    torque: Array = offsets[which] + slopes[which] * times
-    return torque
+    lines = np.array([[(float(offset), float(slope)) for offset, slope in segment.lines] for segment in segments])
+    return list((lines[which, :, 0] + lines[which, :, 1] * times[:, None]).T)
 
 
 def work_is_integrated(scene: Scene) -> bool:
-    """Whether the work is a variable of the equations: of a constant torque without dampers it is known exactly."""
-    return scene.wants("energy") and (scene.has_damping or not scene.has_constant_torque)
+    """Whether the work is a variable of the equations: of constant loads without dampers it is known exactly."""
+    return scene.wants("energy") and (scene.has_damping or not scene.has_constant_loads)
 
 
 # Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).

@@ -1,4 +1,4 @@
-"""The run of any integrator from segment to segment of the torque, and what its states are as a trajectory."""
+"""The run of any integrator from segment to segment of the loads, and what its states are as a trajectory."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.loads import sampled_loads
-from rotor_mbs.models.lagrange.parameters import TorqueSegment, rotor_form
+from rotor_mbs.models.lagrange.parameters import LoadSegment, RotorForm, changing_loads, load_tables, rotor_form
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 
@@ -34,9 +36,9 @@ class Advance(NamedTuple):
 
 def over_segments(
     times: Array,
-    segments: Sequence[TorqueSegment],
+    segments: Sequence[LoadSegment],
     initial: Any,
-    advance: Callable[[TorqueSegment, Any, Array], Advance],
+    advance: Callable[[LoadSegment, Any, Array], Advance],
 ) -> tuple[Any, Integration]:
     """States at the samples, (n, variables), cut before the first row that is not finite; and the engine's report.
 
@@ -81,20 +83,59 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
         ]
         result.tip = np.ascontiguousarray(np.array([np.broadcast_arrays(*path) for path in paths]).transpose(2, 0, 1))
     if scene.wants("energy"):
-        form = rotor_form(scene)
-        with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200; the judgement sees what is not finite
-            result.kinetic_energy, result.potential_energy = closed_form.energies(
-                list(angles[:, columns].T), list(rates[:, columns].T), form, np.sin, np.cos
-            )
-        result.work = states[:, 2 * count] if states.shape[1] > 2 * count else _constant_work(scene, angles)
+        _put_energies(scene, result, states)
     if scene.wants("loads"):
         result.quantities |= sampled_loads(scene, time, angles, rates)
     return result
 
 
-def _constant_work(scene: Scene, angles: Array) -> Array:
-    """Of a constant torque: τ·(q2 - q2(0)), exact."""
-    return scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
+def _put_energies(scene: Scene, result: Trajectory, states: Array) -> None:
+    form, columns = rotor_form(scene), scene.moving_coordinates
+    angles, rates = list(result.angles[:, columns].T), list(result.rates[:, columns].T)
+    loads = loads_at(scene, result.time)
+    with np.errstate(over="ignore", invalid="ignore"):  # of rates like 1e200; the judgement sees what is not finite
+        result.kinetic_energy, result.potential_energy = closed_form.energies(
+            angles, rates, form, loads, np.sin, np.cos
+        )
+        if states.shape[1] <= 2 * len(columns):
+            result.work = constant_work(scene, result.angles)
+        else:
+            result.work = states[:, 2 * len(columns)] + _work_of_rests(scene, form, angles, loads)
+
+
+def loads_at(scene: Scene, time: Array) -> LoadValues:
+    """Loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
+    values: list[Any] = [value_at(table, 0.0) for table in load_tables(scene)]
+    for i in changing_loads(scene):
+        values[i] = np.array([value_at(load_tables(scene)[i], t) for t in time.tolist()])
+    return load_values(values)
+
+
+def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
+    """Numbers: loads of the pitches at t = 0, with `torque` (N m) on the rotor in place of the scene's."""
+    return load_values([torque, *(value_at(table, 0.0) for table in load_tables(scene)[1:])])
+
+
+def at_constant_rests(scene: Scene, loads: LoadValues) -> LoadValues:
+    """`loads` without the rest angles that are constant: those do no work."""
+    first = 1 + len(loads.pitches)
+    rests = [rest if first + i in changing_loads(scene) else 0.0 for i, rest in enumerate(loads.rests)]
+    return LoadValues(loads.rotor, loads.pitches, rests)
+
+
+def _work_of_rests(scene: Scene, form: RotorForm, angles: Sequence[Array], loads: LoadValues) -> Any:
+    """(n,) J: what `closed_form.power` leaves out of the work of rest angles that move; 0 where none does."""
+    energy = closed_form.rest_energy(angles, form, at_constant_rests(scene, loads).rests)
+    return energy - energy[0] if isinstance(energy, np.ndarray) else 0.0
+
+
+def constant_work(scene: Scene, angles: Array) -> Array:
+    """(n,) J of constant torques from (n, 1 + blades) rad: τ·(q - q(0)), exact."""
+    work: Array = scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
+    for i in range(len(scene.pitch_torque)):
+        torque, _ = scene.pitch_load(i)
+        work = work + value_at(torque, 0.0) * (angles[:, 1 + i] - scene.initial_angles[1 + i])
+    return work
 
 
 def items(scene: Scene) -> list[BuiltItem]:
@@ -110,7 +151,9 @@ def items(scene: Scene) -> list[BuiltItem]:
         "hub inertia": scene.hub_inertia != 0.0,
         "gravity": scene.gravity != 0.0,
         "rotor torque": scene.has_torque,
+        "pitch torque": any(scene.pitch_torque),
         "bearing stiffness": any(scene.bearing_stiffness),
+        "bearing rest angle": any(scene.pitch_load(i - 1)[1] for i in moving[1:]),
         "bearing damping": any(scene.bearing_damping),
         "shaft damping": scene.shaft_damping != 0.0,
     }

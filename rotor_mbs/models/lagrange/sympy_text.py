@@ -10,7 +10,8 @@ from fractions import Fraction
 from string import Template
 
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.parameters import rotor_form, torque_segments
+from rotor_mbs.models.lagrange.closed_form import load_values
+from rotor_mbs.models.lagrange.parameters import load_segments, load_tables, rotor_form
 from rotor_mbs.scenario.scene import Scene
 
 
@@ -70,16 +71,20 @@ def sympy_text(scene: Scene) -> str:
 
     q, w, a are angles (rad), rates and accelerations of the coordinates that move, rotor first. The program defines
     the kinetic and potential energy T and V (J), the torque tau (N m) over time t (s), the generalized forces Q (N m)
-    of torque and dampers, the mass matrix M and the right-hand side f by Lagrange's equations, and the initial state.
+    of torques and dampers, the mass matrix M and the right-hand side f by Lagrange's equations, and the initial state.
     """
     form = rotor_form(scene, _constant)
     moving = scene.moving_coordinates
     q, w = ([_Term(f"{name}{i}") for i in moving] for name in "qw")
+    tables = load_tables(scene)
+    names = ["tau", *(f"tau{i}" for i in moving[1:]), *(f"rest{i}" for i in moving[1:])]
+    values = [_Term(name) if table else _constant(0.0) for name, table in zip(names, tables, strict=True)]
+    loads = load_values([_Term("tau"), *values[1:]])
     kinetic, potential = closed_form.energies(
-        q, w, form, lambda x: _Term(f"sin({x.text})"), lambda x: _Term(f"cos({x.text})")
+        q, w, form, loads, lambda x: _Term(f"sin({x.text})"), lambda x: _Term(f"cos({x.text})")
     )
     dampings = [form.shaft_damping, *(blade.damping for blade in form.blades)]
-    moments = [_Term("tau"), *(_constant(0.0) for _ in form.blades)]
+    moments = [loads.rotor, *loads.pitches]
     forces = [moment - damping * rate for moment, damping, rate in zip(moments, dampings, w, strict=True)]
     return _PROGRAM.substitute(
         title=(scene.title or scene.name).replace("\n", " "),
@@ -88,7 +93,7 @@ def sympy_text(scene: Scene) -> str:
         legend="\n".join(f"#   q{i}, w{i}   {scene.coordinate_labels[i]}" for i in moving),
         q=", ".join(f"q{i}" for i in moving),
         w=", ".join(f"w{i}" for i in moving),
-        torque=_torque(scene),
+        loads="\n".join(f"{name} = {_over_time(scene, i)}" for i, name in enumerate(names) if i == 0 or tables[i]),
         kinetic=kinetic.text,
         potential=potential.text,
         forces=", ".join(force.text for force in forces),
@@ -98,15 +103,16 @@ def sympy_text(scene: Scene) -> str:
     )
 
 
-def _torque(scene: Scene) -> str:
-    """N m over time, piecewise linear; at a jump, the value after it."""
-    lines = [
-        (f"{float(part.offset)!r} + {float(part.slope)!r}*t" if part.slope else repr(float(part.offset)), part.end)
-        for part in torque_segments(scene)
+def _over_time(scene: Scene, load: int) -> str:
+    """A load over time, piecewise linear; at a jump, the value after it."""
+    lines = [(part.lines[load], part.end) for part in load_segments(scene)]
+    texts = [
+        (f"{float(offset)!r} + {float(slope)!r}*t" if slope else repr(float(offset)), end)
+        for (offset, slope), end in lines
     ]
-    if len(lines) == 1:
-        return f"sympify({lines[0][0]})"
-    parts = [f"({text}, t < {end!r})" for text, end in lines[:-1]] + [f"({lines[-1][0]}, True)"]
+    if len({line for line, _ in lines}) == 1:
+        return f"sympify({texts[0][0]})"
+    parts = [f"({text}, t < {end!r})" for text, end in texts[:-1]] + [f"({texts[-1][0]}, True)"]
     return f"Piecewise({', '.join(parts)})"
 
 
@@ -115,7 +121,8 @@ _PROGRAM = Template("""\
 #
 # Equations of motion M(q) a = f(q, w, t) in SI units and rad. Angles, and their rates:
 $legend
-# T, V: kinetic and potential energy, J; Q: moments of torque and dampers, N m; tau: torque on the rotor, N m.
+# T, V: kinetic and potential energy, J; Q: moments of torques and dampers, N m; tau: torque on the rotor, N m; tau1,
+# rest1, ...: torque (N m) on pitch 1 and angle (rad) at which its spring is unloaded, where there are such.
 
 from sympy import Matrix, Piecewise, cos, diff, hessian, sin, symbols, sympify
 
@@ -123,10 +130,11 @@ t = symbols("t", real=True)
 $names = symbols("$letters", real=True)
 q, w = [$q], [$w]
 
+$loads
+
 T = $kinetic
 V = $potential
 
-tau = $torque
 Q = [$forces]
 
 # Lagrange's equations of T - V.

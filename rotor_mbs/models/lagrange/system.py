@@ -13,15 +13,17 @@ import numpy as np
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.lagrange import closed_form, samples
+from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import (
+    LoadSegment,
     RotorForm,
-    TorqueSegment,
+    changing_loads,
+    load_segments,
     rotor_form,
-    torque_segments,
     work_is_integrated,
 )
-from rotor_mbs.models.lagrange.samples import Advance, over_segments
+from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
@@ -34,29 +36,30 @@ class EquationSystem:
     """First-order equations of a scene.
 
     equations   [(symbol, right-hand side)]: angles, rates, and the work where it is not known in closed form
-    parameters  their numbers; the last two are the torque's offset and slope where the torque is not constant
+    parameters  their numbers; the last ones are offset and slope of each load that changes over time
+    changing    those loads, as in `parameters.changing_loads`
     """
 
     equations: list[tuple[Any, Any]]
     parameters: Parameters
-    has_constant_torque: bool
+    changing: tuple[int, ...]
 
     @property
     def structure(self) -> tuple[int, ...]:
-        return (*self.parameters.structure, len(self.equations), self.has_constant_torque)
+        return (*self.parameters.structure, len(self.equations), *self.changing)
 
 
 def build_system(scene: Scene) -> EquationSystem:
     """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed."""
     engine = heyoka()
     parameters = Parameters()
-    form, torque = equation_numbers(scene, parameters)
+    form, loads = equation_numbers(scene, parameters)
     angles, rates = state_symbols(form)
-    found = closed_form.accelerations(angles, rates, form, torque, engine.sin, engine.cos)
+    found = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
     equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
     if work_is_integrated(scene):
-        equations.append((engine.make_vars("work"), closed_form.power(rates, form, torque)))
-    return EquationSystem(equations, parameters, scene.has_constant_torque)
+        equations.append((engine.make_vars("work"), closed_form.power(rates, form, at_constant_rests(scene, loads))))
+    return EquationSystem(equations, parameters, changing_loads(scene))
 
 
 def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
@@ -66,13 +69,15 @@ def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
     return symbols[:count], symbols[count:]
 
 
-def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, Any]:
-    """Form, and torque in N m; takes the scene's numbers into `parameters`, in the order that integrators have them."""
+def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, LoadValues]:
+    """Form and loads; takes the scene's numbers into `parameters`, in the order that integrators have them."""
     form = rotor_form(scene, parameters)
-    first = torque_segments(scene)[0]
-    if scene.has_constant_torque:
-        return form, parameters(first.offset)
-    return form, parameters.own(first.offset) + parameters.own(first.slope) * heyoka().time
+    lines, changing = load_segments(scene)[0].lines, changing_loads(scene)
+    values = [0.0 if i in changing else parameters(offset) for i, (offset, _) in enumerate(lines)]
+    for i in changing:
+        offset, slope = lines[i]
+        values[i] = parameters.own(offset) + parameters.own(slope) * heyoka().time
+    return form, load_values(values)
 
 
 _compiled: dict[tuple[object, ...], Any] = {}
@@ -129,8 +134,8 @@ class Propagation:
         self._integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options))
         set_parameters(self._integrator, array_of(system.parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
-        self._torque = None if system.has_constant_torque else len(system.parameters.values) - 2
-        self._segments = torque_segments(scene)
+        self._changing = system.changing
+        self._segments = load_segments(scene)
         self.times = np.linspace(0.0, scene.duration, scene.samples) if times is None else times
         self.states = self._initial[None, :]
 
@@ -140,11 +145,12 @@ class Propagation:
         self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
         return integration
 
-    def _advance(self, segment: TorqueSegment, _state: Array, times: Array) -> Advance:
+    def _advance(self, segment: LoadSegment, _state: Array, times: Array) -> Advance:
         """From where the integrator is, the end of the segment before."""
         integrator, kind = self._integrator, self._initial.dtype
-        if self._torque is not None:
-            integrator.pars[self._torque :] = array_of([segment.offset, segment.slope], quad=kind != np.float64)
+        if self._changing:
+            numbers = [number for i in self._changing for number in segment.lines[i]]
+            integrator.pars[-len(numbers) :] = array_of(numbers, quad=kind != np.float64)
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with deadline.polled():

@@ -16,6 +16,7 @@ import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.linearization import (
     Jet,
@@ -26,9 +27,11 @@ from rotor_mbs.models.lagrange.linearization import (
     sine,
     steady_rotation,
 )
-from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
+from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.models.lagrange.system import compiled
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.record import Array
 
 # What is left of a turn's mismatch, in rad and in shares of the speed: Newton's method ends at the first, and its best
@@ -119,14 +122,15 @@ def _not_found(speed: float, n: int, message: str) -> Turn:
 
 
 def _invariants(scene: Scene, state: Array, torque: float) -> tuple[Array, Array]:
-    """(2n,) gradient of energy less the torque's work, zero where dampers act; (2n,) time derivative of the state."""
+    """(2n,) gradient of energy less the torques' work, zero where dampers act; (2n,) time derivative of the state."""
     form, n = rotor_form(scene), len(state) // 2
     variables = Jet.variables(state)
-    kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, sine, cosine)
+    loads = loads_at_start(scene, torque)
+    kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
     gradient = (kinetic + potential).slope
-    gradient[0] -= torque
+    gradient[:n] -= [torque, *loads.pitches]
     angles, rates = state[:n].tolist(), state[n:].tolist()
-    found = closed_form.accelerations(angles, rates, form, torque, math.sin, math.cos)
+    found = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
     return (np.zeros(2 * n) if scene.has_damping else gradient), np.array([*rates, *found])
 
 
@@ -148,10 +152,12 @@ class _Variational:
         parameters = Parameters()
         form = rotor_form(scene, parameters)
         n = self.coordinates = 1 + len(form.blades)
+        pitch_loads = [parameters(Fraction(value_at(table, 0.0))) for table in load_tables(scene)[1:]]
         torque = parameters.own(Fraction(0))
         symbols = engine.make_vars(*(f"q{i}" for i in range(n)), *(f"w{i}" for i in range(n)))
         angles, rates = symbols[:n], symbols[n:]
-        found = closed_form.accelerations(angles, rates, form, torque, engine.sin, engine.cos)
+        loads = load_values([torque, *pitch_loads])
+        found = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
         equations = [*zip(symbols, [*rates, *found], strict=True)]
 
         def make() -> object:

@@ -68,15 +68,15 @@ class Engine:
         _engine.mj_resetData(self._model, self._data)
         self._data.qpos[:], self._data.qvel[:] = angles, rates
 
-    def advance(self, step: float, steps: int, torques: Sequence[float], slopes: Sequence[float]) -> tuple[int, str]:
-        """So many equal steps of `step` s; torques N m at the start and slopes N m/s, by actuator.
+    def advance(self, step: float, steps: int, loads: Sequence[float], slopes: Sequence[float]) -> tuple[int, str]:
+        """So many equal steps of `step` s; activations (N m, rad) at the start and slopes per s, by actuator.
 
         Returns the steps taken, and why it ended before all were: the time limit, or a state that is not finite; "".
         """
         model, data = self._model, self._data
         model.opt.timestep = step
-        if torques:
-            data.act[:], data.ctrl[:] = torques, slopes
+        if loads:
+            data.act[:], data.ctrl[:] = loads, slopes
         taken = 0
         while taken < steps:
             if time_limit.is_over():
@@ -101,8 +101,8 @@ class Engine:
         """(coordinates,) rad and rad/s."""
         return self._data.qpos, self._data.qvel
 
-    def poses(self, angles: Array, rates: Array, torques: Array) -> Poses:
-        """At given states, (n, coordinates) rad and rad/s, (n, actuators) N m."""
+    def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
+        """At given states, (n, coordinates) rad and rad/s, (n, actuators) N m or rad."""
         model, data = self._model, self._data
         n, bodies = len(angles), model.nbody - 1
         centre, velocity, spin = np.empty((3, n, bodies, 3))
@@ -112,7 +112,7 @@ class Engine:
         six = np.empty(6)
         for k in range(n):
             data.qpos[:], data.qvel[:] = angles[k], rates[k]
-            data.act[:] = torques[k]
+            data.act[:] = loads[k]
             _engine.mj_forward(model, data)
             out.centre[k], out.site[k], out.acceleration[k] = data.xipos[1:], data.site_xpos, data.qacc
             for body in range(bodies):

@@ -6,7 +6,7 @@ import math
 from xml.etree import ElementTree as ET
 
 from rotor_mbs.models.mujoco import mjcf
-from rotor_mbs.models.mujoco.loads import loaded, segments, steps_and_rows
+from rotor_mbs.models.mujoco.loads import loads_of, segments, steps_and_rows
 from rotor_mbs.scenario.scene import Scene
 
 STEP = 2.5e-4  # s, of the file where none is given: the default of mujoco/rk4
@@ -18,8 +18,8 @@ def mjcf_file(scene: Scene, integrator: str = "rk4", step: float = STEP) -> str:
     integrator   "rk4" or "implicitfast"
     step         largest time step in s; the file's step is a whole part of the sample interval
 
-    The keyframe "start" has the initial state and the torques at t = 0. A numeric "segment i" has the time in s from
-    which torques follow it, then each actuator's torque in N m, then each one's slope in N m/s.
+    The keyframe "start" has the initial state and the loads at t = 0. A numeric "segment i" has the time in s from
+    which loads follow it, then each actuator's torque in N m (or rest angle in rad), then each one's slope per s.
     """
     spacing = scene.duration / (scene.samples - 1)
     steps, _ = steps_and_rows(spacing, step, rows_between=False)
@@ -27,18 +27,18 @@ def mjcf_file(scene: Scene, integrator: str = "rk4", step: float = STEP) -> str:
     root.insert(0, ET.Comment(_header(scene, steps)))
     _add_shapes(root, scene)
     pieces = segments(scene)
-    if loaded(scene):
+    if loads_of(scene):
         custom = ET.SubElement(root, "custom")
         for number, piece in enumerate(pieces, start=1):
-            data = mjcf.numbers(piece.start, *piece.torque, *piece.slope)
+            data = mjcf.numbers(piece.start, *piece.value, *piece.slope)
             ET.SubElement(custom, "numeric", name=f"segment {number}", data=data)
     keyframe = ET.SubElement(root, "keyframe")
     key = ET.SubElement(keyframe, "key", name="start")
     moving = mjcf.moving(scene)
     key.set("qpos", mjcf.numbers(*(scene.initial_angles[i] for i in moving)))
     key.set("qvel", mjcf.numbers(*(scene.initial_rates[i] for i in moving)))
-    if loaded(scene):
-        key.set("act", mjcf.numbers(*pieces[0].torque))
+    if loads_of(scene):
+        key.set("act", mjcf.numbers(*pieces[0].value))
         key.set("ctrl", mjcf.numbers(*pieces[0].slope))
     return mjcf.text(root)
 
@@ -49,10 +49,11 @@ def _header(scene: Scene, steps: int) -> str:
         f"SI units, rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from one to the next.",
         "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then mj_step(model, data, nstep=...).",
     ]
-    if loaded(scene):
+    if loads_of(scene):
         lines += [
-            "An actuator's activation is its torque in N m, its control the slope of the torque in N m/s.",
-            "At the start of each segment (custom numerics: time, torques, slopes) set data.act and data.ctrl to them.",
+            "An actuator's activation is its torque in N m, its control the slope of the torque in N m/s. An actuator",
+            '"rest ..." has the rest angle of a spring in rad instead, and the stiffness as its gain.',
+            "At the start of each segment (custom numerics: time, values, slopes) set data.act and data.ctrl to them.",
             "Where a segment starts between two steps, shorten model.opt.timestep to stop there.",
         ]
     lines.append("Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about the centre of mass.")

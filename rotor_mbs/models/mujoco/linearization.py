@@ -34,10 +34,10 @@ def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torqu
     engine = Engine(mjcf.text(mjcf.model(state, "rk4", 1e-3)), mjcf.LEAST)
     here = np.concatenate([np.array(values)[columns] for values in (state.initial_angles, state.initial_rates)])
     n = len(columns)
-    torques = np.array(segments(state)[0].at(0.0))
+    loads = np.array(segments(state)[0].at(0.0))
 
     def accelerations(states: Array) -> Array:
-        return engine.poses(states[:, :n], states[:, n:], np.tile(torques, (len(states), 1))).acceleration
+        return engine.poses(states[:, :n], states[:, n:], np.tile(loads, (len(states), 1))).acceleration
 
     unit = np.eye(2 * n)
     quotients = [(accelerations(here + h * unit) - accelerations(here - h * unit)).T / (2.0 * h) for h in _STEPS]

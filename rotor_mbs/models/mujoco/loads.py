@@ -1,7 +1,7 @@
-"""Torques over time as segments on which they are linear, and the times at which the engine stops. Knows no engine.
+"""Loads over time as segments on which they are linear, and the times at which the engine stops. Knows no engine.
 
-A step across a kink of a torque loses its order, and MuJoCo keeps a load constant within a step. Both are avoided: the
-engine stops at every kink, and within a segment a torque is a state of the engine (see `mjcf`), which every stage of a
+A step across a kink of a load loses its order, and MuJoCo keeps a load constant within a step. Both are avoided: the
+engine stops at every kink, and within a segment a load is a state of the engine (see `mjcf`), which every stage of a
 step evaluates at its own time.
 """
 
@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Table, is_constant, knots, value_at
 from rotor_mbs.solution.record import Array
-
-Table = Sequence[tuple[float, float]]
 
 # A kink closer to a sample than this share of the sample interval is moved onto it.
 _SAME = 1e-9
@@ -26,20 +24,33 @@ _ROWS = 10
 
 
 @dataclass(frozen=True)
-class Segment:
-    """On [start, end] s the torques are torque + slope (t - start).
+class Load:
+    """A moment `gain` times a table over time, on a coordinate (0 = rotor).
 
-    torque, slope   (loads,) N m and N m/s, in the order of `loaded`
+    gain   1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
+    """
+
+    name: str
+    coordinate: int
+    gain: float
+    table: Table
+
+
+@dataclass(frozen=True)
+class Segment:
+    """On [start, end] s the tables are value + slope (t - start).
+
+    value, slope   (loads,) N m or rad, and per s, in the order of `loads_of`
     """
 
     start: float
     end: float
-    torque: tuple[float, ...]
+    value: tuple[float, ...]
     slope: tuple[float, ...]
 
     def at(self, time: float) -> list[float]:
-        """(loads,) N m at `time` s."""
-        return [torque + slope * (time - self.start) for torque, slope in zip(self.torque, self.slope, strict=True)]
+        """(loads,) N m or rad at `time` s."""
+        return [value + slope * (time - self.start) for value, slope in zip(self.value, self.slope, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -52,36 +63,47 @@ class Interval:
     is_sample: bool  # whether a sample is at its end
 
 
-def loaded(scene: Scene) -> dict[int, Table]:
-    """Table of the torque over time by coordinate (0 = rotor); coordinates without a torque are left out."""
-    return {0: scene.rotor_torque} if scene.has_torque else {}
+def loads_of(scene: Scene) -> list[Load]:
+    """Torque on the rotor, torques of the pitches that move, rest angles that change over time, as far as there are."""
+    found = [Load("torque rotor", 0, 1.0, scene.rotor_torque)] if scene.has_torque else []
+    for number in scene.moving_coordinates[1:]:
+        torque, rest = scene.pitch_load(number - 1)
+        if torque:
+            found.append(Load(f"torque pitch {number}", number, 1.0, torque))
+        if not is_constant(rest):
+            found.append(Load(f"rest pitch {number}", number, scene.bearing(number - 1)[0], rest))
+    return found
+
+
+def constant_rest(scene: Scene, number: int) -> float:
+    """rad: rest angle of the spring of blade `number` (from 1); 0 where that changes over time."""
+    rest = scene.pitch_load(number - 1)[1]
+    return value_at(rest, 0.0) if is_constant(rest) else 0.0
 
 
 def segments(scene: Scene) -> tuple[Segment, ...]:
-    """The whole run, cut where a torque has a kink or a jump; one segment where all are constant."""
-    tables = list(loaded(scene).values())
-    varying = [table for table in tables if len({torque for _, torque in table}) > 1]
-    kinks = {time for table in varying for time, _ in table if 0.0 < time < scene.duration}
-    knots = sorted({0.0, scene.duration, *kinks})
+    """The whole run, cut where a load has a kink or a jump; one segment where all are constant."""
+    tables = [load.table for load in loads_of(scene)]
+    cuts = [0.0, *knots(tables, scene.duration), scene.duration]
     return tuple(
         Segment(start, end, *_columns([_line(table, start, end) for table in tables]))
-        for start, end in itertools.pairwise(knots)
+        for start, end in itertools.pairwise(cuts)
     )
 
 
-def _columns(lines: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return tuple(torque for torque, _ in lines), tuple(slope for _, slope in lines)
+def _columns(lines: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return tuple(value for value, _ in lines), tuple(slope for _, slope in lines)
 
 
 def _line(table: Table, start: float, end: float) -> tuple[float, float]:
-    """Torque at `start`, and its slope to `end`, of a table that has no row between the two."""
+    """Value at `start`, and its slope to `end`, of a table that has no kink between the two."""
     before = [row for row in table if row[0] <= start]
     after = [row for row in table if row[0] >= end]
     if not before or not after or before[-1][1] == after[0][1]:
         return (before[-1] if before else table[0])[1], 0.0
-    (t0, torque0), (t1, torque1) = before[-1], after[0]
-    slope = (torque1 - torque0) / (t1 - t0)
-    return torque0 + slope * (start - t0), slope
+    (t0, value0), (t1, value1) = before[-1], after[0]
+    slope = (value1 - value0) / (t1 - t0)
+    return value0 + slope * (start - t0), slope
 
 
 def sample_times(scene: Scene) -> Array:
@@ -90,7 +112,7 @@ def sample_times(scene: Scene) -> Array:
 
 
 def intervals(scene: Scene) -> list[Interval]:
-    """The run from stop to stop: at every sample, and at every kink of a torque between samples."""
+    """The run from stop to stop: at every sample, and at every kink of a load between samples."""
     times = sample_times(scene).tolist()
     spacing = scene.duration / (scene.samples - 1)
     parts = segments(scene)

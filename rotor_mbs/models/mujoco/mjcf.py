@@ -4,8 +4,10 @@ World frame: z up, shaft along y. The hub turns about y by the hinge "rotor"; bl
 its phase about y, and turns about its own z by the hinge "pitch i". Hinge angles are the scene's angles, unwrapped.
 A blade without inertia about its pitch axis has no hinge: it is welded to the hub at its initial pitch.
 
-Torques are actuators with the activation dynamics da/dt = u: the activation a is the torque in N m, the control u its
-slope in N m/s. So a torque that is linear in time enters every stage of a step at the stage's own time.
+Loads are actuators with the activation dynamics da/dt = u: the activation a is the torque in N m, the control u its
+slope in N m/s. So a torque that is linear in time enters every stage of a step at the stage's own time. A spring's rest
+angle is its `springref` where it is constant; where it changes, it is the activation (rad) of an actuator whose gain is
+the spring's stiffness.
 
 Least inertia
 -------------
@@ -25,7 +27,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.models.mujoco.loads import loaded
+from rotor_mbs.models.mujoco.loads import constant_rest, loads_of
 from rotor_mbs.scenario.scene import Scene
 
 LEAST = 2e-15  # kg, kg m²
@@ -63,13 +65,12 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
     _inertial(hub, 0.0, (0.0, 0.0, 0.0), (half, scene.hub_inertia, half, 0.0, 0.0, 0.0))
     for number in range(1, len(scene.blades) + 1):
         _blade(hub, scene, number)
-    tables = loaded(scene)
-    actuators = ET.SubElement(root, "actuator") if tables else None
-    for coordinate in tables:
-        assert actuators is not None
+    loads = loads_of(scene)
+    actuators = ET.SubElement(root, "actuator") if loads else root
+    for load in loads:
         ET.SubElement(
-            actuators, "general", name=f"torque {joint_name(coordinate)}", joint=joint_name(coordinate),
-            dyntype="integrator", gainprm="1",
+            actuators, "general", name=load.name, joint=joint_name(load.coordinate),
+            dyntype="integrator", gainprm="1" if load.gain == 1.0 else numbers(load.gain),
         )  # fmt: skip
     return root
 
@@ -105,16 +106,18 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(*_quaternion(phase, pitch)))
     if blade.has_pitch_inertia:
         stiffness, damping = scene.bearing(number - 1)
-        _joint(body, number, "0 0 1", stiffness, damping)
+        _joint(body, number, "0 0 1", stiffness, damping, constant_rest(scene, number))
     _inertial(body, blade.mass, blade.centre_of_mass, blade.inertia)
     if scene.wants("tip"):
         ET.SubElement(body, "site", name=f"tip {number}", pos=numbers(*blade.tip))
 
 
-def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, damping: float) -> None:
+def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, damping: float, rest: float = 0.0) -> None:
     joint = ET.SubElement(body, "joint", name=joint_name(coordinate), type="hinge", axis=axis)
     if stiffness:
         joint.set("stiffness", numbers(stiffness))
+    if rest:
+        joint.set("springref", numbers(rest))
     if damping:
         joint.set("damping", numbers(damping))
 

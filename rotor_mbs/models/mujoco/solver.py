@@ -5,6 +5,7 @@ Loads the engine.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,12 +17,13 @@ from rotor_mbs.models.mujoco.loads import (
     Interval,
     Segment,
     intervals,
-    loaded,
+    loads_of,
     sample_times,
     segments,
     steps_and_rows,
 )
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import is_constant, value_at
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 # Evaluations of the equations of motion in a step.
@@ -30,7 +32,7 @@ _STAGES = {"rk4": 4, "implicitfast": 1}
 
 @dataclass
 class _Rows:
-    """States in order of time. Where a torque jumps there are two rows, one with the segment before, one after.
+    """States in order of time. Where a load jumps there are two rows, one with the segment before, one after.
 
     angles, rates   (coordinates,) rad and rad/s each
     samples         indices of the rows that are samples
@@ -91,8 +93,8 @@ class MujocoSolver:
         steps, count = steps_and_rows(span, self._step, self._rows_between)
         total = 0
         for row in range(1, count + 1):
-            torques = segment.at(interval.start + span * (row - 1) / count)
-            taken, message = self.engine.advance(span / steps, steps // count, torques, segment.slope)
+            loads = segment.at(interval.start + span * (row - 1) / count)
+            taken, message = self.engine.advance(span / steps, steps // count, loads, segment.slope)
             total += taken
             if message:
                 return total, message
@@ -110,16 +112,17 @@ class MujocoSolver:
         }
         with np.errstate(over="ignore", invalid="ignore"):
             if {"tip", "energy", "loads"} & set(scene.outputs):
-                torques = np.array([segment.at(t) for segment, t in zip(rows.segments, rows.times, strict=True)])
-                poses = self.engine.poses(angles, rates, torques)
+                values = np.array([segment.at(t) for segment, t in zip(rows.segments, rows.times, strict=True)])
+                poses = self.engine.poses(angles, rates, values)
             if scene.wants("tip"):
                 fields["tip"] = poses.site[at]
             if scene.wants("energy"):
                 fields["kinetic_energy"] = self._kinetic_energy(poses)[at]
                 fields["potential_energy"] = self._potential_energy(poses)[at] + _spring_energy(scene, fields["angles"])
-                fields["work"] = self._work(angles, rates, poses.acceleration, torques)[at]
+                done = self._work(angles, rates, poses.acceleration, values)[at]
+                fields["work"] = done + _work_of_rests(scene, fields["angles"])
             if scene.wants("loads"):
-                fields |= {name: values[at] for name, values in self._loads(poses, torques).items()}
+                fields |= {name: table[at] for name, table in self._loads(poses, values).items()}
         finite = np.all([np.isfinite(table.reshape(len(at), -1)).all(axis=1) for table in fields.values()], axis=0)
         n = len(at) if finite.all() else int(np.argmin(finite))
         return Trajectory(time=sample_times(scene)[:n], **{name: table[:n] for name, table in fields.items()})
@@ -134,13 +137,13 @@ class MujocoSolver:
         """(n,) J of the weights; zero at the height of the shaft."""
         return np.asarray(self._scene.gravity * (poses.centre[:, :, 2] @ self.engine.masses))
 
-    def _loads(self, poses: Poses, torques: Array) -> dict[str, Array]:
+    def _loads(self, poses: Poses, values: Array) -> dict[str, Array]:
         """Of what each body's parent does to it: the moment of an actuator is its part about the pitch axis."""
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
         in_frame = [np.einsum("nbij,nbi->nbj", poses.frame, vectors)[:, 1:] for vectors in (force, moment)]
         shaft_moment = moment[:, 0].copy()
-        if 0 in loaded(self._scene):
-            shaft_moment[:, 1] -= torques[:, list(loaded(self._scene)).index(0)]
+        if self._scene.has_torque:
+            shaft_moment[:, 1] -= values[:, 0]  # the first of `loads_of`
         pitching = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
         return {
             "blade_root_force": in_frame[0],
@@ -150,18 +153,20 @@ class MujocoSolver:
             "pitch_actuator_moment": np.where(pitching, in_frame[1][:, :, 2], 0.0),
         }
 
-    def _work(self, angles: Array, rates: Array, accelerations: Array, torques: Array) -> Array:
-        """(n,) J of the torques, less what the dampers took; from rows of rad, rad/s, rad/s², (n, loads) N m.
+    def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
+        """(n,) J of the actuators, less what the dampers took; from rows of rad, rad/s, rad/s², (n, loads) N m or rad.
 
-        Constant torques: torque times angle. Otherwise the power is integrated from row to row by the trapezoidal rule
+        Constant loads: torque times angle. Otherwise the power is integrated from row to row by the trapezoidal rule
         with its end correction, ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here.
         """
-        columns = [self._moving.index(coordinate) for coordinate in loaded(self._scene)]
+        loads = loads_of(self._scene)
+        columns, gains = [self._moving.index(load.coordinate) for load in loads], np.array([one.gain for one in loads])
+        torques = gains * values
         if not _work_needs_rows(self._scene):
             turned = angles[:, columns] - angles[:1, columns]
             return np.asarray((torques * turned).sum(axis=1))
         dampings = np.array(_dampings(self._scene))[self._moving]
-        slopes = np.array([segment.slope for segment in self._rows.segments]).reshape(torques.shape)
+        slopes = gains * np.array([segment.slope for segment in self._rows.segments]).reshape(values.shape)
         power = (torques * rates[:, columns]).sum(axis=1) - (dampings * rates**2).sum(axis=1)
         change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
         change -= 2.0 * (dampings * rates * accelerations).sum(axis=1)
@@ -171,7 +176,7 @@ class MujocoSolver:
 
 
 def _work_needs_rows(scene: Scene) -> bool:
-    """Whether the work has to be integrated along the path: it is exact for constant torques without dampers."""
+    """Whether the work has to be integrated along the path: it is exact for constant loads without dampers."""
     return scene.has_damping or len(segments(scene)) > 1 or any(segments(scene)[0].slope)
 
 
@@ -180,12 +185,31 @@ def _dampings(scene: Scene) -> tuple[float, ...]:
     return (scene.shaft_damping, *(scene.bearing_damping or (0.0,) * len(scene.blades)))
 
 
+def _springs(scene: Scene, samples: int) -> Iterator[tuple[int, float, Array, bool]]:
+    """Of each spring: coordinate, stiffness (N m/rad), (samples,) rest angle in rad, whether that changes."""
+    for number in mjcf.moving(scene)[1:]:
+        stiffness, rest = scene.bearing(number - 1)[0], scene.pitch_load(number - 1)[1]
+        if stiffness:
+            over_time = np.array([value_at(rest, t) for t in sample_times(scene)[:samples].tolist()])
+            yield number, stiffness, over_time, not is_constant(rest)
+
+
 def _spring_energy(scene: Scene, angles: Array) -> Array:
-    """(n,) J of the bearing springs, from (n, 1 + blades) rad."""
-    stiffness = [k if k and i in mjcf.moving(scene) else 0.0 for i, k in enumerate(scene.bearing_stiffness, start=1)]
-    return (
-        np.asarray(0.5 * (np.array(stiffness) * angles[:, 1:] ** 2).sum(axis=1)) if stiffness else np.zeros(len(angles))
-    )
+    """(n,) J of the bearing springs at the first n samples, from (n, 1 + blades) rad."""
+    total = np.zeros(len(angles))
+    for number, stiffness, rest, _ in _springs(scene, len(angles)):
+        total += 0.5 * (stiffness * (angles[:, number] - rest) ** 2)
+    return total
+
+
+def _work_of_rests(scene: Scene, angles: Array) -> Array:
+    """(n,) J: the work -∫ k (θ - r) dr of rest angles that change, less the ∫ k r dθ that actuators did."""
+    total = np.zeros(len(angles))
+    for number, stiffness, rest, is_moving in _springs(scene, len(angles)):
+        if is_moving:
+            energy = 0.5 * stiffness * rest * (rest - 2.0 * angles[:, number])
+            total += energy - energy[0]
+    return total
 
 
 def _all_coordinates(states: Array, moving: list[int], fixed: tuple[float, ...]) -> Array:

@@ -101,11 +101,12 @@ class DerivedRotor:
             pitches.append(terms.h_3_22 * v2 * v2 + terms.h_3_23 * v2 * v3 + terms.h_3_33 * last + terms.gravity_3)
         return rotor, pitches
 
-    def accelerations(self, torque: float, angles: Sequence[float], rates: Sequence[float]) -> list[float]:
-        """τ = D q̈ + H + C solved for q̈ (rad/s²), the pitches eliminated one by one; torque on the rotor in N m."""
+    def accelerations(self, torques: Sequence[float], angles: Sequence[float], rates: Sequence[float]) -> list[float]:
+        """τ = D q̈ + H + C solved for q̈ (rad/s²), the pitches eliminated one by one; torques (1 + blades,) N m."""
         blades = self.blades(angles)
-        rotor, pitches = self.forces(blades, rates)
-        inertia, moment = 0.0, torque - rotor
+        rotor, forces = self.forces(blades, rates)
+        pitches = [force - torque for force, torque in zip(forces, torques[1:], strict=True)]
+        inertia, moment = 0.0, torques[0] - rotor
         for terms, force in zip(blades, pitches, strict=True):
             ratio = terms.d_23 / terms.d_33
             inertia += terms.d_22 - ratio * terms.d_23

@@ -147,14 +147,14 @@ def fixed_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: fl
 
 
 def one_blade_accelerations(
-    m: float, c: float, d: float, g: float, torque: float, state: Sequence[float]
+    m: float, c: float, d: float, g: float, torques: Sequence[float], state: Sequence[float]
 ) -> tuple[float, float]:
-    """(33) solved for q̈2, q̈3 in rad/s²; state (4,): q2, q3, q̇2, q̇3."""
+    """(33) solved for q̈2, q̈3 in rad/s²; torques (2,): τ2, τ3 in N m; state (4,): q2, q3, q̇2, q̇3."""
     q2, q3, v2, v3 = state
     s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
     (d11, d12), (d21, d22) = mass_one(m, c, d, s3, c3)
-    b1 = torque - h2(m, c, d, s2, c2, s3, c3, v2 * v3, v3 * v3)
-    b2 = -h3(m, c, s2, c2, s3, c3, v2 * v2, v2 * v3, v3 * v3)
+    b1 = torques[0] - h2(m, c, d, s2, c2, s3, c3, v2 * v3, v3 * v3)
+    b2 = torques[1] - h3(m, c, s2, c2, s3, c3, v2 * v2, v2 * v3, v3 * v3)
     if g:
         f1, f2 = gravity_one(m, c, d, g, s2, c2, s3, c3)
         b1, b2 = b1 - f1, b2 - f2
@@ -167,11 +167,11 @@ def three_blade_accelerations(
     c: float,
     d: float,
     g: float,
-    torque: float,
+    torques: Sequence[float],
     state: Sequence[float],
     row: Callable[..., float] | None = None,
 ) -> tuple[float, float, float, float]:
-    """(39)-(56) solved for q̈2..q̈5 in rad/s²; state (8,): q2..q5, q̇2..q̇5.
+    """(39)-(56) solved for q̈2..q̈5 in rad/s²; torques (4,): τ2..τ5 in N m; state (8,): q2..q5, q̇2..q̇5.
 
     `row` takes the place of the first row of (56): (m, c, d, g, q2, c3, c4, c5) -> N m, see `gravity_rows`.
 
@@ -184,10 +184,10 @@ def three_blade_accelerations(
         m, c, d, s3, c3, s4, c4, s5, c5
     )
     v22, v23, v24, v25 = v2 * v2, v2 * v3, v2 * v4, v2 * v5
-    b1 = torque - h_1(m, c, d, s2, c2, s3, c3, s4, c4, s5, c5, v23, v24, v25, v3 * v3, v4 * v4, v5 * v5)
-    b2 = -h_2(m, c, s2, c2, s3, c3, v22, v23, v3)
-    b3 = -h_3(m, c, s2, c2, s4, c4, v22, v24, v4)
-    b4 = -h_4(m, c, s2, c2, s5, c5, v22, v25, v5)
+    b1 = torques[0] - h_1(m, c, d, s2, c2, s3, c3, s4, c4, s5, c5, v23, v24, v25, v3 * v3, v4 * v4, v5 * v5)
+    b2 = torques[1] - h_2(m, c, s2, c2, s3, c3, v22, v23, v3)
+    b3 = torques[2] - h_3(m, c, s2, c2, s4, c4, v22, v24, v4)
+    b4 = torques[3] - h_4(m, c, s2, c2, s5, c5, v22, v25, v5)
     if g:
         _, f2, f3, f4 = gravity_three(m, c, g, s2, c2, s3, c3, s4, c4, s5, c5)
         f1 = rotor_gravity(m, c, g, s2, c2, c3, c4, c5) if row is None else row(m, c, d, g, q2, c3, c4, c5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.observables import PointMassRotor, torque_work
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Table, is_constant, value_at
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
 
@@ -28,8 +30,8 @@ class PrintedSettings(Ode45Settings):
     )
 
 
-# (torque in N m, angles and rates) -> accelerations; all of the coordinates that move.
-Accelerations = Callable[[float, Sequence[float]], Sequence[float]]
+# (torques in N m, angles and rates) -> accelerations; all of the coordinates that move.
+Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
 
 
 class PrintedSolver:
@@ -76,8 +78,11 @@ class PrintedSolver:
             trajectory.kinetic_energy = rotor.kinetic_energy(angles, rates)
             trajectory.potential_energy = rotor.potential_energy(angles)
             trajectory.work = np.zeros(len(time))
-            if scene.has_torque:
-                trajectory.work = torque_work(scene.rotor_torque, lambda t: result.at(t)[:, 0], result.time, time)
+            trajectory.work += sum(
+                torque_work(table, partial(_column, result, i), result.time, time)
+                for i, table in enumerate(_torque_tables(scene, self._moving))
+                if table
+            )
         if scene.wants("loads"):
             before = np.nextafter(time, 0.0)  # where a torque jumps, the value before it
             torque = np.array([scene.torque_at(t) for t in before.tolist()])
@@ -129,6 +134,8 @@ class PrintedModel:
             built.append(BuiltItem("term", "gravity"))
         if scene.has_torque:
             built.append(BuiltItem("term", "rotor torque"))
+        if any(scene.pitch_torque):
+            built.append(BuiltItem("term", "pitch torque", "τ3 to τ5"))
         return built + [BuiltItem("output", name) for name in scene.outputs]
 
     def _sources(self, blades: int) -> tuple[str, str]:
@@ -171,26 +178,38 @@ class PrintedModel:
     def _accelerations(self, rotor: PointMassRotor, row: str) -> Accelerations:
         m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
         if not rotor.pitches_move:
-            return lambda torque, state: [literal.fixed_pitch_acceleration(m, d, g, torque, state[0], rotor.phases)]
+            return lambda torques, state: [
+                literal.fixed_pitch_acceleration(m, d, g, torques[0], state[0], rotor.phases)
+            ]
         if self._errata:
             derived = DerivedRotor(m, c, d, g, rotor.phases, self._errata)
             n = 1 + len(rotor.phases)
-            return lambda torque, state: derived.accelerations(torque, state[:n], state[n:])
+            return lambda torques, state: derived.accelerations(torques, state[:n], state[n:])
         if len(rotor.phases) == 1:
-            return lambda torque, state: literal.one_blade_accelerations(m, c, d, g, torque, state)
+            return lambda torques, state: literal.one_blade_accelerations(m, c, d, g, torques, state)
         written = None if row == DEFAULT_ROW else GRAVITY_ROWS[row].moment
-        return lambda torque, state: literal.three_blade_accelerations(m, c, d, g, torque, state, written)
+        return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state, written)
+
+
+def _column(result: Ode45Result, column: int, times: Array) -> Array:
+    return result.at(times)[:, column]
+
+
+def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:
+    """τ2, then τ3 to τ5, over time, of the `moving` coordinates."""
+    return (scene.rotor_torque, *(scene.pitch_load(i)[0] for i in range(moving - 1)))
 
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
     """y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
     undefined = [math.nan] * (2 * moving)
-    constant = scene.torque_at(0.0) if scene.has_constant_torque else None
+    tables = _torque_tables(scene, moving)
+    constant = [value_at(table, 0.0) for table in tables] if all(map(is_constant, tables)) else None
 
     def f(t: float, y: Sequence[float]) -> list[float]:
-        torque = scene.torque_at(t) if constant is None else constant
+        torques = constant or [value_at(table, t) for table in tables]
         try:
-            return [*y[moving:], *accelerations(torque, y)]
+            return [*y[moving:], *accelerations(torques, y)]
         except (ZeroDivisionError, OverflowError, ValueError):  # the last is the sine of an infinite angle
             return undefined
 

@@ -1,0 +1,276 @@
+"""Torques on pitches and commands of rest angles: exact solutions, their work, and all models on one scene."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from math import exp, pi, sqrt
+
+import numpy as np
+import pytest
+from support.rotors import ALL, AXIAL, MIXED, PAPER, STOUT, closed_form, energies, make_scene
+
+from rotor_mbs.analysis import exact as theory
+from rotor_mbs.analysis import kinematics
+from rotor_mbs.methods.catalogue import REFERENCE, find_method
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange.ensemble import solve_many
+from rotor_mbs.models.printed import literal
+from rotor_mbs.models.printed.methods import METHODS as PRINTED
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import value_at
+from rotor_mbs.solution.record import Trajectory
+
+# Settings at which a method has the exact solutions below to 1e-10 rad.
+TO_ROUND_OFF: dict[str, dict[str, object]] = {
+    "lagrange/taylor": {},
+    "lagrange/ode45": {"relative_tolerance": 1e-13, "absolute_tolerance": 1e-13},
+    "lagrange/dop853": {},
+    "lagrange/radau": {"relative_tolerance": 1e-12, "absolute_tolerance": 1e-14},
+    REFERENCE: {},
+    "exudyn_tree/rk44": {},
+    "exudyn_tree/rk67": {},
+    "exudyn_tree/dopri5": {},
+    "mujoco/rk4": {},
+}
+# Methods of low order: (order, step in s). Their order is shown, and what Richardson's extrapolation leaves.
+OF_LOW_ORDER = {
+    "exudyn_tree/generalized_alpha": (2, 4e-3),
+    "exudyn_chain/generalized_alpha": (2, 4e-3),
+    "exudyn_chain/newmark_index2": (2, 4e-3),
+    "mujoco/implicitfast": (1, 1e-3),
+}
+
+STIFFNESS, DAMPING, INERTIA, STEP_S, STEP = 40.0, 3.0, 7.0, 0.4321, 0.3
+FREE = make_scene(
+    [0.1, 0.2], [1.0, -0.5], (AXIAL,), gravity=0.0, duration=1.0, samples=51, pitch_torque=(((0.0, 12.0),),)
+)
+COMMAND = make_scene(
+    [0.1, 0.0],
+    [1.0, 0.0],
+    (AXIAL,),
+    gravity=0.0,
+    duration=2.0,
+    samples=101,
+    bearing_stiffness=(STIFFNESS,),
+    bearing_damping=(DAMPING,),
+    bearing_rest=(((STEP_S, 0.0), (STEP_S, STEP)),),
+)
+
+
+def run(scene: Scene, method: str, **settings: object) -> Trajectory:
+    if not find_method(method).is_installed:
+        pytest.skip(f"{method} is not installed")
+    found = solve(method, scene, settings)
+    assert found.integration.success
+    return found.trajectory
+
+
+def constant_torque(time):
+    """Pitch and its rate: com on the pitch axis and Jxx = Jyy, so that rotor and pitch do not feel each other."""
+    return 0.2 - 0.5 * time + 12.0 * time**2 / (2.0 * INERTIA), -0.5 + 12.0 * time / INERTIA
+
+
+def step_response(time):
+    """Pitch and its rate of J θ'' + d θ' + k (θ - r) = 0 from rest, r stepping up at STEP_S."""
+    decay = DAMPING / (2.0 * INERTIA)
+    w = sqrt(STIFFNESS / INERTIA - decay**2)
+    after = np.maximum(time - STEP_S, 0.0)
+    fading = np.exp(-decay * after)
+    angle = STEP * (1.0 - fading * (np.cos(w * after) + decay / w * np.sin(w * after)))
+    return angle, STEP * fading * (w + decay**2 / w) * np.sin(w * after)
+
+
+def damper_work(time):
+    """∫ d θ'² dt of the step response, integrated by parts: ∫ e^(-2 a s) sin²(w s) ds."""
+    a = DAMPING / (2.0 * INERTIA)
+    w = sqrt(STIFFNESS / INERTIA - a**2)
+    s = np.maximum(time - STEP_S, 0.0)
+    oscillating = (a - np.exp(-2 * a * s) * (a * np.cos(2 * w * s) - w * np.sin(2 * w * s))) / (2 * (a**2 + w**2))
+    squares = 0.5 * ((1.0 - np.exp(-2 * a * s)) / (2 * a) - oscillating)
+    return DAMPING * (STEP * (w + a**2 / w)) ** 2 * squares
+
+
+CASES = {"constant torque": (FREE, constant_torque), "step of the command": (COMMAND, step_response)}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("method", TO_ROUND_OFF)
+def test_exact_solutions_to_round_off(method: str, case: str) -> None:
+    scene, exact = CASES[case]
+    found = run(scene, method, **TO_ROUND_OFF[method])
+    angle, rate = exact(found.time)
+    assert np.abs(found.angles[:, 1] - angle).max() < 1e-10
+    assert np.abs(found.rates[:, 1] - rate).max() < 1e-9
+    assert np.abs(found.angles[:, 0] - (0.1 + found.time)).max() < 1e-10  # the rotor does not feel it
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("method", OF_LOW_ORDER)
+def test_exact_solutions_at_the_order_of_the_method(method: str, case: str) -> None:
+    """Errors at h, h/2, h/4 fall as h^p, and h^p and the next terms taken out, little is left of them."""
+    (scene, exact), (order, step) = CASES[case], OF_LOW_ORDER[method]
+    angle = exact(np.linspace(0.0, scene.duration, scene.samples))[0]
+    runs = [run(scene, method, step=step * 0.5**k).angles[:, 1] for k in range(3)]
+    errors = [np.abs(found - angle).max() for found in runs]
+    if errors[0] < 1e-10:  # a parabola that the rule integrates without error
+        return
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.2)
+    once = [(2.0**order * fine - coarse) / (2.0**order - 1) for coarse, fine in itertools.pairwise(runs)]
+    assert np.abs(once[1] - angle).max() < 0.05 * errors[2]
+
+
+@pytest.mark.parametrize("method", TO_ROUND_OFF)
+def test_work_and_energy_of_a_step_of_the_command(method: str) -> None:
+    """The jump puts ½ k r² into the spring while the pitch is at 0; from there on only the damper does work."""
+    found = run(COMMAND, method, **TO_ROUND_OFF[method])
+    stored = 0.5 * STIFFNESS * STEP**2
+    work = np.where(found.time < STEP_S, 0.0, stored) - damper_work(found.time)
+    assert np.abs(found.work - work).max() < 1e-9 * stored
+    angle, rate = step_response(found.time)
+    rest = np.where(found.time < STEP_S, 0.0, STEP)
+    kinetic = 0.5 * INERTIA * rate**2 + 0.5 * (12.0 + 50.0 * 9.0)
+    potential = 0.5 * STIFFNESS * (angle - rest) ** 2
+    assert np.abs(found.kinetic_energy - kinetic).max() < 1e-9 * kinetic[0]
+    assert np.abs(found.potential_energy - potential).max() < 1e-9 * stored
+    assert np.abs(found.kinetic_energy + found.potential_energy - found.work - kinetic[0]).max() < 1e-9 * kinetic[0]
+
+
+@pytest.mark.parametrize("method", TO_ROUND_OFF)
+def test_work_of_a_constant_torque_and_of_a_constant_rest_angle(method: str) -> None:
+    scene = replace(FREE, bearing_stiffness=(STIFFNESS,), bearing_rest=(((0.0, 0.7),),))
+    found = run(scene, method, **TO_ROUND_OFF[method])
+    assert np.abs(found.work - 12.0 * (found.angles[:, 1] - 0.2)).max() < 1e-12 * np.abs(found.work).max()
+    spring = 0.5 * STIFFNESS * (found.angles[:, 1] - 0.7) ** 2
+    assert np.abs(found.potential_energy - spring).max() < 1e-12 * spring.max()
+    energy = found.kinetic_energy + found.potential_energy - found.work
+    assert np.abs(energy - energy[0]).max() < 1e-9 * energy[0]
+
+
+EVERYTHING = replace(
+    MIXED,
+    pitch_torque=(((0.0, 40.0),), ((0.2, 0.0), (0.55, 90.0), (0.55, -60.0)), ()),
+    bearing_rest=(((0.0, 0.2),), ((0.4, 0.0), (0.9, 0.3)), ((0.777, 0.1), (0.777, -0.5), (1.3, 0.4))),
+)
+BOUND = {"exudyn_chain/generalized_alpha": 5e-5, "exudyn_chain/newmark_index2": 5e-5, "mujoco/rk4": 1e-9}
+
+
+@pytest.mark.parametrize(
+    "method", ["lagrange/taylor", "lagrange/dop853", REFERENCE, "exudyn_tree/rk67", "mujoco/rk4", *list(BOUND)[:2]]
+)
+def test_every_load_at_once_follows_the_equations_written_anew(method: str) -> None:
+    """Constant, ramps and jumps between samples, on unlike blades of full inertia, with springs, dampers, gravity."""
+    found, exact = run(EVERYTHING, method), closed_form(EVERYTHING)
+    bound = BOUND.get(method, 1e-10)
+    assert np.abs(found.angles - exact[:, :4]).max() < bound
+    kinetic, potential = energies(EVERYTHING, exact)
+    scale = np.abs(kinetic).max()
+    assert np.abs(found.kinetic_energy - kinetic).max() < 10 * bound * scale
+    assert np.abs(found.potential_energy - potential).max() < 10 * bound * scale
+    balance = found.kinetic_energy + found.potential_energy - found.work
+    assert np.abs(balance - balance[0]).max() < 10 * bound * scale
+    own = kinematics.potential_energy(EVERYTHING, found.time, found.angles)
+    gap = 1e-7 if method.startswith("exudyn_chain") else 1e-12  # its bodies leave the joints by some 1e-9 m
+    assert np.abs(found.potential_energy - own).max() < gap * scale
+
+
+LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment")
+
+
+@pytest.mark.parametrize(
+    ("method", "bound"),
+    [(REFERENCE, 1e-12), ("exudyn_tree/rk67", 1e-9), ("exudyn_chain/newmark_index2", 2e-3), ("mujoco/rk4", 1e-8)],
+)
+def test_loads_at_roots_and_actuators_with_every_load_at_once(method: str, bound: float) -> None:
+    """The actuator's moment is spring, command, damper and torque; bounds are shares of the largest load."""
+    scene = replace(EVERYTHING, outputs=("angles", "rates", "loads"))
+    exact, found = run(scene, "lagrange/dop853").quantities, run(scene, method).quantities
+    for name in LOADS:
+        assert np.abs(found[name] - exact[name]).max() < bound * np.abs(exact[name]).max(), name
+
+
+def test_the_work_of_a_command_that_moves_is_that_of_its_power() -> None:
+    """-∫ k (θ - r) dr by fine sums over the motion, jumps included, against what is stored."""
+    scene = replace(EVERYTHING, samples=16001)
+    found = run(scene, "lagrange/dop853")
+    rest = np.array([[value_at(table, t) for table in scene.bearing_rest] for t in found.time])
+    forces = np.array(scene.bearing_stiffness) * (found.angles[:, 1:] - rest)
+    moved = -(0.5 * (forces[1:] + forces[:-1]) * np.diff(rest, axis=0)).sum()
+    torques = np.array(
+        [[scene.torque_at(t), *(value_at(table, t) for table in scene.pitch_torque)] for t in found.time]
+    )
+    lost = np.array([scene.shaft_damping, *scene.bearing_damping]) * found.rates**2
+    power = (torques * found.rates - lost).sum(axis=1)
+    done = (0.5 * (power[1:] + power[:-1]) * np.diff(found.time)).sum()
+    # Sums over 1e-4 s: a jump is off by half of it.
+    assert found.work[-1] == pytest.approx(done + moved, abs=2e-4 * np.abs(found.work).max())
+    assert abs(moved) > 0.01 * np.abs(found.work).max()
+
+
+@pytest.mark.parametrize("variant", [theory.mirrored, theory.relabelled])
+def test_symmetry_with_pitch_loads(variant) -> None:
+    there = run(EVERYTHING, "lagrange/dop853").angles
+    other = run(variant(EVERYTHING), "lagrange/dop853").angles
+    error = theory.mirror_error if variant is theory.mirrored else theory.relabelling_error
+    assert error(there, other) < 1e-11
+
+
+def test_a_command_on_a_spring_without_stiffness_does_nothing() -> None:
+    free = replace(EVERYTHING, bearing_stiffness=())
+    assert free.pitch_load(1) == (EVERYTHING.pitch_torque[1], ())
+    still = replace(free, bearing_rest=())
+    for method in ("lagrange/dop853", "exudyn_tree/rk67"):
+        assert np.array_equal(run(free, method).angles, run(still, method).angles)
+
+
+def test_runs_side_by_side_take_pitch_loads() -> None:
+    pytest.importorskip("heyoka")
+    one = make_scene([0.3, 0.4], [1.0, 0.5], (STOUT,), duration=0.5, samples=11, hub_inertia=500.0)
+    scenes = [
+        replace(one, pitch_torque=(((0.0, t),),), bearing_stiffness=(2000.0,), bearing_rest=(((0.0, 0.1 * t),),))
+        for t in (1.0, 2.0, -3.0)
+    ]
+    damped = [replace(scene, bearing_damping=(5.0,)) for scene in scenes]
+    stepping = replace(scenes[0], bearing_rest=(((0.2, 0.0), (0.2, 0.3)),))
+    for some in (scenes, damped, [stepping]):
+        block = solve_many(some, 2.0**-52)
+        for i, scene in enumerate(some):
+            single = run(scene, "lagrange/taylor")
+            for name in ("angles", "rates", "kinetic_energy", "potential_energy", "work"):
+                expected = getattr(single, name)
+                assert np.abs(getattr(block, name)[i] - expected).max() < 1e-11 * max(1.0, np.abs(expected).max()), name
+
+
+@pytest.mark.parametrize("pitches", [1, 3])
+def test_the_printed_equations_take_the_torques_of_the_pitches(pitches: int) -> None:
+    """τ3 to τ5 in rows 2 to 4: from rest without gravity, a short motion starts with the printed accelerations."""
+    tables = (((0.0, 400.0),), ((0.0, -100.0), (1.0, 0.0)), ((0.0, 250.0),))[:pitches]
+    start = [0.3, 0.4, -0.2, 0.7][: 1 + pitches]
+    scene = make_scene(
+        start, [0.0] * len(start), gravity=0.0, duration=1e-2, samples=3, pitch_torque=tables,
+        rotor_torque=((0.0, 1e5),), outputs=ALL,
+    )  # fmt: skip
+    found = run(scene, "printed/ode45", relative_tolerance=1e-12, absolute_tolerance=1e-15)
+    text = literal.one_blade_accelerations if pitches == 1 else literal.three_blade_accelerations
+    x, _, z = PAPER.centre_of_mass
+    torques = [1e5, *(table[0][1] for table in tables)]
+    expected = text(PAPER.mass, x, z, 0.0, torques, [*start, *[0.0] * len(start)])
+    np.testing.assert_allclose(2.0 * (found.angles[-1] - start) / 1e-4, expected, rtol=2e-2)
+    mean = [0.5 * (value_at(table, 0.0) + value_at(table, 1e-2)) for table in tables]
+    assert found.work[-1] == pytest.approx(np.dot([1e5, *mean], found.angles[-1] - found.angles[0]), rel=1e-3)
+    assert "pitch torque" in [item.name for item in PRINTED[0].items(scene)]
+
+
+def test_a_pitch_torque_changes_nothing_where_it_is_zero() -> None:
+    scene = make_scene([0.3, 0.4, -0.2, 0.7], [0.1, 0, 0, 0], duration=0.2, samples=21)
+    zero = replace(scene, pitch_torque=(((0.0, 0.0),),) * 3, bearing_rest=(((0.0, 0.0),),) * 3)
+    for method in ("lagrange/taylor", "exudyn_tree/rk67", "printed/ode45"):
+        assert np.array_equal(run(scene, method).angles, run(zero, method).angles)
+
+
+def test_the_pitch_settles_at_the_command() -> None:
+    """After exp(-decay t) has died away: the pitch rests at the commanded angle, the work is what dampers took."""
+    long = replace(COMMAND, duration=60.0, samples=61, bearing_rest=(((1.0, 0.0), (5.0, pi / 2)),))
+    found = run(long, "lagrange/dop853")
+    left = exp(-DAMPING / (2.0 * INERTIA) * 55.0)
+    assert abs(found.angles[-1, 1] - pi / 2) < 2.0 * left
