@@ -75,6 +75,35 @@ def test_any_number_of_blades(name, count) -> None:
     assert angle_error(run(name, scene), closed_form(scene)) < (1e-11 if name in TREE else 1e-5)
 
 
+@pytest.mark.parametrize("name", ["exudyn_tree/generalized_alpha", "exudyn_chain/generalized_alpha"])
+def test_sixteen_blades_take_another_path_through_the_engine_to_the_same_motion(name) -> None:
+    """The chain a sparse factorization, the tree an old Jacobian; a second order error as with few blades."""
+    count = 16
+    scene = make_scene(
+        [0.4, *np.linspace(-0.5, 0.6, count)],
+        [0.3, *np.linspace(0.2, -0.4, count)],
+        tuple((STOUT, SLIM)[i % 2] for i in range(count)),
+        duration=0.2,
+        samples=21,
+        hub_inertia=20.0,
+    )
+    error = angle_error(run(name, scene, step=5e-4), closed_form(scene))
+    finer = angle_error(run(name, scene, step=2.5e-4), closed_form(scene))
+    assert error < 1e-5
+    assert np.log2(error / finer) == pytest.approx(2.0, abs=0.2)
+
+
+def test_large_chains_alone_are_solved_by_a_sparse_factorization() -> None:
+    """Where it is faster; the scenes of the paper keep their bits."""
+    from rotor_mbs.models.exudyn.adapter import linear_solver
+
+    def sizes(blades: int) -> tuple[int, int]:  # Euler parameters and their norms
+        return 7 * (1 + blades), (1 + blades) + 5 * (1 + blades)
+
+    assert [linear_solver(*sizes(blades)) for blades in (3, 6, 12, 96)] == [*["EigenDense"] * 2, *["EigenSparse"] * 2]
+    assert linear_solver(97, 0) == "EigenDense"
+
+
 def test_a_blade_without_pitch_inertia_beside_others_is_carried_by_the_hub() -> None:
     pole = replace(PAPER, centre_of_mass=(0.0, 0.0, D))
     angles, rates = [0.5, 0.2, 0.3, -0.4], [0.1, 0.0, 0.0, 0.1]

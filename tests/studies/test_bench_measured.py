@@ -7,6 +7,7 @@ import os
 import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -25,6 +26,7 @@ from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.solution.metrics import angle_error
 from rotor_mbs.store.records import Record, read_records
 from rotor_mbs.studies.bench_worker import Judged, Point, PointTimer, thinned, thinned_reference
+from rotor_mbs.studies.cost_scaling import with_blades
 
 
 def errors_of(method: str, settings: Mapping[str, object], name: str = "fig08", intervals: int = 100) -> float:
@@ -318,3 +320,21 @@ def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
     assert min(ratios["rk67"], ratios["dopri5"]) > 10.0
     # On fig08 a run has 36 steps and takes less than 0.1 ms, a quarter of it the call from Python and the samples.
     assert ratios["numba"] > (0.7 if name == "fig08" else 1.0)
+
+
+@pytest.mark.slow
+def test_cost_of_the_chain_grows_no_faster_than_a_power_of_1_25_from_12_to_96_blades() -> None:
+    """By processor time, the least of three. The dense factorization of before: 2.5."""
+    sizes, times = (12, 23, 48, 96), []
+    method = find_method("exudyn_chain/generalized_alpha")
+    for count in sizes:
+        scene = replace(with_blades(paper("fig08"), count), duration=0.5, samples=6)
+        solver, found = method.build(scene, method.settings.of(method.name, method.cost_scaling or {})), []
+        for _ in range(3):
+            start = time.process_time()
+            assert solver.integrate().success
+            found.append(time.process_time() - start)
+        times.append(min(found))
+    power = float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
+    print(f"power {power:.2f}; s: {times}")
+    assert power <= 1.25

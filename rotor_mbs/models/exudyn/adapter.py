@@ -138,7 +138,7 @@ class System:
         Raises KeyboardInterrupt if interrupted.
         """
         self._mbs.systemData.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
-        settings = _settings(scheme)
+        settings = _settings(scheme, *self._sizes())
         trials = self._limit_trials(scheme) if scheme.trial_steps else []
         total = Integration(True, "", 0.0, 0, 0)
         for interval in intervals:
@@ -167,6 +167,11 @@ class System:
                 values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
                 self._initial_values[name] = np.array(values, dtype=float, ndmin=1)
             solver.FinalizeSolver(self._mbs, settings)
+
+    def _sizes(self) -> tuple[int, int]:
+        """Number of coordinates, and of constraints."""
+        data = self._mbs.systemData
+        return data.ODE2Size(), data.AEsize()
 
     def _solve(self, solver: Any, settings: Any) -> str:
         """Why the engine says it failed; empty where it says it did not."""
@@ -203,7 +208,21 @@ def _reads_accelerations(part: Part) -> bool:
     return part.kind == "sensor" and "Acceleration" in str(part.parameters["outputVariableType"])
 
 
-def _settings(scheme: Scheme) -> Any:
+# Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization costs less than a dense
+# one: its cost grows with their number, that of a dense one with a power of 2.5.
+_SPARSE_FROM = 140
+
+# Coordinates of a tree from which on a Jacobian, which takes as many evaluations, costs more than the iterations that
+# an old one takes. Of a chain a Jacobian costs no more than two evaluations, whatever the number of bodies.
+_OLD_JACOBIAN_FROM = 13
+
+
+def linear_solver(coordinates: int, constraints: int) -> str:
+    """The engine's name of the solver for a system of that size. A tree, without constraints, is one dense block."""
+    return "EigenSparse" if constraints and coordinates + constraints >= _SPARSE_FROM else "EigenDense"
+
+
+def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     settings = _engine.SimulationSettings()
     settings.solution.file.write = False
     settings.displayStatistics = settings.displayComputationTime = False
@@ -218,7 +237,10 @@ def _settings(scheme: Scheme) -> Any:
         for group in groups:
             target = getattr(target, group)
         setattr(target, name, value)
-    settings.linearSolver.solverType = _engine.LinearSolverType.EigenDense
+    kind = linear_solver(coordinates, constraints)
+    settings.linearSolver.solverType = getattr(_engine.LinearSolverType, kind)
+    if not constraints and coordinates >= _OLD_JACOBIAN_FROM:
+        integration.newton.modifiedNewtonJacUpdatePerStep = False
     return settings
 
 
