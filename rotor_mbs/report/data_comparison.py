@@ -51,6 +51,8 @@ def compare_data(
     >>> found = rm.compare_data({"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}, scene)
     >>> found.status, found.verdict.read[1]
     ('ok', "rotor = 'rotor_deg' [deg]")
+    >>> rm.compare_data({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
+    ('rotor: degrees taken as rad',)
     """
     study = compare_with_reference(load_data(data, scene, columns), scene, tolerance)
     return DataComparison(study)

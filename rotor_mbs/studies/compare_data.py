@@ -24,6 +24,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.studies.data_causes import CauseSearch, causes_in_the_data
+from rotor_mbs.studies.scene_causes import causes_in_the_scene
 
 METHOD = "data"  # what takes the place of a method's name
 # An error of the state changes the energy by its gradient: some ten times the error, of the energy scale; tenfold that.
@@ -52,7 +54,7 @@ class DataStudy:
 
 
 def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = DEFAULT_TOLERANCE) -> DataStudy:
-    """The verdict on data.
+    """The verdict on data; where they are off by more than the tolerance, causes are tried by running them.
 
     Raises InputError for a tolerance that is not positive, and for data without rows in the scene's duration.
     """
@@ -70,7 +72,20 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     at_rows = _rows_of(exact.trajectory, place)
     cut = _with_whole_turns(cut, at_rows)
     verdict = _verdict(scene, data, cut, at_rows, exact, carried, tolerance)
+    worst = max(one.error_per_growth for one in verdict.channels)
+    if not verdict.agrees:
+        verdict = replace(verdict, likely=_likely(CauseSearch(scene, _aligned(data, cut), exact, tolerance, worst)))
     return DataStudy(scene, cut, at_rows, carried, verdict)
+
+
+def _likely(search: CauseSearch) -> tuple[str, ...]:
+    found = causes_in_the_data(search)
+    return tuple(found if found or search.worst <= search.tolerance else causes_in_the_scene(search))
+
+
+def _aligned(data: ForeignData, cut: ForeignData) -> ForeignData:
+    """All rows, with the whole turns that were added to the rows within the duration."""
+    return replace(data, values=data.values + (cut.values[0] - data.values[0]))
 
 
 def _reference(scene: Scene, time: Array) -> TimedReference:
@@ -125,7 +140,7 @@ def _verdict(
             ),
         )
     if status in ("ok", "unchecked"):
-        status, message = _uncovered(scene, compared, exact, until)
+        status, message = _uncovered(scene, compared, exact, until) or (status, message)
     return DataVerdict(
         scene.name, data.source, status, message, tolerance, errors, rows, float(reference.time[-1]), horizon_s,
         found.metrics.get("energy_drift_max"), data.read, data.unused, tuple(_notes(scene, whole, data, run)),
@@ -166,7 +181,7 @@ def _as_run(scene: Scene, data: ForeignData, reference: Trajectory, tolerance: f
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 
-def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: int) -> tuple[str, str]:
+def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: int) -> tuple[str, str] | None:
     """What the rows leave out of the motion, which is then not ok: its start, its end, or all but a row of it."""
     time, end = data.time, min(scene.duration, float(exact.trajectory.time[-1]))
     step = float(np.diff(time).max(initial=0.0))
@@ -176,7 +191,7 @@ def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: in
         return "inaccurate", f"the data begin at t = {time[0]:.6g} s: what was before is not known"
     if until < _FEWEST:
         return "unchecked", f"{until} rows up to the horizon: too few to be compared"
-    return "ok", ""
+    return None
 
 
 def _notes(scene: Scene, whole: ForeignData, data: ForeignData, run: Solution) -> Sequence[str]:

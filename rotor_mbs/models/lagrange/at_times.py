@@ -12,7 +12,7 @@ from rotor_mbs.models.lagrange.closed_form import accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import Number
-from rotor_mbs.models.lagrange.system import Propagation, build_system, is_compact
+from rotor_mbs.models.lagrange.system import Propagation, build_system
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Trajectory
 
@@ -24,9 +24,8 @@ def motion_at(scene: Scene, times: Array) -> Trajectory:
     """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early."""
     if not is_available():
         return _by_scipy(scene, times, accelerations)
-    run = Propagation(
-        scene, build_system(scene), times=times, tol=_TAYLOR, compact_mode=is_compact(scene), high_accuracy=True
-    )
+    # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
+    run = Propagation(scene, build_system(scene), times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)
     run.run()
     return samples.trajectory(scene, times, run.states)
 

@@ -1,0 +1,185 @@
+"""Mistakes that people make, planted in trajectories of a code of its own: each is named or refused, none is ok."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support import other_code
+from support.other_code import Mistakes
+
+import rotor_mbs as rm
+from rotor_mbs.scenario.scene import Scene
+
+Array = Any
+DURATION = 2.0
+ROWS = 201
+
+
+@functools.cache
+def short(name: str) -> Scene:
+    return replace(rm.scene(name), duration=DURATION, samples=ROWS)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Data of a code with a mistake, compared with `scene`, and what names or refuses it.
+
+    changed     the scene that the code has in place of the right one
+    mistakes    in its equations
+    spoilt      (time, angles, rates) -> the same, after the run
+    """
+
+    says: str
+    scene: str = "paper/fig11"
+    changed: Callable[[Scene], Scene] = lambda scene: scene
+    mistakes: Mistakes = other_code.NONE
+    spoilt: Callable[[Array, Array, Array], tuple[Array, Array, Array]] = lambda *arrays: arrays
+    with_rates: bool = True
+
+    def data(self) -> dict[str, Array]:
+        time = np.linspace(0.0, DURATION, ROWS)
+        angles, rates = _run(self.scene, self.changed, self.mistakes)
+        time, angles, rates = self.spoilt(time, angles.copy(), rates.copy())
+        return {"time": time, "angles": angles} | ({"rates": rates} if self.with_rates else {})
+
+
+@functools.cache
+def _run(name: str, changed: Callable[[Scene], Scene], mistakes: Mistakes) -> tuple[Array, Array]:
+    return other_code.trajectory(changed(short(name)), np.linspace(0.0, DURATION, ROWS), mistakes)
+
+
+def lighter(scene: Scene) -> Scene:
+    return replace(scene, blades=tuple(replace(blade, mass=1.01 * blade.mass) for blade in scene.blades))
+
+
+def longer_offset(scene: Scene) -> Scene:
+    def moved(x: float, y: float, z: float) -> tuple[float, float, float]:
+        return 1.01 * x, y, z
+
+    return replace(scene, blades=tuple(replace(one, centre_of_mass=moved(*one.centre_of_mass)) for one in scene.blades))
+
+
+def with_gravity(value: float) -> Callable[[Scene], Scene]:
+    return lambda scene: replace(scene, gravity=value)
+
+
+def columns(*order: int) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
+    return lambda time, angles, rates: (time, angles[:, order], rates[:, order])
+
+
+def wrapped(angles: Array) -> Array:
+    return (angles + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def noise(size: float) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
+    drawn = np.random.default_rng(15).normal(0.0, size, (2, ROWS, 4))
+    return lambda time, angles, rates: (time, angles + drawn[0], rates + drawn[1])
+
+
+def spoilt(rows: dict[int, float]) -> Callable[[Array, Array, Array], tuple[Array, Array, Array]]:
+    """Other times in some rows."""
+
+    def change(time: Array, angles: Array, rates: Array) -> tuple[Array, Array, Array]:
+        for row, value in rows.items():
+            time[row] = value
+        return time, angles, rates
+
+    return change
+
+
+def not_a_number(time: Array, angles: Array, rates: Array) -> tuple[Array, Array, Array]:
+    angles[100, 2] = np.nan
+    return time, angles, rates
+
+
+THIRD = 2.0 * np.pi / 3.0
+QUARTER = np.array([np.pi / 2.0, 0.0, 0.0, 0.0])
+# Scenes: those in which the mistake changes the motion.
+PLANTS = {
+    "degrees": Plant("degrees taken as rad", spoilt=lambda t, q, w: (t, np.degrees(q), np.degrees(w))),
+    "degrees of pitch alone": Plant(
+        "pitch 1, pitch 2, pitch 3: degrees taken as rad", with_rates=False,
+        spoilt=lambda t, q, w: (t, np.hstack([q[:, :1], np.degrees(q[:, 1:])]), w),
+    ),
+    "sign of pitch": Plant(
+        "sign reversed", spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
+    ),
+    "another zero": Plant("rotor: zero off by 1.5708", spoilt=lambda t, q, w: (t, q + QUARTER, w)),
+    "blade order": Plant("columns exchanged: pitch 1 is pitch 3", spoilt=columns(0, 3, 1, 2)),
+    "phase": Plant("blades numbered the other way round", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))),
+    "gravity": Plant("gravity of 9.81 m/s^2", changed=with_gravity(9.81)),
+    "no gravity": Plant("gravity of 0 m/s^2", changed=with_gravity(0.0)),
+    "mass 1 % off, driven": Plant("blade.mass off by +1 %", "paper/fig15-10kNm", changed=lighter),
+    "mass 1 % off, springs": Plant("blade.mass off by +1 %", "check/general", changed=lighter),
+    "c 1 % off": Plant("blade.centre_of_mass[0] off by +1 %", changed=longer_offset),
+    "missing Coriolis": Plant("without the Coriolis terms", mistakes=Mistakes(coriolis=0.0)),
+    "missing Coriolis, full inertia": Plant(
+        "without the Coriolis terms", "check/general", mistakes=Mistakes(coriolis=0.0)
+    ),
+    "E1": Plant("erratum E1 of", mistakes=Mistakes(e1=True)),
+    "E2": Plant("erratum E2 of", mistakes=Mistakes(e2=True)),
+    "E2 and E3": Plant("erratum E2 and E3 of", mistakes=Mistakes(e2=True, e3=True)),
+    "as printed": Plant("erratum E1 and E2 and E3 of", mistakes=Mistakes(e1=True, e2=True, e3=True)),
+    "one sample late": Plant(
+        "a constant lag of 0.01 s, 1 rows (late)",
+        spoilt=lambda t, q, w: (t, np.vstack([q[:1], q[:-1]]), np.vstack([w[:1], w[:-1]])),
+    ),
+    "one sample early": Plant(
+        "a constant lag of -0.01 s, 1 rows (early)", spoilt=lambda t, q, w: (t[:-1], q[1:], w[1:])
+    ),
+    "half a sample late": Plant("a constant lag of 0.005 s (late)", spoilt=lambda t, q, w: (t + 0.005, q, w)),
+    "time in ms": Plant("time in ms taken as s", spoilt=lambda t, q, w: (1e3 * t, q, w)),
+    "numbers of rows": Plant("row numbers taken as s", spoilt=lambda t, q, w: (np.arange(1.0 * len(t)), q, w)),
+    "wrapped": Plant("wrapped, taken as unwrapped", "paper/fig12", spoilt=lambda t, q, w: (t, wrapped(q), w)),
+    "rates as angles": Plant(
+        "rotor is rotor rate, pitch 1 is pitch 1 rate", with_rates=False, spoilt=lambda t, q, w: (t, w, q)
+    ),
+    "noise": Plant("scatter from row to row, standard deviation 1", spoilt=noise(1e-4)),
+    "truncated": Plant("the data end at t = 1.49 s of 2 s", spoilt=lambda t, q, w: (t[:150], q[:150], w[:150])),
+    "another scene": Plant("the scene paper/fig09", changed=lambda _: short("paper/fig09")),
+    "swapped columns": Plant("columns exchanged: rotor is pitch 1, pitch 1 is rotor", spoilt=columns(1, 0, 2, 3)),
+}  # fmt: skip
+REFUSED = {
+    "NaN": Plant("is nan in row 101 of 201", spoilt=not_a_number),
+    "repeated time": Plant("repeats that of the row above", spoilt=spoilt({51: 0.5})),
+    "decreasing time": Plant("comes before that of the row above", spoilt=spoilt({51: 0.2})),
+}
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_mistake_is_named(name: str) -> None:
+    plant = PLANTS[name]
+    found = rm.compare_data(plant.data(), short(plant.scene))
+    assert found.status != "ok"
+    assert any(plant.says in text for text in (found.message, *found.likely)), (found.message, found.likely)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_compared_is_refused(name: str) -> None:
+    with pytest.raises(rm.InputError, match=REFUSED[name].says):
+        rm.compare_data(REFUSED[name].data(), short("paper/fig11"))
+
+
+@pytest.mark.parametrize("scene", ["paper/fig11", "check/general"])
+def test_a_true_run_with_the_noise_of_rounding_is_ok(scene: str) -> None:
+    found = rm.compare_data(Plant("", scene, spoilt=noise(1e-12)).data(), short(scene))
+    assert (found.status, found.likely) == ("ok", ())
+
+
+def test_e3_alone_is_no_mistake() -> None:
+    """The power of a term whose coefficient is zero unless E2 is in."""
+    assert rm.compare_data(Plant("", mistakes=Mistakes(e3=True)).data(), short("paper/fig11")).agrees
+
+
+def test_nothing_is_said_where_nothing_fits() -> None:
+    """A sine that no mistake makes."""
+    found = rm.compare_data(
+        Plant("", spoilt=lambda t, q, w: (t, q + 1e-2 * np.sin(7.0 * t)[:, None], w)).data(), short("paper/fig11")
+    )
+    assert found.status == "inaccurate"
+    assert found.likely == ()
