@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn, TypeAlias
 
 import rotor_mbs
+from rotor_mbs.cli.argument_values import file, part, path, positive, setting, span
 from rotor_mbs.errors import nearest
 
 _SCENE, _SCENES = "a name (paper/fig05) or a TOML file", "a name (paper/fig05), a folder (paper), a TOML file"
@@ -19,7 +20,6 @@ _DEFAULT_TIMEOUT_S = 60.0
 # The suite has many runs that would reach any limit: with a shorter one it ends in minutes.
 _SUITE_TIMEOUT_S = 8.0
 _CHART_TIMEOUT_S = 600.0
-_LONGEST_SPAN = 10_000
 _DEFAULT_BUDGET_S = 28.0  # the paper's seventeen scenes in eight minutes
 
 
@@ -84,7 +84,7 @@ def _add_list_and_show(commands: _Commands) -> None:
     show.add_argument("--json", action="store_true", help="as JSON, for a script")
 
     new = _command(commands, "new", "a commented scene file to start from", "scenes:new", "my.toml")
-    new.add_argument("file", type=_file, metavar="FILE", help="a TOML file that does not exist yet")
+    new.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
 
 
 def _add_runs(commands: _Commands) -> None:
@@ -96,7 +96,7 @@ def _add_runs(commands: _Commands) -> None:
         "",
         "-o out -j 4",
     )
-    reproduce.add_argument("-o", "--output", type=Path, default=_DEFAULT_FOLDER, metavar="DIR", help=_default("DIR"))
+    reproduce.add_argument("-o", "--output", type=path, default=_DEFAULT_FOLDER, metavar="DIR", help=_default("DIR"))
     _add_pool_options(reproduce)
 
     run = _command(
@@ -106,10 +106,10 @@ def _add_runs(commands: _Commands) -> None:
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     _add_methods(run)
     run.add_argument(
-        "--set", action="append", type=_setting, metavar="NAME=VALUE",
+        "--set", action="append", type=setting, metavar="NAME=VALUE",
         help="a setting of the methods, in place of its default; may be repeated",
     )  # fmt: skip
-    run.add_argument("-o", "--output", type=_file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
+    run.add_argument("-o", "--output", type=file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
     _add_pool_options(run)
 
 
@@ -130,7 +130,7 @@ def _add_compare(commands: _Commands) -> None:
         help="column, unit, sign, zero of each channel (default: guessed)",
     )
     compare.add_argument(
-        "--tolerance", type=_positive(float, "a number more than 0"), default=1e-6, metavar="X",
+        "--tolerance", type=positive(float, "a number more than 0"), default=1e-6, metavar="X",
         help="rad per unit of error growth that still agree (default: %(default)g)",
     )  # fmt: skip
     compare.add_argument(
@@ -146,15 +146,15 @@ def _add_bench(commands: _Commands) -> None:
     )  # fmt: skip
     bench.add_argument("scenes", nargs="*", metavar="SCENE", help=_SCENES)
     _add_methods(bench)
-    bench.add_argument("-o", "--output", type=_file, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
+    bench.add_argument("-o", "--output", type=file, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
     bench.add_argument("--growth", action="store_true", help="also how cost grows with blades and with duration")
     bench.add_argument(
-        "--repeats", type=_positive(int, "a whole number from 1 up"), default=20, metavar="N",
+        "--repeats", type=positive(int, "a whole number from 1 to 1e9"), default=20, metavar="N",
         help="timed runs of each point (default: %(default)s; 5 at most for runs over 0.5 s)",
     )  # fmt: skip
     bench.add_argument(
-        "--budget", type=_positive(float, "seconds, more than 0"), default=_DEFAULT_BUDGET_S, metavar="SECONDS",
-        help="for each scene (default: %(default)g)",
+        "--budget", type=positive(float, "seconds, more than 0, at most 1e9"), default=_DEFAULT_BUDGET_S,
+        metavar="SECONDS", help="for each scene (default: %(default)g)",
     )  # fmt: skip
 
 
@@ -167,7 +167,7 @@ def _add_reference(commands: _Commands) -> None:
         "paper/fig08 -o reference.h5",
     )
     reference.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
-    reference.add_argument("-o", "--output", type=_file, required=True, metavar="FILE")
+    reference.add_argument("-o", "--output", type=file, required=True, metavar="FILE")
     _add_pool_options(reference)
 
 
@@ -177,25 +177,25 @@ def _add_check(commands: _Commands) -> None:
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
     check.add_argument(
-        "file", nargs="?", type=Path, metavar="FILE", help="a results file (default: a quick set, computed)"
+        "file", nargs="?", type=path, metavar="FILE", help="a results file (default: a quick set, computed)"
     )
-    check.add_argument("--bounds", type=Path, metavar="TOML", help="own bounds, read before reference/accuracy.toml")
+    check.add_argument("--bounds", type=path, metavar="TOML", help="own bounds, read before reference/accuracy.toml")
     check.add_argument(
         "--require", action="append", metavar="METHOD",
         help="fail where a scene of FILE has no run of it; may be repeated",
     )  # fmt: skip
     check.add_argument(
-        "--against", type=Path, metavar="OLD",
+        "--against", type=path, metavar="OLD",
         help="also fail where a verdict on this earlier results file passed by more, or its run is gone",
     )  # fmt: skip
     check.add_argument(
-        "--shrink", type=_positive(float, "a number, more than 0"), default=10.0, metavar="FACTOR",
+        "--shrink", type=positive(float, "a number, more than 0"), default=10.0, metavar="FACTOR",
         help="with --against: by how much a margin may shrink (default: %(default)g)",
     )  # fmt: skip
-    check.add_argument("--junit", type=_file, metavar="XML", help="verdicts as JUnit XML")
-    check.add_argument("--json", type=_file, metavar="FILE", help="verdicts as JSON; - for standard output")
-    check.add_argument("--trend", type=_file, metavar="FILE", help="shares of the bounds as JSON, for charts over time")
-    check.add_argument("--badge", type=_file, metavar="FILE", help="the outcome as JSON for shields.io")
+    check.add_argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML")
+    check.add_argument("--json", type=file, metavar="FILE", help="verdicts as JSON; - for standard output")
+    check.add_argument("--trend", type=file, metavar="FILE", help="shares of the bounds as JSON, for charts over time")
+    check.add_argument("--badge", type=file, metavar="FILE", help="the outcome as JSON for shields.io")
     check.add_argument(
         "--github", action="store_true", help="the ten worst failures as annotations, a table as job summary"
     )
@@ -211,9 +211,9 @@ def _add_stability(commands: _Commands) -> None:
     )  # fmt: skip
     stability.add_argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)")
     stability.add_argument(
-        "-o", "--output", type=_file, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
+        "-o", "--output", type=file, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
     )
-    stability.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
+    stability.add_argument("--report", type=path, metavar="DIR", help="its pages (default: FILE's name with -report)")
     _add_pool_options(stability, timeout_s=_SUITE_TIMEOUT_S)
 
 
@@ -224,15 +224,15 @@ def _add_modes(commands: _Commands) -> None:
     )  # fmt: skip
     modes.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     modes.add_argument(
-        "--speeds", type=_span, default=(), metavar="FROM:TO:COUNT",
+        "--speeds", type=span, default=(), metavar="FROM:TO:COUNT",
         help="rad/s, equally spaced: Campbell diagram and Floquet multipliers, as 0:3:31 (default: at rest alone)",
     )  # fmt: skip
     modes.add_argument(
-        "--stiffness", type=_span, default=(), metavar="FROM:TO:COUNT",
+        "--stiffness", type=span, default=(), metavar="FROM:TO:COUNT",
         help="N m/rad of every bearing: the stability chart over speed and stiffness",
     )  # fmt: skip
-    modes.add_argument("-o", "--output", type=_file, default=Path("modes.h5"), metavar="FILE", help=_default("FILE"))
-    modes.add_argument("--report", type=Path, metavar="DIR", help="its pages (default: FILE's name with -report)")
+    modes.add_argument("-o", "--output", type=file, default=Path("modes.h5"), metavar="FILE", help=_default("FILE"))
+    modes.add_argument("--report", type=path, metavar="DIR", help="its pages (default: FILE's name with -report)")
     modes.add_argument("--json", action="store_true", help="the table as JSON, for a script")
     _add_pool_options(modes, timeout_s=_CHART_TIMEOUT_S)
 
@@ -242,14 +242,14 @@ def _add_claims(commands: _Commands) -> None:
         commands, "claims", "the paper's claims in words as shares of many runs, its numbers under other conditions",
         "claims:claims", "--runs 20",
     )  # fmt: skip
-    claims.add_argument("-o", "--output", type=_file, default=Path("claims.h5"), metavar="FILE", help=_default("FILE"))
+    claims.add_argument("-o", "--output", type=file, default=Path("claims.h5"), metavar="FILE", help=_default("FILE"))
     claims.add_argument(
-        "--runs", type=_positive(int, "a whole number from 1 up"), default=100, metavar="N",
+        "--runs", type=positive(int, "a whole number from 1 to 1e9"), default=100, metavar="N",
         help="starts moved by up to 1e-15 rad, for each scene, method and duration (default: %(default)s)",
     )  # fmt: skip
     claims.add_argument(
         "--seed",
-        type=_positive(int, "a whole number from 1 up"),
+        type=positive(int, "a whole number from 1 to 1e9"),
         default=2020,
         metavar="N",
         help="of the moved starts (default: %(default)s)",
@@ -259,8 +259,8 @@ def _add_claims(commands: _Commands) -> None:
 
 def _add_report(commands: _Commands) -> None:
     report = _command(commands, "report", "HTML pages from a results file", "reports:report", "my.h5")
-    report.add_argument("file", type=Path, metavar="FILE", help="a results file")
-    report.add_argument("-o", "--output", type=Path, default=Path("report"), metavar="DIR", help=_default("DIR"))
+    report.add_argument("file", type=path, metavar="FILE", help="a results file")
+    report.add_argument("-o", "--output", type=path, default=Path("report"), metavar="DIR", help=_default("DIR"))
 
     figures = _command(
         commands,
@@ -269,7 +269,7 @@ def _add_report(commands: _Commands) -> None:
         "reports:figures",
         "--format svg --figure 11",
     )
-    figures.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help=_default("DIR"))
+    figures.add_argument("-o", "--output", type=path, default=Path("figures"), metavar="DIR", help=_default("DIR"))
     figures.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
     figures.add_argument("--figure", action="append", metavar="N", help="this one alone; may be repeated")
     _add_results(figures)
@@ -280,11 +280,11 @@ def _add_report(commands: _Commands) -> None:
     )  # fmt: skip
     animate.add_argument("scene", metavar="SCENE", help="its name in the results file")
     animate.add_argument(
-        "-o", "--output", type=_file, required=True, metavar="FILE",
+        "-o", "--output", type=file, required=True, metavar="FILE",
         help="FILE.webp, FILE.gif, or FILE.mp4 where ffmpeg is installed",
     )  # fmt: skip
     animate.add_argument(
-        "--offset", type=_positive(float, "a number more than 0"), metavar="TIMES",
+        "--offset", type=positive(float, "a number more than 0, at most 1e9"), metavar="TIMES",
         help="how many times the tip's distance from its pitch axis is drawn (default: to a tenth of the blade)",
     )  # fmt: skip
     _add_results(animate)
@@ -294,7 +294,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--results",
         dest="file",
-        type=Path,
+        type=path,
         default=_DEFAULT_FOLDER / "results.h5",
         metavar="FILE",
         help=_default("FILE"),
@@ -306,9 +306,9 @@ def _add_sweep(commands: _Commands) -> None:
         commands, "sweep", "a parameter study into one dataset", "sweep:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
-    sweep.add_argument("file", type=Path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
+    sweep.add_argument("file", type=path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
     _add_methods(sweep, "in place of the file's")
-    sweep.add_argument("-o", "--output", type=_file, metavar="FILE", help="(default: the sweep's name with its ending)")
+    sweep.add_argument("-o", "--output", type=file, metavar="FILE", help="(default: the sweep's name with its ending)")
     sweep.add_argument(
         "--format", choices=("h5", "nc"), default="h5", help="ending of the default FILE (default: h5); one content"
     )
@@ -317,45 +317,11 @@ def _add_sweep(commands: _Commands) -> None:
         help="RO-Crate, Croissant and statistics for normalization beside FILE, as JSON",
     )  # fmt: skip
     sweep.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
-    sweep.add_argument("--part", type=_part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
+    sweep.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
     sweep.add_argument("--dry-run", action="store_true", help="how many runs, about how long, how much")
     sweep.add_argument("--yes", action="store_true", help="start a sweep of over a million runs")
     sweep.add_argument("--json", action="store_true", help="progress and summary as JSON lines")
     _add_pool_options(sweep)
-
-
-def _span(text: str) -> tuple[float, ...]:
-    """COUNT numbers from FROM to TO, both included, of "FROM:TO:COUNT"."""
-    try:
-        first, last, count = (kind(part) for kind, part in zip((float, float, int), text.split(":"), strict=True))
-        if 0.0 <= first < last < float("inf") and 2 <= count <= _LONGEST_SPAN:
-            return tuple(first + (last - first) * i / (count - 1) for i in range(int(count)))
-    except ValueError:
-        pass
-    raise argparse.ArgumentTypeError(
-        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO and COUNT from 2 to {_LONGEST_SPAN}"
-    )
-
-
-def _part(text: str) -> tuple[int, int]:
-    """(K, N) of "K/N"."""
-    number, _, parts = text.partition("/")
-    if not (number.isdecimal() and parts.isdecimal() and 1 <= int(number) <= int(parts)):
-        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: K/N with K from 1 to N")
-    return int(number), int(parts)
-
-
-def _setting(text: str) -> tuple[str, object]:
-    """(name, value) of "name=value": a number where it is one."""
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not (name and equals and value):
-        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: NAME=VALUE")
-    for kind in (int, float):
-        try:
-            return name, kind(value)
-        except ValueError:
-            continue
-    return name, value
 
 
 def _add_export(commands: _Commands) -> None:
@@ -370,16 +336,8 @@ def _add_export(commands: _Commands) -> None:
         "equations; iftomm: a folder with description, error definition, acceptance and results",
     )  # fmt: skip
     export.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="or folder (default: the scene's name with an ending)"
+        "-o", "--output", type=path, metavar="FILE", help="or folder (default: the scene's name with an ending)"
     )
-
-
-def _file(text: str) -> Path:
-    """Where a file is to be written: neither nothing, nor a folder that is there."""
-    path = Path(text)
-    if not path.name or path.name == ".." or path.is_dir():
-        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a file's name, not a folder")
-    return path
 
 
 def _default(metavar: str) -> str:
@@ -413,7 +371,7 @@ def _add_methods(parser: argparse.ArgumentParser, text: str = "model/integrator"
 
 def _add_jobs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "-j", "--jobs", type=_positive(int, "a whole number from 1 up"), default=cores(), metavar="N",
+        "-j", "--jobs", type=positive(int, "a whole number from 1 to 1e9"), default=cores(), metavar="N",
         help="parallel processes (default: the cores, %(default)s)",
     )  # fmt: skip
 
@@ -421,7 +379,7 @@ def _add_jobs(parser: argparse.ArgumentParser) -> None:
 def _add_pool_options(parser: argparse.ArgumentParser, timeout_s: float = _DEFAULT_TIMEOUT_S) -> None:
     _add_jobs(parser)
     parser.add_argument(
-        "--timeout", type=_positive(float, "seconds, more than 0"), default=timeout_s, metavar="SECONDS",
+        "--timeout", type=positive(float, "seconds, more than 0, at most 1e9"), default=timeout_s, metavar="SECONDS",
         help="a run longer than this is ended and recorded as timed_out (default: %(default)g)",
     )  # fmt: skip
 
@@ -429,16 +387,3 @@ def _add_pool_options(parser: argparse.ArgumentParser, timeout_s: float = _DEFAU
 def cores() -> int:
     """How many processes this one may run at once."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], float]:
-    def read(text: str) -> float:
-        try:
-            value = kind(text)
-        except ValueError:
-            value = kind(0)
-        if not 0 < value < float("inf"):
-            raise argparse.ArgumentTypeError(f"{text!r} given, allowed: {allowed}")
-        return value
-
-    return read

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import signal
 import sys
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotor_mbs.cli.streams import show
 from rotor_mbs.cli.terminal import SweepProgress, span
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.execution.pool import TaskPool
@@ -26,11 +25,12 @@ _MANY = 1_000_000  # runs that are not started without --yes
 
 def sweep(arguments: argparse.Namespace) -> int:
     """1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
-    with _interruptible(), closing(open_task_pool(arguments.engine, arguments.jobs)) as pool:
-        from rotor_mbs.scenario.sweep import load_sweep
+    with closing(open_task_pool(arguments.engine, arguments.jobs)) as pool:
+        from rotor_mbs.scenario.sweep import MAX_ROWS, load_sweep
         from rotor_mbs.studies.sweep import plan_sweep
 
-        study = load_sweep(arguments.file)
+        may_be_long = arguments.yes or arguments.dry_run
+        study = load_sweep(arguments.file, MAX_ROWS if may_be_long else _MANY)
         plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             return _show_estimate(plan, pool, arguments)
@@ -55,7 +55,7 @@ def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
                 on_progress=progress,
             )
     except StoreError as exc:  # the disk, not the input: what is stored stays, the same command continues
-        print(exc, file=sys.stderr)
+        show(str(exc), sys.stderr)
         return 1
     _summarize(result, as_json=arguments.json)
     if study.table.picture and arguments.part == (1, 1):
@@ -67,20 +67,6 @@ def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
         names = ", ".join(place.name for place in describe(result.path))
         print(f"{result.path}: described in {names}", file=sys.stderr if arguments.json else sys.stdout)
     return 0 if result.is_ok else 1
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """SIGTERM, as a cluster sends before it kills, ends the sweep as Ctrl-C does."""
-
-    def interrupt(_number: int, _frame: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _summarize(result: SweepResult, *, as_json: bool) -> None:

@@ -11,9 +11,11 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TextIO
 
+from rotor_mbs.cli.streams import printable
 from rotor_mbs.solution.status import STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
@@ -46,7 +48,8 @@ def print_table(table: TextTable) -> None:
 
 def print_text(text: str) -> None:
     """On standard output, after an empty line, with its statuses coloured on a terminal."""
-    print("", coloured(text) if has_colour(sys.stdout) else text, sep="\n")
+    text, stream = printable(text), getattr(sys.stdout, "unfiltered", sys.stdout)
+    print("", coloured(text) if has_colour(stream) else text, sep="\n", file=stream)
 
 
 class _RenewedLine:
@@ -83,6 +86,7 @@ class _RenewedLine:
     def _show(self, text: str, *, keep: bool = False) -> None:
         """keep: it stays on the terminal, whole."""
         with self._lock:
+            text = printable(text)
             self._text = "" if keep else text
             if not self._is_terminal:
                 self._print(text)
@@ -96,7 +100,9 @@ class _RenewedLine:
         self._print(f"\r\x1b[K{text[: self._width - len(elapsed)]}{elapsed}", end="")
 
     def _print(self, text: str, end: str = "\n") -> None:
-        print(text, end=end, file=self._stream, flush=True)
+        """A progress that nobody can read any more must not end the work."""
+        with suppress(OSError, ValueError):
+            print(text, end=end, file=getattr(self._stream, "unfiltered", self._stream), flush=True)
 
     @property
     def _width(self) -> int:

@@ -6,6 +6,8 @@ import gc
 import time
 from collections.abc import Mapping
 
+import numpy as np
+
 from rotor_mbs.methods.base import Method, Settings
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import time_limit
@@ -45,7 +47,8 @@ def solve(
         if gc_was_on:
             gc.enable()
     start = time.perf_counter()
-    trajectory = solver.observe()
+    with np.errstate(over="ignore", invalid="ignore"):  # of a runaway: the judgement sees what is not finite
+        trajectory = solver.observe()
     output = time.perf_counter() - start
     found = Solution(scene, method.name, trajectory, integration, chosen.as_dict(), setup, run_times, output)
     found.is_corrected, found.bounds = method.is_corrected, method.bounds

@@ -42,10 +42,10 @@ class KeyProblem(NamedTuple):
 
 
 class TableError(ValueError):
-    """Tables of a file that are not as they should be; `problems` are all that is wrong."""
+    """Tables of a file that are not as they should be; `problems` are what is wrong, but for the `left_out` last."""
 
-    def __init__(self, problems: Sequence[KeyProblem]) -> None:
-        self.problems = tuple(problems)
+    def __init__(self, problems: Sequence[KeyProblem], left_out: int = 0) -> None:
+        self.problems, self.left_out = tuple(problems), left_out
         super().__init__("; ".join(problem.message for problem in problems))
 
     @property

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -57,7 +57,9 @@ def validate(model: type[M], tables: Mapping[str, Any]) -> M:
     try:
         return model.model_validate(tables, context={})
     except ValidationError as error:
-        raise TableError([_problem(one, tables, model) for one in error.errors(include_url=False)]) from error
+        found = error.errors(include_url=False)
+        shown = [_problem(one, tables, model) for one in found[:_MAX_PROBLEMS]]
+        raise TableError(shown, left_out=len(found) - len(shown)) from error
 
 
 def validate_file(model: type[M], tables: Mapping[str, Any], text: str, source: str) -> M:
@@ -65,12 +67,17 @@ def validate_file(model: type[M], tables: Mapping[str, Any], text: str, source: 
     try:
         return validate(model, tables)
     except TableError as error:
-        lines = find_lines(text)
-        found = sorted((line_of(lines, problem.path), problem.message) for problem in error.problems)
-    shown = [f"{source}:{line}: {message}" for line, message in found[:_MAX_PROBLEMS]]
-    if len(found) > _MAX_PROBLEMS:
-        shown.append(f"{source}: {len(found) - _MAX_PROBLEMS} more errors")
+        shown = located(error.problems, text, source)
+        if error.left_out:
+            shown.append(f"{source}: {error.left_out} more errors")
     raise InputError(shown)
+
+
+def located(problems: Sequence[KeyProblem], text: str, source: str) -> list[str]:
+    """A line `source:line: message` for each error in a file's text, in the order of the lines."""
+    lines = find_lines(text)
+    found = sorted((line_of(lines, problem.path), problem.message) for problem in problems)
+    return [f"{source}:{line}: {message}" for line, message in found]
 
 
 def invalid(wrong: str, allowed: str | None = None) -> PydanticCustomError:

@@ -97,6 +97,7 @@ def judged(run: Solution, reference: Trajectory | None) -> Solution:
     return replace(run, status=found.status, message=found.message, metrics=found.metrics)
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
     """Finite? End reached? Through a singularity? Energy, quantities, reference? The first no names the status."""
     metrics = metrics_of(scene, run.trajectory, reference)

@@ -61,7 +61,7 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
     """
     weights = sum(b.mass * scene.gravity * float(np.linalg.norm(b.centre_of_mass)) for b in scene.blades)
     springs = sum(
-        0.5 * k * (angle - value_at(scene.pitch_load(i)[1], 0.0)) ** 2
+        0.5 * k * float(np.square(angle - value_at(scene.pitch_load(i)[1], 0.0)))
         for i, (k, angle) in enumerate(zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False))
     )
     kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.solution.quantities import SCALES, Quantity, quantities, scale_values
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store import hdf5
@@ -29,10 +30,14 @@ def write_run(path: Path, scene_hash: str, run: Solution, attributes: Mapping[st
     }
     refined = run.trajectory.get("refined_time")
     datasets = {**scale_values(scene), "time": run.time, "refined_time": refined, **run.quantities}
+    outputs: tuple[str, ...] = scene.outputs
+    if run.method == REFERENCE:  # it is read back by its angles and rates, whatever the scene asks for
+        datasets |= {"angles": run.angles, "rates": run.rates}
+        outputs = (*outputs, "angles", "rates")
     with hdf5.new_file(path) as file:
         hdf5.put_attributes(hdf5.new_group(file, scene.name), facts)
         group = hdf5.new_group(file, f"{scene.name}/{run.method}")
-        put_datasets(group, datasets, quantities(scene.outputs), list(scene.coordinate_labels))
+        put_datasets(group, datasets, quantities(outputs), list(scene.coordinate_labels))
         hdf5.put_attributes(group, {**_facts(run), **attributes})
 
 

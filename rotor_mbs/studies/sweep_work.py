@@ -20,7 +20,7 @@ from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts, horizon, largest, running_growth
-from rotor_mbs.solution.quantities import energy_balance
+from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
@@ -28,6 +28,7 @@ from rotor_mbs.store.sweep_columns import Rows, RunColumns
 from rotor_mbs.store.sweep_layout import AMPLIFICATION, MESSAGE_BYTES, METRICS, empty_rows
 
 ENSEMBLE_METHOD = "lagrange/taylor"
+_SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that `solve_many` computes
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def perform(chunk: Chunk) -> Rows | NDArray[np.int8]:
 def rows_of(chunk: Chunk) -> Rows:
     """(runs, ...) columns of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
     scenes = _scenes(chunk)
-    if chunk.method == ENSEMBLE_METHOD:
+    if chunk.method == ENSEMBLE_METHOD and _has_all_of(scenes[0].outputs):
         rows = _ensemble(chunk, scenes)
     else:
         rows = empty_rows(len(scenes), chunk.row)
@@ -97,6 +98,11 @@ def _put_amplification(rows: Rows, i: int, scene: Scene) -> None:
     time = np.linspace(0.0, scene.duration, scene.samples)
     motion = Trajectory(time, angles, angles, error_growth=error_growth(scene))
     rows["error_growth"][i], rows["horizon_s"][i] = running_growth(motion)[-1], horizon(motion)
+
+
+def _has_all_of(outputs: Sequence[str]) -> bool:
+    """Whether runs side by side have what is asked for, or it follows from their samples."""
+    return all(one.output in _SIDE_BY_SIDE or one.producer or not one.required for one in quantities(outputs))
 
 
 def _scenes(chunk: Chunk) -> list[Scene]:

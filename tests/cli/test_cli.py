@@ -221,7 +221,7 @@ def test_a_run_without_a_single_finite_sample_is_stored_as_what_it_is(tmp_path: 
         (["run", "paper/fig99"], "no such scene"),
         (["run", "../paper"], "../paper"),
         (["run", "paper/fig05", "-m", "magic/rk4"], "allowed: printed/ode45"),
-        (["run", "paper/fig05", "-j", "0"], "allowed: a whole number from 1 up"),
+        (["run", "paper/fig05", "-j", "0"], "allowed: a whole number from 1 to"),
         (["run", "paper/fig05", "--timeout", "nan"], "allowed: seconds, more than 0"),
         (["show", "paper"], "one scene"),
         (["report", "missing.h5"], "no such file"),
