@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.rehydrate import Rehydrated, rehydrate
+from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
@@ -23,7 +25,9 @@ from rotor_mbs.solution.metrics import Metrics, energy_scale, metrics_of
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.store.digests import DIGESTS
+from rotor_mbs.store.hdf5 import reading
+from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene, all_damages
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +64,41 @@ def verdicts(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds
     shipped = {name: scene.reference for file in frozen for name, scene in file.scenes.items()}
     found: list[Verdict] = []
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
+        damages = _damages(results)
         for scene in results.scenes.values():
             for run in scene.runs.values():
-                found += _of_run(run, bounds, rehydrate(scene, run), _motion_ends(scene))
+                found += _of_stored_run(scene, run, bounds, damages.pop(f"{scene.name}/{run.method}", []))
             found += _of_reference(scene, shipped.get(scene.name), bounds)
+        if results.scenes:
+            found += [_integrity(place, "*", parts, bounds) for place, parts in damages.items()]
         found += _of_paper(results, bounds)
+    return found
+
+
+def _damages(results: OpenResults) -> dict[str, list[str]]:
+    """Parts that are not what was written, by the path of their group; the root's is "file"."""
+    found: dict[str, list[str]] = {}
+    for place, part in all_damages(results.root):
+        found.setdefault(place or "file", []).append(part)
+    return found
+
+
+def _integrity(scene: str, method: str, parts: Sequence[str], bounds: Bounds) -> Verdict:
+    look = f"{', '.join(parts)} changed after it was written" if parts else "as written"
+    if list(parts) == [DIGESTS]:
+        look = "it has no digests: they were removed, or an earlier version wrote it"
+    bound = bounds.of("integrity", method).value
+    return Verdict("integrity", scene, method, "digests", float(len(parts)), bound, "parts", look)
+
+
+def _of_stored_run(scene: StoredScene, run: StoredRun, bounds: Bounds, damages: Sequence[str]) -> list[Verdict]:
+    """Of a run that is known to be damaged, what can still be judged."""
+    found = [_integrity(scene.name, run.method, damages, bounds)]
+    try:
+        with reading(str(scene.name), run.method) if damages else nullcontext():
+            found += _of_run(run, bounds, rehydrate(scene, run), _motion_ends(scene))
+    except StoreError as exc:
+        found.append(_make("complete", run, "all", math.nan, bounds, "faults", str(exc)))
     return found
 
 

@@ -108,6 +108,7 @@ def draw(sweep: Sweep, dataset: Path, path: Path) -> str:
     from rotor_mbs.store.sweep_dataset import StoredSweep
 
     stored = StoredSweep(dataset)
+    stored.refuse_damaged_runs()
     if sweep.table.picture == "spread":
         spread = spread_of(stored)
         text = spread_figure(spread, sweep.table.title)

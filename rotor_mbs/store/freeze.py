@@ -5,16 +5,14 @@ The digests stand in a text file beside each file of references: a changed numbe
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
-
-import numpy as np
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.solution.quantities import BUILT_IN, LOADS
 from rotor_mbs.store import hdf5
-from rotor_mbs.store.read import OpenResults, StoredRun, open_results
+from rotor_mbs.store.digests import array_digest
+from rotor_mbs.store.read import OpenResults, open_results
 from rotor_mbs.store.write import put_datasets
 
 # What cannot be computed again from angles and rates as precisely, and the scales.
@@ -75,12 +73,6 @@ def changed_arrays(results: OpenResults) -> dict[str, list[str]]:
 
 def _digests(results: OpenResults) -> dict[tuple[str, str], str]:
     references = [scene.reference for scene in results.scenes.values()]
-    return {(run.scene, name): _digest(run, name) for run in references if run is not None for name in run.names}
-
-
-def _digest(run: StoredRun, name: str) -> str:
-    """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout."""
-    values = np.ascontiguousarray(run.array(name))
-    digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
-    digest.update(values.astype(values.dtype.newbyteorder("<")).tobytes())
-    return digest.hexdigest()
+    return {
+        (run.scene, name): array_digest(run.array(name)) for run in references if run is not None for name in run.names
+    }

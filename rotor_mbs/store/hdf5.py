@@ -14,10 +14,20 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.solution.quantities import Quantity
+from rotor_mbs.store.digests import DIGESTS, plain, seal_all
 from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Column
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
+
+# What h5py and HDF5 raise on damaged files, and what plain code does with what they return.
+_DAMAGE = (
+    KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, OverflowError, MemoryError,
+    NotImplementedError,
+)  # fmt: skip
+
+# An array may be larger than its bytes in the file, where it is compressed: up to a factor, and a size in any case.
+_UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
 
 # What the library keeps of scales and their users; it writes them itself when a scale is made or attached.
 _SCALE_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid")
@@ -27,12 +37,14 @@ _SCALE_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netc
 def new_file(path: Path) -> Iterator[Any]:
     """A new HDF5 file, put in the place of `path` when all of it is written and on the disk.
 
-    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
-    where the file cannot be written; what stood at `path` before then still stands.
+    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Every group that has
+    no digests yet gets them. Raises StoreError where the file cannot be written; what stood at `path` before then still
+    stands.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
     with begin_file(path.name, **memory) as file:
         yield file
+        seal_all(file)
         file.flush()
         image = file.id.get_file_image()
     replace_file(path, image)
@@ -81,13 +93,60 @@ def open_file(path: Path) -> Iterator[Any]:
     except OSError as exc:
         raise StoreError(f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]})") from exc
     with file:
-        written_by = file.attrs.get("format")
+        with reading(path):
+            written_by, version = (plain(file.attrs.get(name)) for name in ("format", "format_version"))
         if written_by != FORMAT:
             raise StoreError(f"{path}: not a {FORMAT} results file (attribute format is {written_by!r})")
-        version = file.attrs.get("format_version")
         if version != FORMAT_VERSION:
-            raise StoreError(f"{path}: format_version {version}, this program reads {FORMAT_VERSION}")
+            raise StoreError(f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}")
         yield file
+
+
+@contextmanager
+def reading(path: Path | str, what: str = "") -> Iterator[None]:
+    """Whatever goes wrong in reading a file that may be damaged is a StoreError that names the place."""
+    try:
+        yield
+    except StoreError:
+        raise
+    except _DAMAGE as exc:
+        place = f"{path}: {what}" if what else f"{path}"
+        reason = str(exc).splitlines()[0][:150] if str(exc) else type(exc).__name__
+        raise StoreError(f"{place}: damaged or incomplete ({reason})") from exc
+
+
+def members(group: Any) -> Iterator[tuple[str, Any]]:
+    """(name, item) of a group, in order. Raises StoreError at a link that leads out of the file or nowhere."""
+    for name in group:
+        yield name, member(group, name)
+
+
+def member(group: Any, name: str) -> Any:
+    """One of them. Raises KeyError where there is none, StoreError at a link."""
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise StoreError(
+            f"{group.file.filename}: {group.name}/{name} is a link; allowed: groups and arrays of this file"
+        )
+    return group[name]
+
+
+def values_of(dataset: Any) -> NDArray[Any]:
+    """An array, whole. Raises StoreError where it is not in the file, or claims far more than the file holds."""
+    place = f"{dataset.file.filename}: {dataset.name}"
+    if not isinstance(dataset, h5py.Dataset):
+        raise StoreError(f"{place} is no array")
+    if dataset.external or dataset.is_virtual:
+        raise StoreError(f"{place} is stored in another file; allowed: arrays of this file")
+    kept = dataset.id.get_storage_size()
+    if kept > Path(dataset.file.filename).stat().st_size or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
+        raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
+    values: NDArray[Any] = dataset[()]
+    return values
+
+
+def address(group: Any) -> int:
+    """Where a group stands in its file: two names of one group have one address."""
+    return int(h5py.h5o.get_info(group.id).addr)
 
 
 def new_group(parent: Any, name: str) -> Any:
@@ -127,23 +186,15 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 
 def attributes_of(target: Any) -> dict[str, Any]:
     """As plain Python values."""
-    return {name: _plain(value) for name, value in target.attrs.items() if name != "REFERENCE_LIST"}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return [_plain(item) for item in value]
-    if isinstance(value, bytes):
-        return value.decode()
-    return value.item() if isinstance(value, np.generic) else value
+    return {name: plain(value) for name, value in target.attrs.items() if name not in ("REFERENCE_LIST", DIGESTS)}
 
 
 def copy_group(source: Any, target: Any) -> None:
     """All members and attributes of one group into another, in order. Scales are made and attached anew: a copy by
     the library itself would leave references that point nowhere."""
-    datasets = {name: item for name, item in source.items() if not is_group(item)}
+    datasets = {name: item for name, item in members(source) if not is_group(item)}
     for name, item in datasets.items():
-        copied = target.create_dataset(name, data=item[()], compression=item.compression, shuffle=item.shuffle)
+        copied = target.create_dataset(name, data=values_of(item), compression=item.compression, shuffle=item.shuffle)
         copied.attrs.update({key: value for key, value in item.attrs.items() if key not in _SCALE_ATTRIBUTES})
         if item.is_scale:
             copied.make_scale(name)
@@ -153,7 +204,7 @@ def copy_group(source: Any, target: Any) -> None:
                 # By the name that the scale itself tells: the library would look for its path through the whole file.
                 target[name].dims[axis].attach_scale(target[dimension.keys()[0]])
     target.attrs.update(source.attrs)
-    for name, item in source.items():
+    for name, item in members(source):
         if is_group(item):
             copy_group(item, new_group(target, name))
 
@@ -208,7 +259,7 @@ def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str,
             name = _chosen(path, list(places), group.strip("/"), scene)
             chosen = file[name or "/"]
             arrays = {name: chosen[name][()] for name in places[name]}
-            units = {name: str(_plain(chosen[name].attrs.get("units", ""))) for name in arrays}
+            units = {name: str(plain(chosen[name].attrs.get("units", ""))) for name in arrays}
     except (OSError, RuntimeError, KeyError) as exc:
         raise StoreError(f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]})") from exc
     return arrays, {name: unit for name, unit in units.items() if unit}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
-from rotor_mbs.store import hdf5
+from rotor_mbs.store import digests, hdf5
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class StoredRun:
     scene: str
     method: str
     _group: Any
+    _verify: bool = True
 
     @functools.cached_property
     def attributes(self) -> dict[str, Any]:
         """Status, message, metrics, times ... as plain values. Raises StoreError where they are damaged."""
-        try:
+        with self._reading("attributes"):
+            self._prove(digests.ATTRIBUTES, lambda: digests.attributes_digest(self._group.attrs))
             return hdf5.attributes_of(self._group)
-        except (KeyError, OSError, RuntimeError) as exc:
-            raise StoreError(f"{self._group.file.filename}: {self._group.name}: damaged attributes ({exc})") from exc
 
     @property
     def status(self) -> str:
@@ -43,15 +43,16 @@ class StoredRun:
 
     @property
     def settings(self) -> dict[str, Any]:
-        found: dict[str, Any] = json.loads(self.attributes.get("settings", "{}"))
-        return found
+        with self._reading("settings"):
+            return dict(json.loads(self.attributes.get("settings", "{}")))
 
     @property
     def labels(self) -> list[str]:
         """Names of the coordinates: rotor, pitch 1, ...; none where neither angles nor rates are stored."""
         if "coordinate" not in self._group:
             return []
-        return [str(label) for label in hdf5.attributes_of(self._group["coordinate"])["labels"]]
+        with self._reading("coordinate"):
+            return [str(label) for label in hdf5.attributes_of(hdf5.member(self._group, "coordinate"))["labels"]]
 
     @property
     def names(self) -> list[str]:
@@ -62,12 +63,30 @@ class StoredRun:
         return name in self._group
 
     def array(self, name: str) -> NDArray[Any]:
-        """A dataset, whole. Raises StoreError where the run has none of that name."""
-        try:
-            values: NDArray[Any] = self._group[name][()]
-        except (KeyError, OSError) as exc:
-            raise StoreError(f"{self._group.file.filename}: {self._group.name} has no readable {name}") from exc
+        """A dataset, whole. Raises StoreError where the run has none of that name, or it is not what was written."""
+        if name not in self._group:
+            raise StoreError(f"{self._group.file.filename}: {self._group.name} has no readable {name}")
+        with self._reading(name):
+            dataset = hdf5.member(self._group, name)
+            values = hdf5.values_of(dataset)
+            self._prove(name, lambda: digests.dataset_digest(values, dataset.attrs))
         return values
+
+    def damages(self) -> list[str]:
+        """The parts, "attributes" or names of datasets, that are not what was written, are new or are gone."""
+        return damages_of(self._group)
+
+    @functools.cached_property
+    def _digests(self) -> dict[str, str]:
+        return digests.stored_digests(self._group.attrs)
+
+    def _reading(self, part: str) -> AbstractContextManager[None]:
+        return hdf5.reading(self._group.file.filename, f"{self._group.name}: {part}")
+
+    def _prove(self, part: str, found: Callable[[], str]) -> None:
+        """Files of earlier versions, and shipped references, have no digests here."""
+        if self._verify and self._digests and self._digests.get(part) != found():
+            raise StoreError(f"{self._group.file.filename}: {self._group.name}: {part} changed after it was written")
 
 
 @dataclass(frozen=True)
@@ -103,33 +122,98 @@ class OpenResults:
 
 
 @contextmanager
-def open_results(path: Path) -> Iterator[OpenResults]:
-    """Raises StoreError where `path` is not a results file of this program."""
+def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
+    """An open results file. What is read of it is compared with its digests, but for verify=False.
+
+    Raises StoreError where `path` is not a results file of this program, or is damaged.
+    """
     with hdf5.open_file(path) as file:
-        try:
-            scenes = {scene.name: scene for scene in _scenes(file, "")}
+        with hdf5.reading(path):
+            scenes = {scene.name: scene for scene in _scenes(file, "", verify, {hdf5.address(file)})}
             attributes = hdf5.attributes_of(file)
-        except (KeyError, OSError, RuntimeError) as exc:
-            raise StoreError(f"{path}: damaged or incomplete ({exc})") from exc
         yield OpenResults(path, attributes, scenes, file)
 
 
-def _scenes(group: Any, name: str) -> Iterator[StoredScene]:
-    for key, item in group.items():
-        if not hdf5.is_group(item) or (not name and key in RESERVED_GROUPS):
+def _scenes(group: Any, name: str, verify: bool, seen: set[int]) -> Iterator[StoredScene]:
+    """`seen`: addresses of the groups above and before: each is looked into once."""
+    for key, item in hdf5.members(group):
+        if not hdf5.is_group(item) or (not name and key in RESERVED_GROUPS) or hdf5.address(item) in seen:
             continue
+        seen.add(hdf5.address(item))
         path = f"{name}/{key}" if name else key
         if "scene_hash" in item.attrs:
-            runs = {run.method: run for run in _runs(item, path)}
+            known = digests.stored_digests(item.attrs)
+            if verify and known and known.get(digests.ATTRIBUTES) != digests.attributes_digest(item.attrs):
+                raise StoreError(f"{item.file.filename}: {item.name}: attributes changed after they were written")
+            runs = {run.method: run for run in _runs(item, path, verify)}
             yield StoredScene(path, hdf5.attributes_of(item), runs)
         else:
-            yield from _scenes(item, path)
+            yield from _scenes(item, path, verify, seen)
 
 
-def _runs(group: Any, scene: str) -> Iterator[StoredRun]:
-    for model, item in group.items():
+def _runs(group: Any, scene: str, verify: bool) -> Iterator[StoredRun]:
+    for model, item in hdf5.members(group):
         if model == REFERENCE:
-            yield StoredRun(scene, model, item)
+            yield StoredRun(scene, model, item, verify)
         elif hdf5.is_group(item):
-            for integrator, run in item.items():
-                yield StoredRun(scene, f"{model}/{integrator}", run)
+            for integrator, run in hdf5.members(item):
+                yield StoredRun(scene, f"{model}/{integrator}", run, verify)
+
+
+def damages_of(group: Any) -> list[str]:
+    """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
+
+    "digests" where it has none. Links, and arrays that cannot be read, count too.
+    """
+    try:
+        known = digests.stored_digests(group.attrs)
+    except ValueError:
+        known = {}
+    if not known:
+        return [digests.DIGESTS]
+    unfilled = digests.unfilled_in(known)
+    found = {digests.ATTRIBUTES: _proved(lambda: digests.attributes_digest(group.attrs))}
+    for name in group:
+        found |= _digests_of_member(group, name, name in unfilled)
+    return [name for name in {**known, **found} if known.get(name) != found.get(name)]
+
+
+def _digests_of_member(group: Any, name: str, is_unfilled: bool) -> dict[str, str]:
+    try:
+        item = hdf5.member(group, name)
+    except (KeyError, StoreError):
+        return {name: ""}
+    if hdf5.is_group(item):
+        return {}
+    if is_unfilled:
+        return {digests.unfilled(name): _proved(lambda: digests.attributes_digest(item.attrs))}
+    return {name: _proved(lambda: digests.dataset_digest(hdf5.values_of(item), item.attrs))}
+
+
+def _proved(digest: Callable[[], str]) -> str:
+    """ "" where the content cannot be read."""
+    try:
+        with hdf5.reading(""):
+            return digest()
+    except StoreError:
+        return ""
+
+
+def all_damages(group: Any) -> Iterator[tuple[str, str]]:
+    """(path, part) of whatever is damaged in a group and the groups below it; at most once each."""
+    seen: set[int] = set()
+
+    def visit(inner: Any) -> Iterator[tuple[str, str]]:
+        if hdf5.address(inner) in seen:
+            return
+        seen.add(hdf5.address(inner))
+        yield from ((str(inner.name).strip("/"), part) for part in damages_of(inner))
+        for name in inner:
+            try:
+                item = hdf5.member(inner, name)
+            except (KeyError, StoreError):
+                continue  # told above
+            if hdf5.is_group(item):
+                yield from visit(item)
+
+    return visit(group)

@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.errors import StoreError
 from rotor_mbs.solution.status import STATUSES, recode
 from rotor_mbs.store import hdf5
+from rotor_mbs.store.digests import DIGESTS
 from rotor_mbs.store.layout import Column, key_of
-from rotor_mbs.store.read import open_results
+from rotor_mbs.store.read import damages_of, open_results
 
 # The scene's place in a record of how cost scales with blades or duration.
 COST_SCALING = "growth"
@@ -171,12 +173,15 @@ def _leaves(group: Any, path: str) -> Iterator[tuple[str, Any]]:
     if "record" in group.attrs or path == "errata" or not all(hdf5.is_group(item) for item in group.values()):
         yield path, group
     else:
-        for name, item in group.items():
+        for name, item in hdf5.members(group):
             yield from _leaves(item, f"{path}/{name}")
 
 
 def read_record(path: str, group: Any) -> Record:
-    """The record in a group of an open file, by its path in the file."""
+    """The record in a group of an open file, by its path in the file. Raises StoreError where it is damaged."""
+    damages = [part for part in damages_of(group) if part != DIGESTS]
+    if damages:
+        raise StoreError(f"{group.file.filename}: {path}: {', '.join(damages)} changed after they were written")
     kind = next(kind for kind, folder in _FOLDERS.items() if path == folder or path.startswith(f"{folder}/"))
     parts = path.removeprefix(_FOLDERS[kind]).strip("/").split("/")
     arrays = {name: item[()] for name, item in group.items() if name != "row" and not hdf5.is_group(item)}

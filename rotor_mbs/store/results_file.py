@@ -11,8 +11,9 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
+from rotor_mbs.store.digests import DIGESTS
 from rotor_mbs.store.layout import KEYWORDS, TOGETHER, key_of
-from rotor_mbs.store.read import OpenResults, open_results
+from rotor_mbs.store.read import OpenResults, all_damages, open_results
 from rotor_mbs.store.records import records_in
 from rotor_mbs.store.summary import put_summary
 
@@ -24,12 +25,13 @@ class ResultsStore:
     path: Path
 
     def stored_keys(self) -> set[str]:
-        """Keys of all runs and records in the file. Raises StoreError."""
+        """Keys of all runs and records in the file that are what was written. Raises StoreError."""
         refuse_other_kinds(self.path)
         if not self.path.exists():
             return set()
-        with open_results(self.path) as results:
-            return {key for _, _, _, key in _members(results) if key}
+        with open_results(self.path, verify=False) as results, hdf5.reading(self.path):
+            damaged = {place for place, part in all_damages(results.root) if part != DIGESTS}
+            return {key for above, _, name, key in _members(results) if key and not damaged & {above, name}}
 
     def merge(self, parts: Sequence[Path], without: Collection[str] = frozenset()) -> None:
         """The records of `parts` into the file, atomically, and those of these keys out of it. Raises StoreError."""
@@ -64,7 +66,7 @@ def merge(
         hdf5.put_attributes(file, {**_description(plan), **versions, "created": created, "date_created": created})
         for owner in sorted(plan, key=lambda name: (name.split("/")[0] in RESERVED_GROUPS, name)):
             for source, names in _by_source(plan[owner]).items():
-                with open_results(source) as results:
+                with open_results(source, verify=False) as results, hdf5.reading(source):
                     hdf5.new_group(file, owner).attrs.update(results.root[owner].attrs)
                     for name in names:
                         hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
@@ -76,8 +78,8 @@ def refuse_other_kinds(path: Path) -> None:
     the root, where a results file has groups alone."""
     if not path.exists():
         return
-    with open_results(path) as results:
-        if not all(hdf5.is_group(member) for member in results.root.values()):
+    with open_results(path, verify=False) as results, hdf5.reading(path):
+        if not all(hdf5.is_group(item) for _, item in hdf5.members(results.root)):
             raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
 
 
@@ -97,7 +99,7 @@ def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[s
     """Group above -> group -> the source to take it from."""
     latest: dict[str, tuple[str, dict[str, Path]]] = {}
     for source in sources:
-        with open_results(source) as results:
+        with open_results(source, verify=False) as results, hdf5.reading(source):
             for above, owner, name, key in _members(results):
                 if key not in without or not key:
                     known, groups = latest.get(above, (owner, {}))

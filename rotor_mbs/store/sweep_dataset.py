@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.scenario.sweep_design import split_rows
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store import hdf5, sweep_layout
+from rotor_mbs.store import digests, hdf5, sweep_layout
 from rotor_mbs.store.layout import Column
+from rotor_mbs.store.read import damages_of
 from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns
 from rotor_mbs.store.sweep_layout import COLUMNS, CRC32, SPLITS, SweepLayout
 
@@ -99,6 +100,7 @@ class SweepDataset:
             row = self._layout.row
             offsets = {name: file[name].id.get_offset() for name in (*(row.names or ()), "crc32")}
             marked = file["status"][()] != MISSING
+            refuse_damages(file)
         inode = self.path.stat().st_ino
         self.columns = RunColumns(self.path, inode, self._layout.first, offsets, row)
         self.statuses = self.columns.stored(len(self.statuses))
@@ -124,6 +126,7 @@ def _lay_out(path: Path, layout: SweepLayout) -> None:
             hdf5.put_attributes(file, {**layout.attributes, "sweep_identity": layout.identity, "runs": count})
             _put_run_columns(file, layout)
             _put_result_columns(file, layout)
+            digests.seal(file, later=(*(layout.row.names or ()), "crc32"))
         _reserve(temporary, temporary.stat().st_size)
         temporary.replace(path)
     except OSError as exc:
@@ -186,6 +189,13 @@ def _put_result_columns(file: Any, layout: SweepLayout) -> None:
     hdf5.put_flags(file["status"], STATUSES)
 
 
+def refuse_damages(file: Any) -> None:
+    """Raises StoreError where what is known of the runs before they are computed is not what was laid out."""
+    damages = [part for part in damages_of(file) if part != digests.DIGESTS]
+    if damages:
+        raise StoreError(f"{file.filename}: {', '.join(damages)} changed after the file was laid out")
+
+
 class Variable(NamedTuple):
     """A dataset of a sweep; `kind` is "f" for floating point numbers, "i" or "u" for integers."""
 
@@ -197,6 +207,12 @@ class Variable(NamedTuple):
     long_name: str
 
 
+def is_sweep(path: Path) -> bool:
+    """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
+    with hdf5.open_file(path) as file, hdf5.reading(path):
+        return "sweep_identity" in file.attrs
+
+
 class StoredSweep:
     """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none.
 
@@ -206,10 +222,11 @@ class StoredSweep:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        with hdf5.open_file(path) as file:
+        with hdf5.open_file(path) as file, hdf5.reading(path):
             self.attributes = hdf5.attributes_of(file)
             if "sweep_identity" not in self.attributes:
                 raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
+            refuse_damages(file)
             self.keys: list[str] = self.attributes["parameter_keys"]
             self.units = [str(hdf5.attributes_of(file[sweep_layout.parameter_name(key)])["units"]) for key in self.keys]
 
@@ -238,9 +255,30 @@ class StoredSweep:
 
     def column(self, name: str) -> NDArray[Any]:
         """A dataset whole, such as `status` or `time`. Raises StoreError where there is none of that name."""
-        with hdf5.open_file(self._path) as file:
-            values: NDArray[Any] = self._dataset(file, name)[()]
-            return values
+        with hdf5.open_file(self._path) as file, hdf5.reading(self._path, name):
+            return hdf5.values_of(self._dataset(file, name))
+
+    def damaged_runs(self) -> NDArray[np.int64]:
+        """Numbers of the stored runs that are not what was written, by their checksums. Reads all of the file."""
+        with hdf5.open_file(self._path) as file, hdf5.reading(self._path):
+            marked = hdf5.values_of(file["status"])
+            names = digests.unfilled_in(digests.stored_digests(file.attrs))
+            offsets = {name: file[name].id.get_offset() for name in names}
+            kinds = {name: (file[name].dtype, file[name].shape[1:]) for name in names if name != "crc32"}
+            row = sweep_layout.stored_row(kinds)
+            first = int(file["run"][0])
+        columns = RunColumns(self._path, self._path.stat().st_ino, first, offsets, row)
+        return first + np.flatnonzero((marked != MISSING) & (columns.stored(len(marked)) == MISSING))
+
+    def refuse_damaged_runs(self) -> None:
+        """Raises StoreError where a stored run is not what was written."""
+        damaged = self.damaged_runs().tolist()
+        if damaged:
+            which = ", ".join(map(str, damaged[:5])) + (" ..." if len(damaged) > 5 else "")
+            raise StoreError(
+                f"{self._path}: runs {which} changed after they were written; allowed: the sweep's own command, which "
+                "computes them anew"
+            )
 
     def pieces(self, name: str, runs: int) -> Iterator[NDArray[Any]]:
         """The same in pieces of at most `runs` runs: for trajectories."""

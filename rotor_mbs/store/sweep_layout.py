@@ -114,6 +114,12 @@ def row_type(scene: Scene, outputs: Sequence[str], precision: str, *, amplificat
     return np.dtype(fields)
 
 
+def stored_row(columns: Mapping[str, tuple[np.dtype[Any], tuple[int, ...]]]) -> np.dtype[np.void]:
+    """The type of a stored run, from type and shape of a run in every column that is computed, in the file's order."""
+    fields = [(name, _TYPES["message"]) if name == "message" else (name, *kind) for name, kind in columns.items()]
+    return np.dtype(fields)
+
+
 def empty_rows(count: int, row: np.dtype[np.void], names: Iterable[str] | None = None) -> Rows:
     """Runs that left nothing: NaN, -1 and no text. `names`: these columns only."""
     blank = {"f": np.nan, "S": b"", "i": -1}

@@ -19,6 +19,8 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import changed_arrays
 from rotor_mbs.store.read import open_results
+from rotor_mbs.store.sweep_columns import MISSING
+from rotor_mbs.store.sweep_dataset import StoredSweep, is_sweep
 from rotor_mbs.studies.check_probes import measured, perform_probe, probes, speed_probes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_files
@@ -80,11 +82,26 @@ def check_speed(bounds: Bounds) -> list[Verdict]:
 
 
 def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
-    """Verdicts on what is there. Raises StoreError, InputError."""
+    """Verdicts on what is there: runs, or a sweep. Raises StoreError, InputError."""
+    if is_sweep(path):
+        return _judge_sweep(StoredSweep(path), bounds)
     with ExitStack() as stack:
-        results = stack.enter_context(open_results(path))
+        results = stack.enter_context(open_results(path, verify=False))
         shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
         return verdicts(results, shipped, bounds)
+
+
+def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Verdict]:
+    """Whether all runs are there, and as they were written; their energies were judged when they were computed."""
+    scene = str(sweep.attributes.get("base_scene", "sweep"))
+    missing = int((sweep.column("status") == MISSING).sum())
+    damaged = len(sweep.damaged_runs())
+    look = f"{missing} runs missing; the sweep's own command computes them"
+    changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
+    return [
+        Verdict("complete", scene, "*", "runs", float(missing), bounds.of("complete", "*").value, "runs", look),
+        Verdict("integrity", scene, "*", "runs", float(damaged), bounds.of("integrity", "*").value, "runs", changed),
+    ]
 
 
 def _judge_presence(found: Sequence[Verdict], required: Sequence[str]) -> list[Verdict]:

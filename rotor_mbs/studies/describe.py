@@ -59,6 +59,7 @@ def describe(path: Path) -> list[Path]:
         written here and would be lost.
     """
     stored = StoredSweep(path)
+    stored.refuse_damaged_runs()
     content = hashlib.sha256(path.read_bytes()).hexdigest()
     files = {
         path.with_name(_CRATE): _crate(path, stored, content),

@@ -78,7 +78,8 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
     lines = told(capsys, good, "-v", status=0)
     assert lines[-1].endswith(" passed, 0 failed")
     checks = (
-        "complete", "status", "times", "start", "agreement", "energy", "impulse", "energies", "tip", "reference",
+        "integrity", "complete", "status", "times", "start", "agreement", "energy", "impulse", "energies", "tip",
+        "reference",
     )  # fmt: skip
     assert lines[-2] == f"runs judged: 2 exudyn_tree/rk67, 2 {METHOD}"
     assert {line.split(":")[0] for line in lines[:-2]} == {f"pass {name}" for name in checks}
@@ -365,7 +366,7 @@ def test_every_known_fault_is_as_large_as_its_bound_says() -> None:
     here = {"agreement", "energy", "tip", "energies", "start", "exact", "gap", "loads", "impulse"}
     elsewhere = {
         "complete", "status", "times", "published", "reference", "growth", "frozen", "symmetry", "order", "printed",
-        "extrapolated", "rules", "speed",
+        "extrapolated", "rules", "speed", "integrity",
     }  # fmt: skip
     assert {bound.check for bound in load_bounds().entries} == here | elsewhere
     for bound in load_bounds().entries:
