@@ -7,7 +7,7 @@ bits. Runs in one process and one thread: processes are the parallelism.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
+from rotor_mbs.models.lagrange.loads import sampled_loads
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.models.lagrange.system import (
@@ -47,6 +48,7 @@ class Block:
     tip             (k, n, blades, 3) m
     kinetic_energy, potential_energy, work   (k, n) J
     integrations    the engine's report of each run; samples: how many rows of each are finite
+    loads           by quantity, each (k, n, ...)
     """
 
     time: Array
@@ -58,12 +60,13 @@ class Block:
     work: Array | None
     integrations: list[Integration]
     samples: list[int]
+    loads: dict[str, Array] = field(default_factory=dict)
 
     @property
     def quantities(self) -> dict[str, Array]:
         """Arrays by name, but for the time and those that are None."""
         names = ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work")
-        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None} | self.loads
 
     def trajectory(self, i: int) -> Trajectory:
         """Run i alone, cut where it broke off."""
@@ -128,7 +131,18 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
     for places in groups.values():
         of_group = [scenes[i] for i in places]
         _propagate(block, _Group(places, of_group, [rotors[scene.rotor_key] for scene in of_group], tolerance))
+    if scenes[0].wants("loads"):
+        _put_loads(block, scenes)
     return block
+
+
+def _put_loads(block: Block, scenes: Sequence[Scene]) -> None:
+    """Of every run by itself, from its angles and rates."""
+    for i, (scene, n) in enumerate(zip(scenes, block.samples, strict=True)):
+        found = sampled_loads(scene, block.time[i, :n], block.angles[i, :n], block.rates[i, :n])
+        for name, values in found.items():
+            shape = (*block.time.shape, *values.shape[1:])
+            block.loads.setdefault(name, np.full(shape, np.nan))[i, :n] = values
 
 
 def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
