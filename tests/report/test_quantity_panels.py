@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.checking import results_file
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.core.numbers import prefixed
+from rotor_mbs.store.read import open_results
 
 PACKAGE = """
 from rotor_mbs.solution.quantities import Plot, Quantity
@@ -56,3 +59,23 @@ def test_a_stored_quantity_of_another_package_is_drawn(tmp_path: Path) -> None:
     assert sections["pitch_speed"].count("<figure>") == 2  # one for each run
     assert "blade 3" in sections["pitch_speed"]
     assert "closed form, Taylor from" in sections["shaft_power"]
+
+
+def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(tmp_path: Path) -> None:
+    """Of the reference a picture per axis, one of the errors, and a table of the extremes with their times."""
+    path = results_file(tmp_path / "r.h5", ["check/loads"], ["lagrange/dop853", "exudyn_tree/rk67"])
+    folder = write_report(path, tmp_path / "out").parent
+    page = (folder / "check-loads.html").read_text(encoding="utf-8")
+    sections = dict(re.findall(r'<section id="quantity-(\w+)">(.*?)</section>', page, re.S))
+    loads = ["blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment"]
+    assert [name for name in sections if name in loads] == loads
+    counts = [sections[name].count("<figure>") for name in loads]
+    assert counts == [4, 4, 2, 2, 2]
+    with open_results(path) as results:
+        reference = results.scenes["check/loads"].reference
+        assert reference is not None
+        largest = float(reference.array("blade_root_force")[:, 3, 0].max())
+    row = re.search(r"blade 4 x.*?</tr>", sections["blade_root_force"], re.S)
+    assert row is not None
+    assert prefixed(largest, "N") in row[0]
+    assert "Exudyn tree, RK67" in sections["shaft_moment"]

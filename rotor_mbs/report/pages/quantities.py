@@ -11,6 +11,7 @@ from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages.compared_quantities import compared_section, is_compared
 from rotor_mbs.report.pages.error_pictures import Curves, error_picture, line_picture, run_legend, visible
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.time_histories import Series
@@ -47,6 +48,8 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
                 label_of(m): Series(run.array("time"), run.array(quantity.name), look_of(m)) for m, run in own.items()
             }
             section = Section([line_picture(lines, plot.axis, name, plot.title, horizon, quantity.units)], legend)
+        elif is_compared(quantity, own):
+            section = compared_section(quantity, plot, own, name, horizon)
         else:
             section = _components(quantity, plot, own, name, horizon)
         found.append((name, plot.title, section))
