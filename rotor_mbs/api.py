@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import warnings
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -19,9 +20,10 @@ import numpy as np
 
 from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
-from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene
+from rotor_mbs.scenario.plausibility import doubts
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.solution.metrics import metrics_of
@@ -68,8 +70,15 @@ def scene(name: str) -> Scene:
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
-    """The scene in a TOML file, named like the file. Raises InputError with every fault of the file, a line each."""
-    return load_scene(Path(path), Path(path).stem)
+    """The scene in a TOML file, named like the file.
+
+    Numbers that look like a slip, such as 30 rad, give a PlausibilityWarning. Raises InputError with every fault of the
+    file, a line each.
+    """
+    found = load_scene(Path(path), Path(path).stem)
+    for doubt in doubts(found):
+        warnings.warn(f"{path}: {doubt}", PlausibilityWarning, stacklevel=2)
+    return found
 
 
 def run(
@@ -215,7 +224,7 @@ def compare(
     workers : parallel processes; 0 runs everything in this process. In a script, processes need the usual
         `if __name__ == "__main__":`.
     timeout : s, for each run.
-    **settings : of every method, in place of its defaults.
+    **settings : of the methods that have them, in place of defaults and of the scene's own.
 
     Raises
     ------

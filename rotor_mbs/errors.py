@@ -29,6 +29,10 @@ class StoreError(RotorError):
     """A results file that cannot be read or written; names the file and the reason."""
 
 
+class PlausibilityWarning(UserWarning):
+    """A number that is allowed, and yet looks like a slip: degrees, millimetres, tonnes."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """ ", perhaps NAME" with the one of `known` that a misspelt `name` may mean, or "" where none is near.
 

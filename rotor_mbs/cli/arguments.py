@@ -105,10 +105,7 @@ def _add_runs(commands: _Commands) -> None:
     )  # fmt: skip
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     _add_methods(run)
-    run.add_argument(
-        "--set", action="append", type=setting, metavar="NAME=VALUE",
-        help="a setting of the methods, in place of its default; may be repeated",
-    )  # fmt: skip
+    _add_settings(run)
     run.add_argument("-o", "--output", type=file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
     _add_pool_options(run)
 
@@ -146,6 +143,7 @@ def _add_bench(commands: _Commands) -> None:
     )  # fmt: skip
     bench.add_argument("scenes", nargs="*", metavar="SCENE", help=_SCENES)
     _add_methods(bench)
+    _add_settings(bench)
     bench.add_argument("-o", "--output", type=file, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
     bench.add_argument("--growth", action="store_true", help="also how cost grows with blades and with duration")
     bench.add_argument(
@@ -210,6 +208,7 @@ def _add_stability(commands: _Commands) -> None:
         "stability:stability", "", "stiff/bearing-1e8 -o stiff.h5",
     )  # fmt: skip
     stability.add_argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)")
+    _add_settings(stability)
     stability.add_argument(
         "-o", "--output", type=file, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
     )
@@ -367,6 +366,13 @@ def _late(target: str) -> Callable[[argparse.Namespace], int]:
 
 def _add_methods(parser: argparse.ArgumentParser, text: str = "model/integrator") -> None:
     parser.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{text}; may be repeated")
+
+
+def _add_settings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set", action="append", type=setting, metavar="NAME=VALUE",
+        help="of the methods that have it, in place of the default; may be repeated (see rotor-mbs show METHOD)",
+    )  # fmt: skip
 
 
 def _add_jobs(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ import sys
 
 from rotor_mbs.analysis.run_tables import bench_table
 from rotor_mbs.cli.arguments import cores
-from rotor_mbs.cli.terminal import ProgressLine, print_not_computed, print_table
+from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.report.pages.bench import write_bench_report
@@ -23,9 +23,11 @@ def bench(arguments: argparse.Namespace) -> int:
         raise InputError("bench: nothing to measure; allowed: SCENE..., or --growth")
     scenes = find_scenes(arguments.scenes) if arguments.scenes else []
     methods, output = check_names(arguments.method or ()), arguments.output
+    settings = dict(arguments.set or ())
+    print_doubts(scenes)
     limits = {"repeats": arguments.repeats, "budget_s": arguments.budget}
     with ProgressLine() as progress:
-        report = run_bench(scenes, methods, output, workers=cores(), on_progress=progress, **limits)
+        report = run_bench(scenes, methods, output, workers=cores(), settings=settings, on_progress=progress, **limits)
         made = [*report.made]
         if arguments.growth:
             made += run_cost_scaling(methods, output, on_progress=progress, **limits)

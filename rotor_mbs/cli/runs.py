@@ -12,7 +12,7 @@ from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.run_tables import finding_lines, method_table, run_table
 from rotor_mbs.analysis.summary import finding
 from rotor_mbs.cli import EXIT_BAD_INPUT
-from rotor_mbs.cli.terminal import ProgressLine, print_summary, print_table, print_text
+from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results
@@ -22,14 +22,16 @@ from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Methods named with -m must represent every scene; without, a rule selects them."""
+    """Methods named with -m, or by a scene's file, must represent it; without, a rule selects them."""
     scenes = find_scenes(arguments.scenes)
+    print_doubts(scenes)
     names = check_names(arguments.method or ())
     if names:
         methods = asked_methods(scenes, names)
     else:
         methods, reasons = selected_methods(scenes)
-        print(*reasons, sep="\n", file=sys.stderr)
+        for reason in reasons:
+            print(reason, file=sys.stderr)
         scenes = [scene for scene in scenes if methods[scene.name]]
         if not scenes:
             return EXIT_BAD_INPUT

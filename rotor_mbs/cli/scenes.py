@@ -7,6 +7,7 @@ import json
 from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING
 
+from rotor_mbs.cli.terminal import print_doubts
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps
 from rotor_mbs.scenario.scene import Scene, scene_fields
@@ -47,7 +48,9 @@ def new(arguments: argparse.Namespace) -> int:
         with arguments.file.open("x", encoding="utf-8") as file:
             file.write(new_scene_text())
     except OSError as exc:
-        raise InputError(f"{arguments.file}: cannot be created: {exc.strerror}") from exc
+        raise InputError(
+            f"{arguments.file}: cannot be created: {exc.strerror}; allowed: a file that is not there yet"
+        ) from exc
     print(f"{arguments.file}: edit it, then: rotor-mbs run {arguments.file}")
     return 0
 
@@ -69,6 +72,7 @@ def show(arguments: argparse.Namespace) -> int:
         built = {model.name: asdict(model) for model in models}
         print(json.dumps({"name": scene.name, "scene": _data(scene), "models": built}, ensure_ascii=False, indent=1))
         return 0
+    print_doubts(found)
     print(f"{scene.name}: {scene.title}\n")
     for key, value in _data(scene).items():
         if isinstance(value, dict):

@@ -17,7 +17,12 @@ def stability(arguments: argparse.Namespace) -> int:
     start, output = time.monotonic(), arguments.output
     with ProgressLine() as progress:
         report = run_suite(
-            arguments.scenes, output, workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress
+            arguments.scenes,
+            output,
+            workers=arguments.jobs,
+            timeout_s=arguments.timeout,
+            settings=dict(arguments.set or ()),
+            on_progress=progress,
         )
     print(*advice_lines(report.runs), sep="\n")
     print(f"{output}: {report.scenes} scenes, {len(report.runs)} runs, {time.monotonic() - start:.0f} s in all")

@@ -20,6 +20,7 @@ from rotor_mbs.solution.status import STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.execution.execute import Outcome
+    from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.text_table import TextTable
     from rotor_mbs.studies.run import RunReport
 
@@ -182,6 +183,15 @@ def print_summary(report: RunReport, output: Path) -> int:
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
     print(f"{output}: {made}, {report.kept} there already")
     return 1 if report.failures or lost else 0
+
+
+def print_doubts(scenes: Sequence[Scene]) -> None:
+    """A line for each number that looks like a slip; none for shipped scenes, which have a folder in their name."""
+    from rotor_mbs.scenario.plausibility import doubts
+
+    for scene in scenes:
+        for doubt in () if "/" in scene.name else doubts(scene):
+            print(f"warning: {scene.name}: {doubt}", file=sys.stderr)
 
 
 def print_not_computed(lost: Sequence[Outcome]) -> None:

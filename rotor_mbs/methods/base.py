@@ -151,6 +151,19 @@ class Method:
         """Its settings where none are given."""
         return self.settings().as_dict()
 
+    def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
+        """The settings of the next finer rung of its ladder; {} where it is as fine as the ladder goes.
+
+        interval: s, between samples.
+        """
+        for ladder in self.ladders:
+            for rung in () if ladder.variant else ladder.rungs(interval):
+                varied = {name: float(str(value)) for name, value in ladder.fill(rung.setting).items()}
+                lower = {name: value for name, value in varied.items() if value < float(str(settings[name]))}
+                if next(iter(varied)) in lower:
+                    return dict(lower)
+        return {}
+
     @property
     def is_installed(self) -> bool:
         """Whether all packages it needs are there; none is imported."""

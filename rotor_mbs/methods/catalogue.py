@@ -73,6 +73,25 @@ def _unknown(name: str) -> str:
     return f"unknown method {name!r}{nearest(name, known)}; allowed: {', '.join(known)}"
 
 
+def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str, dict[str, object]]:
+    """By method, those of the `given` settings that it has.
+
+    Raises InputError for a setting that none of them has, and for a value that one of them does not allow.
+    """
+    if len(names) == 1:
+        find_method(names[0]).settings.of(names[0], given)
+    own = {name: find_method(name).settings.allowed() for name in names}
+    known = list(dict.fromkeys(setting for allowed in own.values() for setting in allowed))
+    unknown = [setting for setting in given if setting not in known]
+    if unknown and names:
+        allowed = f"{', '.join(known) or 'none'} ({', '.join(names)})"
+        raise InputError(f"no setting {setting!r}{nearest(setting, known)}; allowed: {allowed}" for setting in unknown)
+    found = {name: {one: value for one, value in given.items() if one in allowed} for name, allowed in own.items()}
+    for name, chosen in found.items():
+        find_method(name).settings.of(name, chosen)
+    return found
+
+
 def is_corrected(name: str) -> bool:
     """Whether the method called `name` claims the corrected equations; one that is not known here is taken to."""
     method = look_up(name)

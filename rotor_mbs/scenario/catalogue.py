@@ -156,6 +156,8 @@ def _unknown_argument(argument: str, is_there: bool, shipped: Iterable[str]) -> 
         return "is not a TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
     if not _NAME.fullmatch(argument):
         return f"is neither a scene's name nor a TOML file; allowed: pieces {_NAME_RULE}, joined by /"
+    if argument in dict(list_sweeps()):
+        return f"is a sweep; allowed: a scene, or: rotor-mbs sweep {argument}"
     names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
     return f"no such scene{nearest(argument, natural_order(names))}; allowed: what `rotor-mbs list` names, or FILE.toml"
 

@@ -88,6 +88,8 @@ class Scene:
     bearing_stiffness, _damping     (blades,) N m/rad, N m s/rad; of the pitch and of its rate
     bearing_rest                    (blades,) tables over time, rad: pitch at which the spring is unloaded
     shaft_damping                   N m s/rad
+    methods, settings               by which methods `run` computes it, and with what in place of their defaults; () for
+                                    what a rule and the methods say
     text                            the TOML text it was read from
     """
 
@@ -116,6 +118,8 @@ class Scene:
     bearing_rest: tuple[Table, ...] = field(
         default=(), metadata=file_key("bearing.rest", "rad", per_blade=True, over_time=True, added=True)
     )
+    methods: tuple[str, ...] = field(default=(), metadata=file_key("methods", part="label"))
+    settings: tuple[tuple[str, float | str], ...] = field(default=(), metadata=file_key("settings", part="label"))
     text: str = field(default="", metadata=file_key("", part="label"))
 
     @property

@@ -76,6 +76,8 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
             table[last] = [_listed(rows) if rows else 0.0 for rows in value]
         else:
             table[last] = _blade_tables(scene) if one.name == "blades" else _listed(value)
+    if scene.settings:
+        tables["settings"] = dict(scene.settings)
     return {"blades": len(scene.blades), **tables}
 
 

@@ -279,6 +279,8 @@ class SceneTable(Table):
     bearing: BearingTable | None = Field(None, description="a table with stiffness, damping, rest")
     shaft: ShaftTable | None = Field(None, description="a table with damping")
     torque: TorqueTable | None = Field(None, description="a table with rotor, pitch")
+    methods: list[Text] = Field([], description="names of methods, as `rotor-mbs list` has them")
+    settings: dict[str, Number | Text] = Field({}, description="a table of methods' settings, such as step = 1e-3")
     initial: InitialTable = Field(description="a table with angles, rates")
 
     @field_validator("blades")
@@ -349,6 +351,8 @@ class SceneTable(Table):
             shaft_damping=self.shaft.damping if self.shaft else 0.0,
             pitch_torque=_tables(self.torque.pitch, self.blades) if self.torque else (),
             bearing_rest=_tables(self.bearing.rest, self.blades) if self.bearing else (),
+            methods=tuple(self.methods),
+            settings=tuple(self.settings.items()),
             text=text,
         )
 

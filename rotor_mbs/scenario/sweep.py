@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import find_scenes, scenarios_folder, sweeps_folder
+from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import scene_tables
 from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
@@ -198,6 +198,8 @@ def load_sweep(path: Path, most_rows: int = MAX_ROWS) -> Sweep:
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
+    if not path.exists() and str(path) in dict(list_scenes()):
+        raise InputError(f"{path}: is a scene; allowed: a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}")
     text, tables = read_toml(path)
     return _sweep(path, text, validate_file(SweepTable, tables, text, shown_path(path)), most_rows=most_rows)
 

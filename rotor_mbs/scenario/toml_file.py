@@ -60,6 +60,9 @@ def shown_path(path: Path) -> str:
     return text if text.isprintable() else ascii(text)
 
 
+_TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
+
+
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     """The text of the file and its tables. Raises InputError with one line."""
     text = _read_text(path)
@@ -75,7 +78,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}:{_syntax_error(str(error), text)}; allowed: TOML 1.0") from error
+        raise InputError(f"{source}:{_syntax_error(str(error), text)}; {_TOML_ALLOWED}") from error
     except RecursionError as error:
         raise InputError(f"{source}:1: nested too deep; allowed: tables and arrays of a scene") from error
     except ValueError as error:

@@ -91,7 +91,9 @@ def open_file(path: Path) -> Iterator[Any]:
     try:
         file = h5py.File(path, "r")
     except OSError as exc:
-        raise StoreError(f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]})") from exc
+        raise StoreError(
+            f"{path}: not a readable HDF5 file ({str(exc).splitlines()[0]}); allowed: a file that rotor-mbs wrote"
+        ) from exc
     with file:
         with reading(path):
             written_by, version = (plain(file.attrs.get(name)) for name in ("format", "format_version"))

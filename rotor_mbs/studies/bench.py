@@ -9,7 +9,7 @@ import json
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, last_core, one_line
 from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
-from rotor_mbs.methods.catalogue import ladders
+from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
@@ -70,6 +70,7 @@ def run_bench(
     repeats: int,
     budget_s: float,
     workers: int,
+    settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> BenchReport:
     """The curves of every scene into the results file `output`; what it has already is kept.
@@ -78,10 +79,11 @@ def run_bench(
     repeats     timed runs of each point at most
     budget_s    s, for all curves of a scene
     workers     processes that compute references before the first curve is timed
+    settings    of the methods that have them, the same at every point
 
     Raises InputError for a method without a ladder and for a scene without a usable reference, StoreError.
     """
-    chosen = ladders(methods)
+    chosen = with_settings(ladders(methods), settings or {})
     _complete_references(scenes, output, workers)
     for scene in scenes:  # refused before the first is measured
         prepared_scene(scene, output)
@@ -93,6 +95,18 @@ def run_bench(
         left_out += refused
     made = execute(cases, _time_by_scene, ResultsStore(output), on_progress)
     return BenchReport(len(scenes), made, left_out)
+
+
+def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> list[Ladder]:
+    """The ladders with these settings fixed, where their methods have them and they are no choice of the ladder itself.
+
+    Raises InputError for a setting that no method has, that is not allowed, or that a ladder varies.
+    """
+    own = settings_for(list(dict.fromkeys(ladder.method for ladder in chosen)), settings)
+    varied = {name for ladder in chosen for name in ladder.fill(1.0) if name in own[ladder.method]}
+    if varied:
+        raise InputError(f"bench varies {', '.join(sorted(varied))} itself; allowed: other settings of the methods")
+    return [replace(ladder, choices={**own[ladder.method], **ladder.choices}) for ladder in chosen]
 
 
 def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) -> None:
@@ -134,7 +148,7 @@ def _measure_scene(jobs: Sequence[Job]) -> list[Record]:
     assert results is not None  # every bench case has a reference
     short, reference = prepared_scene(case.scene, results)
     by_curve = {ladder.curve: ladder for ladder in ladders()}
-    own = [by_curve[str(job.case.options["curve"])] for job in jobs]
+    own = [replace(by_curve[str(job.case.options["curve"])], choices=job.case.settings) for job in jobs]
     points = [points_of(ladder, short.duration / (short.samples - 1)) for ladder in own]
     scenes = {point: (short, reference) for curve in points for point in curve}
     measured = measure_points(scenes, points, case.options)

@@ -13,7 +13,16 @@ from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.execution.pool import one_line
-from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, is_corrected
+from rotor_mbs.methods.catalogue import (
+    REFERENCE,
+    check_names,
+    default_methods,
+    find_method,
+    is_corrected,
+    look_up,
+    method_names,
+    settings_for,
+)
 from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
@@ -74,11 +83,12 @@ def run_scenes(
     methods      by scene name
     workers      parallel processes; 0: all in this process
     timeout_s    a run over this ends itself, and is stored with the status timed_out
-    settings     of every method, in place of its defaults
+    settings     of the methods that have them, in place of defaults and of the scene's own
     use_frozen   whether a shipped reference may stand for a computed one
 
     Raises InputError, StoreError, KeyboardInterrupt; the same call then goes on where it stopped.
     """
+    settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings or {})
     cases: list[Case] = []
     for scene in scenes:
         reference = reference_case(scene, use_frozen=use_frozen)
@@ -119,13 +129,27 @@ def solve_judged(
         reference = frozen_solution(scene, scene_key)[0].trajectory
     elif compute_reference:
         reference = solve(REFERENCE, scene, {}).trajectory
+    own = own_settings(scene, method, {}) | dict(settings or {})
     try:
-        run = solve(method, scene, settings or {}, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
+        run = solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
     except OutOfTimeError as exc:
         run = _without_samples(scene, method, str(exc), settings or {})
         return replace(run, status="timed_out", message=str(exc)), reference
     judgement = judge(scene, run, reference)
-    return replace(run, status=judgement.status, message=judgement.message, metrics=judgement.metrics), reference
+    message = judgement.message + next_to_try(scene, method, run.settings, judgement.status)
+    return replace(run, status=judgement.status, message=message, metrics=judgement.metrics), reference
+
+
+def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
+    """What would make an inaccurate run better: the next rung of the method's ladder, or another method; else ""."""
+    found = look_up(method)
+    if status != "inaccurate" or found is None or not found.is_corrected:
+        return ""
+    finer = found.finer(settings, scene.duration / (scene.samples - 1))
+    if finer:
+        return "; next to try: " + ", ".join(f"{name}={value:.3g}" for name, value in finer.items())
+    others = [name for name in default_methods() if name != method and is_corrected(name)]
+    return f"; as fine as its ladder goes, next to try: {others[0]}" if others else ""
 
 
 def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
@@ -136,10 +160,26 @@ def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
 
 
 def run_cases(scene: Scene, methods: Iterable[str], reference: Case, settings: Mapping[str, object]) -> list[Case]:
-    """A run of the scene by each method. Raises InputError for an unknown setting or a value out of range."""
-    for name in methods:
-        find_method(name).settings.of(name, settings)
-    return [Case(scene, name, settings, reference=reference.key) for name in methods]
+    """A run of the scene by each method, with those of the scene's settings and of `settings` that it has.
+
+    Raises InputError for a setting of the scene that no method has, or that is out of range.
+    """
+    return [Case(scene, name, own_settings(scene, name, settings), reference=reference.key) for name in methods]
+
+
+def own_settings(scene: Scene, method: str, given: Mapping[str, object]) -> dict[str, object]:
+    """Those of the scene's settings that the method has, with those of the `given` ones in their place.
+
+    Raises InputError for a setting of the scene that no method at all has, or that is out of range.
+    """
+    of_scene: dict[str, dict[str, object]] = {}
+    try:
+        if scene.settings:
+            of_scene = settings_for(method_names(), dict(scene.settings))
+    except InputError as exc:
+        raise InputError(f"{scene.name}: settings: {problem}" for problem in exc.problems) from exc
+    allowed = find_method(method).settings.allowed()
+    return of_scene.get(method, {}) | {name: value for name, value in given.items() if name in allowed}
 
 
 def perform_run(job: Job) -> Result:
@@ -165,15 +205,14 @@ def perform_run(job: Job) -> Result:
     verdict = judge(case.scene, run, reference)
     attributes |= {
         "status": verdict.status,
-        "message": verdict.message,
+        "message": verdict.message + next_to_try(case.scene, case.method, run.settings, verdict.status),
         "false_success": verdict.false_success,
         KEY_ATTRIBUTE: case.key,
         **verdict.metrics,
     }
     write_run(job.part, case.scene_hash, run, attributes)
-    return Result(
-        verdict.status, verdict.message, 0.0 if is_read else float(np.median(run.run_times_s)), is_read=is_read
-    )
+    message, seconds = str(attributes["message"]), 0.0 if is_read else float(np.median(run.run_times_s))
+    return Result(verdict.status, message, seconds, is_read=is_read)
 
 
 def store_failure(status: str, job: Job, message: str) -> Result:
@@ -213,10 +252,16 @@ def asked_methods(scenes: Sequence[Scene], names: Sequence[str]) -> dict[str, li
 
 
 def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], list[str]]:
-    """The methods that the rule selects for each scene, none where it refuses; and the reasons, a line each."""
+    """The methods that each scene names itself, or that the rule selects, none where it refuses; and the reasons.
+
+    Raises InputError where a scene names a method that is unknown or cannot represent it.
+    """
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
     for scene in scenes:
+        if scene.methods:
+            methods |= asked_methods([scene], check_names(scene.methods))
+            continue
         try:
             choice = choose(scene, default_methods())
         except MethodRefusal as exc:

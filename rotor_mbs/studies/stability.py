@@ -9,7 +9,7 @@ from pathlib import Path
 from rotor_mbs.analysis.stability import SuiteRun, suite_runs
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.methods.catalogue import find_method, method_names
+from rotor_mbs.methods.catalogue import find_method, method_names, settings_for
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
@@ -46,10 +46,12 @@ def run_suite(
     *,
     workers: int,
     timeout_s: float,
+    settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> SuiteReport:
     """The suite on the scenes of these names (all of it where there are none) into the results file `output`.
 
+    settings: of the methods that have them, for the runs of the map; the step ladders vary the step by themselves.
     What the file has already is kept; records of these scenes that are no longer wanted are dropped. Raises InputError,
     StoreError.
     """
@@ -57,9 +59,14 @@ def run_suite(
     methods = {scene.name: able_methods(scene, method_names(is_corrected=True))[0] for scene in scenes}
     none: Mapping[str, Sequence[str]] = dict.fromkeys(methods, ())  # references, some of which take long, first
     patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in methods.items()}
+    every = dict.fromkeys(method for able in methods.values() for method in able)
+    chosen_settings = settings_for(list(every), settings or {})
     lost = []
     for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (methods, timeout_s)):
-        report = run_scenes(scenes, chosen, output, workers=workers, timeout_s=limit_s, on_progress=on_progress)
+        own = {k: v for able in chosen.values() for method in able for k, v in chosen_settings[method].items()}
+        report = run_scenes(
+            scenes, chosen, output, workers=workers, timeout_s=limit_s, settings=own, on_progress=on_progress
+        )
         lost += report.not_computed
     lost += complete_records(scenes, methods, output, workers, on_progress)
     return SuiteReport(len(scenes), suite_runs(output), lost)

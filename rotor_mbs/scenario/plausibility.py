@@ -1,0 +1,53 @@
+"""Numbers of a scene that are allowed and yet look like a slip: degrees for radians, millimetres for metres, tonnes.
+
+Limits are far outside what rotors of turbines, models of them and toys have. Must not know models or files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rotor_mbs.scenario.scene import Blade, Scene
+
+_TURN = 2.0 * math.pi
+_FASTEST = 100.0  # rad/s: a thousand revolutions per minute
+_LONGEST, _SHORTEST = 300.0, 0.01  # m, from the shaft to the farthest point of a blade: the longest built have 130
+_HEAVIEST, _LIGHTEST = 1e6, 0.01  # kg
+_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
+
+
+def doubts(scene: Scene) -> list[str]:
+    """A line for each number that looks like a slip: key, value, and what may have been meant; [] where all is well.
+
+    >>> from rotor_mbs.scenario.catalogue import find_scenes
+    >>> doubts(find_scenes(["paper/fig11"])[0].replace(**{"initial.angles[0]": 30}))
+    ['initial.angles (entry 1): 30 rad are 4.8 turns; degrees? write "deg(30)"']
+    """
+    found = [*_of_start(scene)]
+    blades = scene.blades[:1] if len(set(scene.blades)) == 1 else scene.blades
+    for number, blade in enumerate(blades, start=1):
+        where = "blade" if len(blades) == 1 else f"blade {number}"
+        found += [f"{where}.{line}" for line in _of_blade(blade)]
+    if scene.gravity and not _GRAVITY[0] <= scene.gravity <= _GRAVITY[1]:
+        found.append(f"gravity: {scene.gravity:g} m/s^2; 9.81 is usual, 0 is none")
+    return found
+
+
+def _of_start(scene: Scene) -> Iterator[str]:
+    for i, angle in enumerate(scene.initial_angles, start=1):
+        if abs(angle) > _TURN:
+            turns = f"{abs(angle) / _TURN:.1f} turns"
+            yield f'initial.angles (entry {i}): {angle:g} rad are {turns}; degrees? write "deg({angle:g})"'
+    for i, rate in enumerate(scene.initial_rates, start=1):
+        if abs(rate) > _FASTEST:
+            yield f'initial.rates (entry {i}): {rate:g} rad/s; degrees per second? write "deg({rate:g})"'
+
+
+def _of_blade(blade: Blade) -> Iterator[str]:
+    if not _LIGHTEST <= blade.mass <= _HEAVIEST:
+        yield f"mass: {blade.mass:g} kg; is it in kg?"
+    for key, point in (("centre_of_mass", blade.centre_of_mass), ("tip", blade.tip)):
+        distance = math.hypot(*point)
+        if not _SHORTEST <= distance <= _LONGEST:
+            yield f"{key}: {distance:g} m from the shaft; is it in m?"

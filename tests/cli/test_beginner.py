@@ -1,0 +1,127 @@
+"""Typical mistakes of a beginner: each is answered with a line that says what to do next."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+
+import rotor_mbs as rm
+from rotor_mbs.cli import main
+from rotor_mbs.errors import PlausibilityWarning
+from rotor_mbs.scenario.scene_file import new_scene_text
+
+# Mistake: (edits of the template, the command with {file} for the scene file, what the one line must say).
+MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
+    "a scene without its folder": ({}, "run fig05", "perhaps paper/fig05"),
+    "a method by its integrator": ({}, "run {file} -m rk67", "perhaps exudyn_tree/rk67"),
+    "a misspelt command": ({}, "rnu {file}", "perhaps run"),
+    "a misspelt setting": ({}, "run {file} -m lagrange/taylor --set tolerence=1e-9", "perhaps tolerance"),
+    "a setting out of range": (
+        {}, "run {file} -m exudyn_tree/rk67 --set step=-1", "step (a number above 0, in s; default"
+    ),
+    "a misspelt key": ({"[shaft]": "[shaf]"}, "run {file}", "shaf: is not a key here, perhaps shaft"),
+    "arithmetic without quotes": ({'"deg(30)"': "pi/6"}, "run {file}", 'arithmetic in quotes: "pi/6"'),
+    "a pitch too few": ({'"pi/4", 0]': "0]"}, "run {file}", "rotor, then a pitch per blade"),
+    "no tip": ({"tip = [0.08, 0.0, 33.4]": ""}, "run {file}", 'needed for the output "tip"'),
+    "a sweep that is run": ({}, "run sweeps/fig11-spread", "rotor-mbs sweep sweeps/fig11-spread"),
+    "a scene that is swept": ({}, "sweep paper/fig11", "rotor-mbs run paper/fig11"),
+    "a report of a scene file": ({}, "report {file}", "allowed: a file that rotor-mbs wrote"),
+    "a report of nothing": ({}, "report missing.h5", "as rotor-mbs run or reproduce writes it"),
+    "a folder as the output": ({}, "run {file} -o .", "a file's name, not a folder"),
+    "a new file over an old one": ({}, "new {file}", "allowed: a file that is not there yet"),
+}  # fmt: skip
+SLIPS: dict[str, tuple[str, str, str]] = {
+    "degrees": ('"deg(30)"', "30", '30 rad are 4.8 turns; degrees? write "deg(30)"'),
+    "degrees per second": ("rates = [0,", "rates = [360,", 'write "deg(360)"'),
+    "millimetres": ("33.4]", "24000]", "24000 m from the shaft; is it in m?"),
+    "tonnes": ("15000.0", "1e-3", "0.001 kg; is it in kg?"),
+    "gravity in cm": ("9.81", "981", "9.81 is usual"),
+}
+
+
+def scene_file(folder: Path, edits: dict[str, str]) -> Path:
+    text = new_scene_text()
+    for old, new in edits.items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line_that_says_what_to_do_next(
+    mistake: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edits, command, says = MISTAKES[mistake]
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = main(command.format(file=scene_file(tmp_path, edits).name).split())
+    except SystemExit as end:
+        status = int(str(end.code))
+    printed = capsys.readouterr()
+    assert status == 2
+    assert says in printed.err
+    assert len(printed.err.splitlines()) == 1
+    assert printed.out == ""
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_a_number_that_looks_like_a_slip_is_warned_of_and_not_refused(
+    slip: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, new, says = SLIPS[slip]
+    path = scene_file(tmp_path, {old: new})
+    assert main(["show", str(path)]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("warning: mine: ")
+    assert says in line
+    with pytest.warns(PlausibilityWarning, match="mine.toml"):
+        rm.load(path)
+
+
+def test_plausible_numbers_are_not_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rm.load(scene_file(tmp_path, {}))
+    assert main(["show", str(tmp_path / "mine.toml")]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_an_inaccurate_run_names_the_next_step_to_try_until_it_is_accurate() -> None:
+    scene = rm.scene("paper/fig11").replace(duration=1.0, samples=11)
+    step, steps = 0.1, [0.1]
+    for _ in range(12):
+        run = rm.run(scene, "exudyn_tree/rk44", step=step, reference=True)
+        if run.status == "ok":
+            break
+        assert run.status == "inaccurate"
+        step = float(run.message.rpartition("next to try: step=")[2])
+        steps.append(step)
+    assert run.status == "ok", run.message
+    assert len(steps) > 1
+    assert steps == sorted(set(steps), reverse=True)
+
+
+def test_a_scene_names_its_methods_and_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    edits = {
+        "methods = []": 'methods = ["exudyn_tree/rk67", "lagrange/dop853"]', "# step = 1e-3": "step = 0.002",
+        "duration = 10.0": "duration = 0.2", "samples = 1001": "samples = 11",
+    }  # fmt: skip
+    path = scene_file(tmp_path, edits)
+    assert main(["run", str(path), "-o", "r.h5", "-j", "1"]) == 0
+    assert main(["run", str(path), "-o", "s.h5", "-j", "1", "--set", "step=0.001"]) == 0
+    for name, step in (("r.h5", 0.002), ("s.h5", 0.001)):
+        tree = rm.open(name)
+        assert set(tree.scenes["mine"]) == {"reference", "exudyn_tree/rk67", "lagrange/dop853"}
+        assert tree["mine/exudyn_tree/rk67"].settings["step"] == step
+    assert rm.run(rm.load(path), "exudyn_tree/rk67").settings["step"] == 0.002
+    capsys.readouterr()
+    scene_file(tmp_path, edits | {"# step = 1e-3": "stp = 0.002"})
+    assert main(["run", str(path), "-o", "r.h5"]) == 2
+    assert "mine: settings: no setting 'stp', perhaps step" in capsys.readouterr().err
