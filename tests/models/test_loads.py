@@ -242,6 +242,16 @@ def test_a_planted_error_is_noticed(monkeypatch: pytest.MonkeyPatch, fault: str)
     assert load_error(scene, extrapolated, exact) > 1e-6
 
 
+def test_at_a_jump_of_the_torque_stands_the_load_before_it(method: str) -> None:
+    """Two blades that balance, at rest: until the jump at a sample, and in it, no force along the arms' way."""
+    scene = beam((0.3, 0.0, 0.0), (0.0, 0.0, 0.0), gravity=0.0, rotor_torque=((0.0, 0.0), (0.1, 0.0), (0.1, 5000.0)))
+    run = loads(method, scene)
+    about_shaft = 2.0 * (MOMENTS[1] + MASS * ARM**2)
+    across = MASS * ARM * 5000.0 / about_shaft
+    assert off(run.blade_root_force[:11], 0.0) < METHODS[method]
+    assert off(run.blade_root_force[12:, :, 0], across) < 1e-5 * across
+
+
 # The printed model.
 
 

@@ -1,0 +1,77 @@
+"""Loads among a run's numbers, in its judgement, in its dataset and in its file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from support.checking import results_file
+
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import metrics_of
+from rotor_mbs.solution.quantities import LOADS
+from rotor_mbs.solution.solution import Solution
+
+SCENE = replace(find_scenes(["check/loads"])[0], duration=0.2, samples=41)
+
+
+@pytest.fixture(scope="module")
+def run() -> Solution:
+    return solve("lagrange/dop853", SCENE, {})
+
+
+def test_the_largest_loads_with_their_times_and_blades(run: Solution) -> None:
+    metrics = metrics_of(SCENE, run.trajectory, None)
+    forces = np.linalg.norm(run.blade_root_force, axis=2)
+    sample, blade = np.argwhere(forces == forces.max())[0]
+    assert metrics["blade_root_force_max"] == forces.max()
+    assert metrics["blade_root_force_max_time_s"] == run.time[sample]
+    assert metrics["blade_root_force_max_blade"] == blade + 1
+    assert metrics["shaft_moment_max"] == np.linalg.norm(run.shaft_moment, axis=1).max()
+    assert "shaft_moment_max_blade" not in metrics
+    assert metrics["pitch_actuator_moment_max"] == np.abs(run.pitch_actuator_moment).max()
+
+
+@pytest.mark.parametrize("load", [load.name for load in LOADS])
+def test_a_load_that_is_off_is_inaccurate(run: Solution, load: str) -> None:
+    """By a millionth of the largest force (at the arm): a hundred thousand times the bound, not yet another motion."""
+    exact, metric = run.trajectory, f"{load}_error"
+    found = judge(SCENE, run, exact)
+    assert (found.status, found.metrics[metric]) == ("ok", 0.0)
+    force = np.linalg.norm(exact.blade_root_force, axis=2).max() * (1.0 if load.endswith("force") else 6.0)
+    for share, is_false in ((1e-6, False), (0.1, True)):
+        wrong = exact.get(load).copy()
+        wrong[20].flat[0] += share * force
+        found = judge(SCENE, replace(run, trajectory=exact.replace(**{load: wrong})), exact)
+        assert found.status == "inaccurate"
+        assert load.replace("_", " ") in found.message
+        assert found.metrics[metric] == pytest.approx(share, rel=0.1)
+        assert found.false_success is is_false
+
+
+def test_loads_as_xarray_have_units_and_labels(run: Solution) -> None:
+    pytest.importorskip("xarray")
+    data = run.to_xarray()
+    along = data.blade_root_force.sel(blade=2, axis="z")
+    assert along.attrs["units"] == "N"
+    assert np.array_equal(along.values, run.blade_root_force[:, 1, 2])
+    assert data.shaft_moment.dims == ("time", "axis")
+    assert data.pitch_actuator_moment.attrs["units"] == "N m"
+
+
+def test_loads_are_stored_with_units_dimensions_and_metrics(tmp_path: Path) -> None:
+    path = results_file(tmp_path / "r.h5", ["check/loads"], ["lagrange/dop853"])
+    with h5py.File(path) as file:
+        group = file["check/loads/lagrange/dop853"]
+        for load in LOADS:
+            dataset = group[load.name]
+            assert dataset.attrs["units"] == load.units
+            assert [scale.keys()[0] for scale in dataset.dims] == list(load.dimensions)
+            assert group.attrs[f"{load.name}_error"] < 1e-11
+            assert 0.0 <= group.attrs[f"{load.name}_max_time_s"] <= 1.0
+        assert group.attrs["linear_impulse_error_max"] < 1e-9
