@@ -126,7 +126,7 @@ class Run(Solution):
     Attributes
     ----------
     reference : the trajectory it was judged against; None where there was none.
-    plot : `run.plot()` draws the motion; `run.plot.energy()`, `run.plot.error()`, `run.plot.tips()`.
+    plot : `run.plot()` draws the motion; `run.plot.energy()`, `.error()`, `.tips()`, `.loads("shaft_force")`.
     """
 
     reference: Trajectory | None = None

@@ -13,10 +13,12 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.core.looks import coordinate_look
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.paths import paths
 from rotor_mbs.report.plots.time_histories import Motion, Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
+from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
 
@@ -40,6 +42,29 @@ class RunPlots:
         scale = energy_scale(run.scene, run.trajectory)
         curves = (kinetic, potential, kinetic + potential - work)
         return time_histories.energies(run.time, curves, scale)
+
+    def loads(self, name: str = "blade_root_force") -> Panels:
+        """A load over time: a panel per axis with a line per blade, or one panel with a line per axis (or blade).
+
+        name: blade_root_force, blade_root_moment, shaft_force, shaft_moment or pitch_actuator_moment (N, N m).
+
+        Raises InputError where the run does not have it.
+        """
+        values, load = _quantity(self._run, name), next((one for one in LOADS if one.name == name), None)
+        if load is None or load.plot is None:
+            raise InputError(f"no load {name!r}; allowed: {', '.join(one.name for one in LOADS)}")
+        stacked = values[:, :, None] if values.ndim == 2 else values
+        panels = canvas.panels((1.6,) * stacked.shape[2], time_histories.TIME_AXIS)
+        first = 1 if load.dimensions[1] == "blade" else 0
+        looks = [coordinate_look(first + i) for i in range(stacked.shape[1])]
+        for k, axes in enumerate(panels.axes):
+            series = [Series(self._run.time, stacked[:, i, k], look) for i, look in enumerate(looks)]
+            time_histories.draw_lines(
+                axes, series, f"{'xyz'[k]} {load.plot.axis}" if values.ndim == 3 else load.plot.axis
+            )
+        names = [f"blade {i + 1}" if first else "xyz"[i] for i in range(len(looks))]
+        canvas.legend_inside(panels.axes[0], list(zip(names, looks, strict=True)))
+        return panels
 
     def error(self) -> Panels:
         """Largest angle error (rad) against the reference over time. Raises InputError where there is none."""

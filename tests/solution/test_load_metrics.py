@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from support.checking import results_file
 
+import rotor_mbs as rm
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.solution.judgement import judge
@@ -75,3 +77,14 @@ def test_loads_are_stored_with_units_dimensions_and_metrics(tmp_path: Path) -> N
             assert group.attrs[f"{load.name}_error"] < 1e-11
             assert 0.0 <= group.attrs[f"{load.name}_max_time_s"] <= 1.0
         assert group.attrs["linear_impulse_error_max"] < 1e-9
+
+
+def test_loads_are_drawn_from_python() -> None:
+    """A panel per axis with a line per blade; of the shaft a line per axis."""
+    run = rm.run(SCENE, "lagrange/dop853")
+    roots, shaft = run.plot.loads(), run.plot.loads("shaft_moment")
+    assert [len(axes.lines) for axes in roots.axes] == [4, 4, 4]
+    assert np.array_equal(roots.axes[1].lines[3].get_ydata(), run.blade_root_force[:, 3, 1])
+    assert [len(axes.lines) for axes in shaft.axes] == [3]
+    with pytest.raises(InputError, match="no load 'angles'"):
+        run.plot.loads("angles")

@@ -44,17 +44,19 @@ def metrics_table(scene: StoredScene) -> PageTable:
     """Every run of the scene."""
     head = (
         "Method", "Status", "Angle error to the horizon (rad)", "Angle error, whole run (rad)",
-        "Tip error to the horizon (m)", "Energy drift (relative)", "Joint gap (m)", "Zero pitch", "Steps",
-        "Evaluations", "Set-up", "Run",
+        "Tip error to the horizon (m)", "Energy drift (relative)", "Momentum about the shaft (relative)",
+        "Joint gap (m)", "Zero pitch", "Steps", "Evaluations", "Set-up", "Run",
     )  # fmt: skip
     rows = [_metrics_row(run) for run in run_selection.in_order(scene).values()]
-    return PageTable("", head, rows, numeric=(2, 3, 4, 5, 6, 8, 9, 10, 11)).without_empty_columns()
+    return PageTable("", head, rows, numeric=(2, 3, 4, 5, 6, 7, 9, 10, 11, 12)).without_empty_columns()
 
 
 def _metrics_row(run: StoredRun) -> Row:
     errors = ("angle_error_max", "angle_error_whole", "tip_error_max")
     texts = ["" if run.method == REFERENCE else number(metric(run, name)) for name in errors]
-    texts += [number(metric(run, name)) for name in ("energy_drift_max", "constraint_error_max")]
+    texts += [
+        number(metric(run, name)) for name in ("energy_drift_max", "angular_impulse_error_max", "constraint_error_max")
+    ]
     texts.append(_zero_pitch(run))
     counts = [metric(run, name) for name in ("steps", "rhs_evaluations")]
     texts += ["" if count is None else f"{count:.0f}" for count in counts]
