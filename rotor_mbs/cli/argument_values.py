@@ -7,9 +7,21 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 _LONGEST_SPAN = 10_000
 _LONGEST_NAME = 200  # bytes of a file's name; file systems allow 255, and temporary names are longer
 _LARGEST = 1e9  # of a count; of seconds: thirty years
+
+
+def default_results() -> Path:
+    """The results file that is read where none is named: `run`'s in this folder, else `reproduce`'s."""
+    here = Path("results.h5")
+    return here if here.exists() else REPRODUCED / here
+
+
+def pages_beside(results: Path) -> Path:
+    """The folder for the pages of a file where none is named: `report` beside results.h5, x-report beside x.h5."""
+    return results.with_name("report" if results.name == "results.h5" else f"{results.stem}-report")
 
 
 def path(text: str) -> Path:

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import NoReturn, TypeAlias
 
 import rotor_mbs
-from rotor_mbs.cli.argument_values import file, part, path, positive, setting, span
+from rotor_mbs.cli.argument_values import REPRODUCED, default_results, file, part, path, positive, setting, span
 from rotor_mbs.errors import nearest
 
 _SCENE, _SCENES = "a name (paper/fig05) or a TOML file", "a name (paper/fig05), a folder (paper), a TOML file"
+_PAGES = "(default: beside FILE, its name with -report; of results.h5: report)"
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv", "sympy", "iftomm")
-_DEFAULT_FOLDER = Path("rotor-mbs-out")
 _DEFAULT_TIMEOUT_S = 60.0
 # The suite has many runs that would reach any limit: with a shorter one it ends in minutes.
 _SUITE_TIMEOUT_S = 8.0
@@ -39,7 +39,10 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     if argv and not argv[0].startswith("-") and argv[0] not in commands.choices:
         known = ", ".join(commands.choices)
         parser.error(f"no command {argv[0]!r}{nearest(argv[0], commands.choices)}; allowed: {known}")
-    return parser.parse_args(argv or ["--help"])
+    arguments = parser.parse_args(argv or ["--help"])
+    if getattr(arguments, "results", None):
+        arguments.file = arguments.results
+    return arguments
 
 
 def _parser() -> tuple[_Parser, _Commands]:
@@ -96,7 +99,7 @@ def _add_runs(commands: _Commands) -> None:
         "",
         "-o out -j 4",
     )
-    reproduce.add_argument("-o", "--output", type=path, default=_DEFAULT_FOLDER, metavar="DIR", help=_default("DIR"))
+    reproduce.add_argument("-o", "--output", type=path, default=REPRODUCED, metavar="DIR", help=_default("DIR"))
     _add_pool_options(reproduce)
 
     run = _command(
@@ -212,7 +215,7 @@ def _add_stability(commands: _Commands) -> None:
     stability.add_argument(
         "-o", "--output", type=file, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
     )
-    stability.add_argument("--report", type=path, metavar="DIR", help="its pages (default: FILE's name with -report)")
+    stability.add_argument("--report", type=path, metavar="DIR", help=f"its pages {_PAGES}")
     _add_pool_options(stability, timeout_s=_SUITE_TIMEOUT_S)
 
 
@@ -231,7 +234,7 @@ def _add_modes(commands: _Commands) -> None:
         help="N m/rad of every bearing: the stability chart over speed and stiffness",
     )  # fmt: skip
     modes.add_argument("-o", "--output", type=file, default=Path("modes.h5"), metavar="FILE", help=_default("FILE"))
-    modes.add_argument("--report", type=path, metavar="DIR", help="its pages (default: FILE's name with -report)")
+    modes.add_argument("--report", type=path, metavar="DIR", help=f"its pages {_PAGES}")
     modes.add_argument("--json", action="store_true", help="the table as JSON, for a script")
     _add_pool_options(modes, timeout_s=_CHART_TIMEOUT_S)
 
@@ -257,9 +260,10 @@ def _add_claims(commands: _Commands) -> None:
 
 
 def _add_report(commands: _Commands) -> None:
-    report = _command(commands, "report", "HTML pages from a results file", "reports:report", "my.h5")
-    report.add_argument("file", type=path, metavar="FILE", help="a results file")
-    report.add_argument("-o", "--output", type=path, default=Path("report"), metavar="DIR", help=_default("DIR"))
+    report = _command(commands, "report", "HTML pages from a results file", "reports:report", "my.h5 --open")
+    _add_results(report)
+    report.add_argument("-o", "--output", type=path, metavar="DIR", help=_PAGES)
+    report.add_argument("--open", action="store_true", help="show the index in the browser")
 
     figures = _command(
         commands,
@@ -268,36 +272,32 @@ def _add_report(commands: _Commands) -> None:
         "reports:figures",
         "--format svg --figure 11",
     )
+    _add_results(figures)
     figures.add_argument("-o", "--output", type=path, default=Path("figures"), metavar="DIR", help=_default("DIR"))
     figures.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
     figures.add_argument("--figure", action="append", metavar="N", help="this one alone; may be repeated")
-    _add_results(figures)
 
     animate = _command(
         commands, "animate", "a scene moving, from a results file", "reports:animate",
-        "paper/fig11 -o fig11.webp",
+        "paper/fig11", "mine my.h5 -o mine.gif",
     )  # fmt: skip
     animate.add_argument("scene", metavar="SCENE", help="its name in the results file")
+    _add_results(animate)
     animate.add_argument(
-        "-o", "--output", type=file, required=True, metavar="FILE",
-        help="FILE.webp, FILE.gif, or FILE.mp4 where ffmpeg is installed",
+        "-o", "--output", type=file, metavar="FILE",
+        help="FILE.gif, FILE.webp, or FILE.mp4 where ffmpeg is installed (default: the scene's name with .webp)",
     )  # fmt: skip
     animate.add_argument(
         "--offset", type=positive(float, "a number more than 0, at most 1e9"), metavar="TIMES",
         help="how many times the tip's distance from its pitch axis is drawn (default: to a tenth of the blade)",
     )  # fmt: skip
-    _add_results(animate)
 
 
 def _add_results(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--results",
-        dest="file",
-        type=path,
-        default=_DEFAULT_FOLDER / "results.h5",
-        metavar="FILE",
-        help=_default("FILE"),
-    )
+    text = "a results file (default: results.h5 of this folder, else that of reproduce)"
+    parser.add_argument("file", nargs="?", type=path, default=default_results(), metavar="FILE", help=text)
+    # As it was called before; it stays for scripts.
+    parser.add_argument("--results", type=path, help=argparse.SUPPRESS)
 
 
 def _add_sweep(commands: _Commands) -> None:

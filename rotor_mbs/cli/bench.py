@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from rotor_mbs.analysis.run_tables import bench_table
+from rotor_mbs.cli.argument_values import pages_beside
 from rotor_mbs.cli.arguments import cores
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
 from rotor_mbs.errors import InputError
@@ -35,7 +36,7 @@ def bench(arguments: argparse.Namespace) -> int:
         print(line, file=sys.stderr)
     names = {scene.name for scene in scenes}
     print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
-    index = write_bench_report(output, output.with_name(f"{output.stem}-report"))
+    index = write_bench_report(output, pages_beside(output))
     print(f"{output}: {report.measured} scenes measured, {report.kept} there already\nreport: {index}")
     lost = [one for one in made if not one.is_computed]
     print_not_computed(lost)

@@ -8,6 +8,7 @@ import sys
 
 from rotor_mbs.analysis.campbell import mode_rows, modes_summary
 from rotor_mbs.analysis.mode_records import read_modes
+from rotor_mbs.cli.argument_values import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.report.pages.modes import write_modes_report
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -31,6 +32,6 @@ def modes(arguments: argparse.Namespace) -> int:
     else:
         for one in chosen:
             print("\n".join(modes_summary(one)))
-        folder = arguments.report or arguments.output.with_name(f"{arguments.output.stem}-report")
+        folder = arguments.report or pages_beside(arguments.output)
         print(f"report: {write_modes_report(arguments.output, folder)}")
     return 1 if missing or not all(one.agrees for one in chosen) else 0

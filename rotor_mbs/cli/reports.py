@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 
+from rotor_mbs.cli.argument_values import pages_beside
 from rotor_mbs.execution.provenance import fingerprint
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.hdf5 import replace_file
@@ -19,20 +21,25 @@ _SUMMARY = "summary.txt"  # what `reproduce` prints at its end
 
 
 def report(arguments: argparse.Namespace) -> int:
-    """Pages from `arguments.file` into `arguments.output`."""
+    """Pages from `arguments.file` into `arguments.output`, or beside the file."""
     from rotor_mbs.report.build import write_report
     from rotor_mbs.report.pages.bench import write_bench_report
     from rotor_mbs.report.pages.modes import write_modes_report
 
+    output = arguments.output or pages_beside(arguments.file)
     has_modes = bool(read_records(arguments.file, "modes"))
     with open_results(arguments.file) as results:
         has_scenes = bool(results.scenes)
+    pages = []
     if has_scenes or not has_modes:
-        print(write_report(arguments.file, arguments.output, jobs=os.cpu_count() or 1))
+        pages.append(write_report(arguments.file, output, jobs=os.cpu_count() or 1))
     if has_modes:
-        print(write_modes_report(arguments.file, arguments.output / "modes" if has_scenes else arguments.output))
+        pages.append(write_modes_report(arguments.file, output / "modes" if has_scenes else output))
     if read_records(arguments.file, "bench"):
-        print(write_bench_report(arguments.file, arguments.output / "bench"))
+        pages.append(write_bench_report(arguments.file, output / "bench"))
+    print(*pages, sep="\n")
+    if arguments.open:
+        webbrowser.open(pages[0].resolve().as_uri())
     return 0
 
 
@@ -48,7 +55,8 @@ def animate(arguments: argparse.Namespace) -> int:
     """`arguments.scene` of `arguments.file`, moving, into `arguments.output`."""
     from rotor_mbs.report.animation import write_animation
 
-    print(write_animation(arguments.file, arguments.scene, arguments.output, arguments.offset))
+    output = arguments.output or Path(arguments.scene.rpartition("/")[2] + ".webp")
+    print(write_animation(arguments.file, arguments.scene, output, arguments.offset))
     return 0
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from rotor_mbs.cli.argument_values import pages_beside
 from rotor_mbs.cli.arguments import parse
 from rotor_mbs.store.read import open_results
 
@@ -98,6 +99,19 @@ def test_every_help_has_an_example(tmp_path: Path) -> None:
         with contextlib.redirect_stdout(io.StringIO()) as printed, pytest.raises(SystemExit):
             parse([command, "--help"])
         assert f"example:\n  rotor-mbs {command}" in printed.getvalue()
+
+
+def test_files_and_pages_have_the_same_default_in_every_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    commands = (["report"], ["figures"], ["animate", "paper/fig11"])
+    assert {parse(command).file for command in commands} == {Path("rotor-mbs-out/results.h5")}
+    Path("results.h5").touch()
+    assert {parse(command).file for command in commands} == {Path("results.h5")}
+    assert {parse([*command, "mine.h5"]).file for command in (*commands, ["check"])} == {Path("mine.h5")}
+    assert pages_beside(Path("a/mine.h5")) == Path("a/mine-report")
+    assert pages_beside(Path("rotor-mbs-out/results.h5")) == Path("rotor-mbs-out/report")
 
 
 def test_a_new_scene_file_runs_and_replaces_no_other(tmp_path: Path) -> None:

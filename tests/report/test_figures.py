@@ -30,7 +30,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_figure_the_file_has_is_written(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["figures", "--results", str(results), "-o", str(tmp_path), "--format", "svg"]) == 0
+    assert main(["figures", str(results), "-o", str(tmp_path), "--format", "svg"]) == 0
     names = [f"fig{number:02d}.svg" for number in (8, 9, 10, 11, 13, 15, 16)]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in names]
@@ -42,7 +42,7 @@ def test_every_figure_the_file_has_is_written(
 
 @pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_formats(results: Path, tmp_path: Path, kind: str, start: bytes) -> None:
-    command = ["figures", "--results", str(results), "--format", kind, "--figure", "11", "-o"]
+    command = ["figures", str(results), "--format", kind, "--figure", "11", "-o"]
     assert main([*command, str(tmp_path / "a")]) == 0
     assert main([*command, str(tmp_path / "b")]) == 0
     content = (tmp_path / "a" / f"fig11.{kind}").read_bytes()
@@ -104,8 +104,7 @@ def test_a_damaged_or_foreign_file_is_refused_and_nothing_is_written(
             file["data"] = np.arange(3.0)
     else:
         path.write_text("<script>alert(1)</script>")
-    read = [str(path)] if command == ["report"] else ["--results", str(path)]
-    assert main([*command, *read, "-o", str(output)]) == 2
+    assert main([*command, str(path), "-o", str(output)]) == 2
     error = capsys.readouterr().err
     assert str(path) in error
     assert error.count("\n") == 1
