@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
@@ -29,6 +30,7 @@ _STEP = 1.25e-3  # s, of what is interpolated: of the printed equations' own run
 # Growth up to which a parameter is fitted, one after another: a start too far off is useless once errors have grown.
 _LEVELS = (3.0, 1e1, 1e2, 1e3, 1e4, HORIZON_GROWTH)
 _LARGEST_CHANGE = 0.3
+_SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
 _MOST = 6  # parameters that are named
 
 Motion = Callable[[Array], Array | None]  # (n,) s -> (n, 2 (1 + blades)), None where it ends before
@@ -85,13 +87,16 @@ def _scenes(search: CauseSearch) -> Iterator[tuple[str, Scene]]:
     ):
         yield "blade mass on the pitch axis", replace(scene, blades=on_axis)
     first = search.data.values[0]
-    for name, _ in list_scenes():
-        if name == scene.name:
-            continue
-        other = find_scenes([name])[0]
+    for other in _catalogue():
         states = np.array([*other.initial_angles, *other.initial_rates])
-        if len(other.blades) == len(scene.blades) and np.abs(states[search.data.columns] - first).max() < 1e-3:
-            yield f"the scene {name}", other
+        is_other = other.name != scene.name and len(other.blades) == len(scene.blades)
+        if is_other and np.abs(states[search.data.columns] - first).max() < _SAME_START:
+            yield f"the scene {other.name}", other
+
+
+@functools.cache
+def _catalogue() -> tuple[Scene, ...]:
+    return tuple(find_scenes(sorted({name.partition("/")[0] for name, _ in list_scenes()})))
 
 
 def _renumbered(scene: Scene, time: Array) -> Array | None:
@@ -127,7 +132,7 @@ def _printed(scene: Scene, errata: Errata, time: Array) -> Array | None:
     end = float(time[-1])
     whole = replace(scene, duration=end, samples=2 + math.ceil(end / _STEP), outputs=("angles", "rates"))
     solver = PrintedModel("printed", errata).build(
-        whole, Ode45Settings(relative_tolerance=1e-10, absolute_tolerance=1e-12)
+        whole, Ode45Settings(relative_tolerance=1e-9, absolute_tolerance=1e-11)
     )
     solver.integrate()
     run = solver.observe()

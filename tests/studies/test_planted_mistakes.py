@@ -151,7 +151,14 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("name", PLANTS)
+# Of a kind with others; the fast suite leaves them out.
+SLOW = {
+    "degrees of pitch alone", "no gravity", "mass 1 % off, springs", "missing Coriolis, full inertia", "as printed",
+    "numbers of rows", "half a sample late",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.slow if one in SLOW else ()) for one in PLANTS])
 def test_a_mistake_is_named(name: str) -> None:
     plant = PLANTS[name]
     found = rm.compare_data(plant.data(), short(plant.scene))
