@@ -103,16 +103,13 @@ def _renumbered(scene: Scene, time: Array) -> Array | None:
     """Blade 2 in the place of the last one, and so on."""
     order = [0, *range(len(scene.blades) - 1, 0, -1)]
     coordinates = [0, *(1 + i for i in order)]
-
-    def turned(values: tuple[Any, ...], places: list[int]) -> tuple[Any, ...]:
-        return tuple(values[i] for i in places) if len(values) == len(places) else values
-
-    other = replace(
-        scene, blades=turned(scene.blades, order), initial_angles=turned(scene.initial_angles, coordinates),
-        initial_rates=turned(scene.initial_rates, coordinates),
-        bearing_stiffness=turned(scene.bearing_stiffness, order), bearing_damping=turned(scene.bearing_damping, order),
-    )  # fmt: skip
-    states = states_at(other, time)
+    changed: dict[str, Any] = {}
+    for one in scene_fields("rotor", "start"):
+        value = getattr(scene, one.name)
+        places = coordinates if one.metadata["part"] == "start" else order
+        if value and (one.name == "blades" or one.metadata["per_blade"] or places is coordinates):
+            changed[one.name] = tuple(value[i] for i in places)
+    states = states_at(replace(scene, **changed), time)
     return None if states is None else states[:, [*coordinates, *(len(coordinates) + i for i in coordinates)]]
 
 

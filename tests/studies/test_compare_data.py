@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,13 +19,13 @@ from rotor_mbs.models.lagrange import reference
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.testing import assert_agrees
 
-# (scene, format, duration of the short form, s): three formats more are in test_a_third_engine_and_exported_files.
+# (scene, format, duration of the short form, s)
 ACCEPTED = [
     ("paper/fig08", "data.csv", 4.0),
     ("paper/fig09", "data.npz", 2.5),
     ("paper/fig11", "data.out", 2.5),
     ("check/general", "data.mat", 1.5),  # springs, dampers, a torque with a jump, full inertia
-    ("check/general", "data.nc", 1.5),
+    ("check/pitch-loads", "data.nc", 1.5),  # torques and commands on every pitch, with jumps
     ("check/general", "data.txt", 1.5),
 ]
 
@@ -66,13 +68,31 @@ def test_a_correct_code_agrees_to_the_end(tmp_path: Path, name: str) -> None:
     accepted(name, "data.csv", 10.0, tmp_path)
 
 
-def test_mujoco_agrees_through_plain_arrays() -> None:
-    """RK4 at its default step: an error of 1e-8 of a step's size, far below the tolerance."""
-    pytest.importorskip("mujoco")
+def test_a_script_for_mujoco_agrees(tmp_path: Path) -> None:
+    """Plain MuJoCo on the exported model, RK4 at the file's step: far below the tolerance."""
+    mujoco = pytest.importorskip("mujoco")
     scene = scene_of("paper/fig11", 1.0)
-    run = rm.run(scene, "mujoco/rk4")
-    found = rm.compare_data({"time": run.time, "qpos": run.angles, "qvel": run.rates}, scene)
-    assert found.agrees
+    (path,) = rm.export(scene, "mjcf", tmp_path / "model.xml")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    rows = [(0.0, data.qpos.copy(), data.qvel.copy())]
+    while data.time < 1.0 - 0.5 * model.opt.timestep:
+        mujoco.mj_step(model, data)
+        rows.append((data.time, data.qpos.copy(), data.qvel.copy()))
+    time, qpos, qvel = map(np.array, zip(*rows[::10], strict=True))
+    np.savez(tmp_path / "mujoco.npz", time=time, qpos=qpos, qvel=qvel)
+    found = rm.compare_data(tmp_path / "mujoco.npz", scene)
+    assert (found.status, found.message) == ("ok", "")
+
+
+def test_an_exported_script_for_exudyn_agrees(tmp_path: Path) -> None:
+    """The CSV that the script writes, run without this package, as it is."""
+    (script,) = rm.export(rm.scene("check/pitch-loads"), "exudyn", tmp_path / "model.py")
+    subprocess.run([sys.executable, "-P", script, tmp_path / "out.csv"], check=True, cwd=tmp_path, capture_output=True)
+    found = rm.compare_data(tmp_path / "out.csv", rm.scene("check/pitch-loads"))
+    assert (found.status, found.message) == ("ok", "")
+    assert len(found.verdict.channels) == 8
 
 
 def test_the_reference_at_the_times_of_the_data_is_the_frozen_one() -> None:
@@ -127,9 +147,7 @@ def test_the_command_prints_a_table_and_writes_a_page(tmp_path: Path, capsys: py
         assert main([*call, "--json"]) == status
         found = json.loads(capsys.readouterr().out)
         assert found["agrees"] == (status == 0)
-        assert found["channels"][0]["agrees_until"]["0.001"] == (
-            10.0 if status == 0 else found["channels"][0]["agrees_until"]["0.001"]
-        )
+        assert (found["channels"][0]["agrees_until"]["0.001"] == 10.0) == (status == 0)
     assert main([*call, "--tolerance", "0.1"]) == 0
 
 

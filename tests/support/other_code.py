@@ -37,7 +37,8 @@ def trajectory(scene: Scene, times: Array, mistakes: Mistakes = NONE) -> tuple[A
     count = 1 + len(scene.blades)
     accelerations = _equations(scene, mistakes)
     state = np.array([*scene.initial_angles, *scene.initial_rates])
-    kinks = [t for t, _ in scene.rotor_torque if 0.0 < t < times[-1]]
+    tables = [scene.rotor_torque, *scene.pitch_torque, *scene.bearing_rest]
+    kinks = [t for table in tables for t, _ in table if 0.0 < t < times[-1]]
     rows = [state[None, :]]
     for start, end in pairwise(sorted({0.0, *kinks, float(times[-1])})):
         inside = times[(times > start) & (times <= end)]
@@ -45,8 +46,8 @@ def trajectory(scene: Scene, times: Array, mistakes: Mistakes = NONE) -> tuple[A
 
         def derivative(t: float, y: Array, start: float = start, end: float = end) -> Array:
             shift = 1e-9 * (end - start)  # a jump of the torque belongs to the interval that it begins
-            torque = scene.torque_at(min(max(t, start + shift), end - shift))
-            return np.concatenate([y[count:], accelerations(torque, y[:count], y[count:])])
+            loads = [_value(table, min(max(t, start + shift), end - shift)) for table in tables]
+            return np.concatenate([y[count:], accelerations(loads, y[:count], y[count:])])
 
         run = solve_ivp(derivative, (start, end), state, "DOP853", asked, rtol=1e-11, atol=1e-12)
         rows.append(run.y.T[: len(inside)])
@@ -55,8 +56,14 @@ def trajectory(scene: Scene, times: Array, mistakes: Mistakes = NONE) -> tuple[A
     return found[:, :count], found[:, count:]
 
 
-def _equations(scene: Scene, mistakes: Mistakes) -> Callable[[float, Array, Array], Array]:
-    """(torque, angles, rates) -> accelerations: pitches eliminated, arrays over the blades."""
+def _value(table: Array, t: float) -> float:
+    """Of rows of (time, value), linear between."""
+    times, values = zip(*table, strict=True) if table else ((0.0,), (0.0,))
+    return float(np.interp(t, times, values))
+
+
+def _equations(scene: Scene, mistakes: Mistakes) -> Callable[[list[float], Array, Array], Array]:
+    """(values of the loads, angles, rates) -> accelerations: pitches eliminated, arrays over the blades."""
     blades = scene.blades
     phases = np.array(mistakes.phases or [2.0 * np.pi * i / len(blades) for i in range(len(blades))])
     m = np.array([blade.mass for blade in blades])
@@ -64,7 +71,10 @@ def _equations(scene: Scene, mistakes: Mistakes) -> Callable[[float, Array, Arra
     xx, yy, zz, xy, xz, yz = np.array([blade.inertia for blade in blades]).T
     k, d = (np.array(values or [0.0] * len(blades)) for values in (scene.bearing_stiffness, scene.bearing_damping))
 
-    def accelerations(torque: float, q: Array, w: Array) -> Array:
+    pitch_loads = len(scene.pitch_torque)
+
+    def accelerations(loads: list[float], q: Array, w: Array) -> Array:
+        torque, pitch_torque, rest = loads[0], loads[1 : 1 + pitch_loads] or 0.0, loads[1 + pitch_loads :] or 0.0
         sp, cp, s, c = np.sin(q[0] + phases), np.cos(q[0] + phases), np.sin(q[1:]), np.cos(q[1:])
         u, v = x * c - y * s, x * s + y * c  # the centre of mass, across the blade and along the shaft
         spin, rate, zero = w[0], w[1:], 0.0 * u
@@ -81,7 +91,9 @@ def _equations(scene: Scene, mistakes: Mistakes) -> Callable[[float, Array, Arra
         on_rotor = -m * _dot(phi, _sum(phi_phi, spin**2, phi_theta, 2.0 * coriolis, theta_theta, rate**2))
         on_pitch = -m * _dot(theta, _sum(phi_phi, spin**2, phi_theta, 2.0 * coriolis, theta_theta, last))
         on_rotor -= m * scene.gravity * phi[2] + a_slope * coriolis + b_slope * rate**2
-        on_pitch += -m * scene.gravity * theta[2] + 0.5 * a_slope * spin**2 - k * q[1:] - d * rate
+        on_pitch += (
+            -m * scene.gravity * theta[2] + 0.5 * a_slope * spin**2 - k * (q[1:] - rest) - d * rate + pitch_torque
+        )
         coupling, pitch_inertia = m * _dot(phi, theta) + b, m * _dot(theta, theta) + zz
         inertia = scene.hub_inertia + np.sum(m * _dot(phi, phi) + a - coupling**2 / pitch_inertia)
         moment = torque - scene.shaft_damping * spin + np.sum(on_rotor - coupling * on_pitch / pitch_inertia)
