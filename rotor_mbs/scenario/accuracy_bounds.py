@@ -18,8 +18,8 @@ from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 CHECKS = (
     "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "impulse", "loads", "gap",
-    "exact", "published", "reference", "growth", "integrity", "frozen", "symmetry", "order", "extrapolated", "printed",
-    "rules", "speed",
+    "exact", "published", "reference", "growth", "integrity", "frozen", "symmetry", "order", "extrapolated",
+    "ensemble", "printed", "rules", "speed",
 )  # fmt: skip
 
 

@@ -1,0 +1,58 @@
+"""Beyond the horizon two methods have the same distributions, and a model that is wrong by a percent has not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from support.references import TAYLOR
+from support.scenes import paper
+
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.studies.ensembles import ChannelDistance, compare_ensembles, compare_samples, ensemble
+
+TREE = "exudyn_tree/rk67"
+
+
+def with_offset(scene: Scene, factor: float) -> Scene:
+    """Every blade's centre of mass so much farther from its pitch axis."""
+    blades = [replace(b, centre_of_mass=(factor * b.centre_of_mass[0], *b.centre_of_mass[1:])) for b in scene.blades]
+    return replace(scene, blades=tuple(blades))
+
+
+def largest(found: list[ChannelDistance]) -> float:
+    return max(max(one.distance, one.mean) for one in found)
+
+
+def test_tree_and_closed_form_in_short() -> None:
+    pytest.importorskip("heyoka")
+    found = list(compare_ensembles(paper("fig11"), TAYLOR, TREE, (90, 30), {"step": 4e-3}))
+    assert len(found) == 4 + 2 + 3
+    assert largest(found) < 1.0
+
+
+def test_a_percent_of_the_offset_shows() -> None:
+    pytest.importorskip("heyoka")
+    scene = paper("fig11")
+    own, same, wrong = (
+        ensemble(one, TAYLOR, 120, seed) for one, seed in ((scene, 1), (scene, 2), (with_offset(scene, 1.01), 2))
+    )
+    assert largest(list(compare_samples(own, same))) < 1.0
+    assert largest(list(compare_samples(own, wrong))) > 1.2
+
+
+def test_the_same_seed_gives_the_same_numbers() -> None:
+    pytest.importorskip("heyoka")
+    one, other = (ensemble(paper("fig11", duration=1.0, samples=11), TAYLOR, 3, 7) for _ in range(2))
+    assert all((one[name] == other[name]).all() for name in one)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fig11", "fig12", "fig13b", "fig14a", "fig14b", "fig14c"])
+def test_tree_and_closed_form_on_every_chaotic_scene(name: str) -> None:
+    """900 runs of the closed form, 300 of the tree at its default step."""
+    found = list(compare_ensembles(paper(name), TAYLOR, TREE, (900, 300), {}))
+    for one in found:
+        quantiles = ", ".join(f"{value:.2f}" for value in one.quantiles)
+        print(f"{name} {one.channel}: distance {one.distance:.2f}, mean {one.mean:.2f}, quantiles {quantiles}")
+    assert largest(found) < 1.0
