@@ -213,7 +213,7 @@ LOADS = (
         "Moment of the shaft's bearing", "the sum of the moments at the roots, the hub, or the torque",
     ),
     _load(
-        "pitch_actuator_moment", ("blade",), "moment of each pitch actuator (spring, damper) on its blade",
+        "pitch_actuator_moment", ("blade",), "moment of each pitch actuator (torque, spring, damper) on its blade",
         "Moments of the pitch actuators", "a spring or a damper of a pitch bearing",
     ),
 )  # fmt: skip

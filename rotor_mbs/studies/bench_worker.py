@@ -157,11 +157,12 @@ def ask(request: tuple[str, Point]) -> Any:
 
 
 def prepared_scene(scene: Scene, results: Path) -> tuple[Scene, Trajectory]:
-    """The scene as it is benched, and its reference from the results file. Raises InputError where there is none."""
+    """The scene as it is benched, without loads, and its reference. Raises InputError where the file has none."""
     reference = load_reference(results, scene)
     if reference is None or len(reference.time) < scene.samples:
         raise InputError(f"{scene.name}: no usable reference (it does not reach the end); a bench needs one")
     short, k = thinned(scene)
+    short = replace(short, outputs=tuple(name for name in short.outputs if name != "loads"))
     return short, thinned_reference(reference, k)
 
 

@@ -18,6 +18,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import loads as closed_form_loads
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.quantities import longest_arm
 
 LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment")
@@ -112,7 +113,7 @@ def test_gyroscopic_moment_of_a_pitching_blade(method: str) -> None:
     assert off(run.shaft_moment, in_base) < METHODS[method]
 
 
-# Three unlike blades of full inertia on springs and dampers, and a torque that grows.
+# Three unlike blades of full inertia on springs and dampers, torques on rotor and pitches, and pitch commands.
 DRIVEN = general(
     outputs=OUTPUTS,
     duration=0.4,
@@ -120,6 +121,8 @@ DRIVEN = general(
     bearing_damping=(200.0, 300.0, 100.0),
     shaft_damping=4000.0,
     rotor_torque=((0.0, 20000.0), (1.0, 30000.0)),
+    pitch_torque=(((0.0, 900.0),), ((0.0, 0.0), (1.0, 2000.0)), ()),
+    bearing_rest=(((0.0, 0.1),), ((0.0, 0.0), (1.0, 0.3)), ()),
 )
 
 
@@ -148,11 +151,13 @@ def test_roots_and_hub_add_up_to_the_shaft(method: str) -> None:
 
 
 def test_actuator_moment_is_the_moment_about_the_pitch_axis(method: str) -> None:
-    """Spring and damper are all that turns a blade about its own axis: Euler's law must give their moment."""
+    """Torque, spring and damper are all that turns a blade about its own axis: Euler's law must give their moment."""
     scene = DRIVEN
     run = loads(method, scene)
     scale = np.abs(run.blade_root_moment).max()
-    law = -run.angles[:, 1:] * scene.bearing_stiffness - run.rates[:, 1:] * scene.bearing_damping
+    applied = np.array([[[value_at(table, t) for table in scene.pitch_load(i)] for i in range(3)] for t in run.time])
+    torque, rest = applied[:, :, 0], applied[:, :, 1]
+    law = torque - (run.angles[:, 1:] - rest) * scene.bearing_stiffness - run.rates[:, 1:] * scene.bearing_damping
     assert np.abs(law).max() > 1e-2 * scale
     allowed = 1e-7 if method.startswith("exudyn_chain") else 1e-12
     assert off(run.pitch_actuator_moment, law) < allowed * scale
