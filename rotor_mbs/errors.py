@@ -25,6 +25,10 @@ class MethodRefusal(RotorError):
     """A method that cannot represent this scene, or is not installed here; says what is allowed or how to get it."""
 
 
+class ResourceError(RotorError):
+    """The machine lacks what a run needs (memory, processes, open files); it says nothing about the run."""
+
+
 class StoreError(RotorError):
     """A results file that cannot be read or written; names the file and the reason."""
 

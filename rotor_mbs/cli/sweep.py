@@ -58,6 +58,8 @@ def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
         show(str(exc), sys.stderr)
         return 1
     _summarize(result, as_json=arguments.json)
+    for line in result.lost:
+        show(f"{line}; not computed, the same command tries again", sys.stderr)
     if study.table.picture and arguments.part == (1, 1):
         line = draw(study, result.path, output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)

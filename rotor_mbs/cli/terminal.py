@@ -182,7 +182,9 @@ def print_summary(report: RunReport, output: Path) -> int:
     parts = [f"{len(report.made) - sum(counts.values())} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
     print(f"{output}: {made}, {report.kept} there already")
-    return 1 if report.failures or lost else 0
+    for line in report.stored_failures:
+        print(f"stored: {line}", file=sys.stderr)
+    return 1 if report.failures or lost or report.stored_failures else 0
 
 
 def print_doubts(scenes: Sequence[Scene]) -> None:

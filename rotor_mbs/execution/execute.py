@@ -6,16 +6,15 @@ output at the end of the call, or by the next call where this one was interrupte
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
-from rotor_mbs.errors import InputError, RotorError, StoreError
+from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.output import RESULTS, writing
 from rotor_mbs.execution.pool import Finished, run_tasks
 
 # Statuses of a case of which there is no record: the same call tries it again.
@@ -75,7 +74,7 @@ class Store(Protocol):
     def path(self) -> Path: ...
 
     def stored_keys(self) -> AbstractSet[str]:
-        """Keys of all records in the file; none where there is no file. Raises StoreError."""
+        """Keys of all records in the file that need not be computed again. Raises StoreError."""
 
     def merge(self, parts: Sequence[Path]) -> None:
         """The records of `parts` into the file, atomically; later ones take the place of earlier ones."""
@@ -107,9 +106,10 @@ def execute(
 
     Raises InputError where another process is writing the output, StoreError, and what `run_jobs` raises of RotorError.
     """
-    with _parts_folder(store.path) as parts:
+    with writing(store.path, RESULTS) as parts:
+        _merge(store, parts)
         stored = store.stored_keys()
-        missing = [case for case in cases if case.key not in stored and not _part(parts, case.key).exists()]
+        missing = _missing(list(cases), stored)
         made: list[Outcome] = []
         work = sum(case.work for case in missing)
         for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
@@ -118,11 +118,23 @@ def execute(
                 done = outcome.case.work + sum(one.case.work for one in made)
                 made.append(replace(outcome, share=done / work))
                 on_progress(len(made), len(missing), made[-1])
-        new = {case.key for case in missing}
-        found = sorted(parts.glob("*.h5"), key=lambda path: (path.stem in new, path.name))
-        if found or not store.path.exists():
-            store.merge(found)
+        _merge(store, parts, even_none=not store.path.exists())
     return made
+
+
+def _missing(cases: Sequence[Case], stored: AbstractSet[str]) -> list[Case]:
+    """Those that are not stored, and those that are compared with one of these."""
+    keys = {case.key for case in cases if case.key not in stored}
+    return [case for case in cases if case.key in keys or case.reference in keys]
+
+
+def _merge(store: Store, parts: Path, *, even_none: bool = False) -> None:
+    """Finished parts into the output, also those of a call that was interrupted; then they go."""
+    found = sorted(parts.glob("*.h5"))
+    if found or even_none:
+        store.merge(found)
+    for part in found:
+        part.unlink()
 
 
 def compute(cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float) -> Iterator[Outcome]:
@@ -178,29 +190,3 @@ def _place(case: Case, parts: Path, store: Store, stored: AbstractSet[str]) -> P
     if not case.reference:
         return None
     return store.path if case.reference in stored else _part(parts, case.reference)
-
-
-@contextmanager
-def _parts_folder(output: Path) -> Iterator[Path]:
-    """The folder of the parts, locked against other processes; it stays where the block is left with parts in it."""
-    from filelock import FileLock, Timeout
-
-    parts = output.with_name(f"{output.name}.parts")
-    try:
-        parts.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(parts / "lock", timeout=0)
-        lock.acquire()
-    except Timeout:
-        raise InputError(
-            f"{output}: another process is writing it now; allowed: wait for its end, or another output file"
-        ) from None
-    except OSError as exc:
-        raise StoreError(f"{output.parent}: cannot be written: {exc.strerror}") from exc
-    try:
-        yield parts
-        for part in parts.glob("*.h5"):
-            part.unlink()
-    finally:
-        if not any(parts.glob("*.h5")):
-            shutil.rmtree(parts)
-        lock.release()

@@ -17,9 +17,11 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPo
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import resource_tracker
-from queue import SimpleQueue
+from queue import LifoQueue
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
+
+from rotor_mbs.errors import ResourceError
 
 if TYPE_CHECKING:  # loaded with the first process
     from pebble import ProcessPool
@@ -30,6 +32,7 @@ R = TypeVar("R")
 # One thread per process: the processes are the parallelism, and timings must not depend on a library's threads.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
+_ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
 _RETRY_START_S = 1.0  # after the system had no room for a process
 _POLL_S = 1.0  # how often a waiting thread looks whether its pool still works
@@ -77,7 +80,9 @@ class TaskPool(Protocol):
 
 
 class WorkerPool:
-    """Worker processes that start at once, each of which keeps its state between tasks. A context manager.
+    """Worker processes, each of which keeps its state between tasks. A context manager.
+
+    As many as there are cores start at once, the others when there is a task for them.
 
     The processes are started afresh (spawn), ignore Ctrl-C, and end with this one. A process that dies, or is ended at
     a time limit, is replaced.
@@ -104,10 +109,12 @@ class WorkerPool:
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers)
         self._processes = [_Process(initializer, core) for _ in range(workers)]
-        self._free: SimpleQueue[_Process] = SimpleQueue()
-        for process in self._processes:
-            self._threads.submit(process.start)
+        # The last one that became free is taken first: with few tasks, few processes are started.
+        self._free: LifoQueue[_Process] = LifoQueue()
+        for process in reversed(self._processes):
             self._free.put(process)
+        for process in self._processes[: os.cpu_count() or 1]:
+            self._threads.submit(process.start)
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
         """The future of `work(task)`: its result, what it raised, or a TaskLostError.
@@ -251,6 +258,8 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
         task, error = waiting.pop(future), future.exception()
         if error is None:
             yield Finished(task, future.result())
+        elif isinstance(error, MemoryError | OSError | ResourceError):  # of the machine, not of the task
+            yield Finished(task, None, "worker_died", f"not enough memory, files or processes: {one_line(error)}")
         elif (failure := pool.failure(error)) == "error":
             yield Finished(task, None, failure, one_line(error), error)
         else:
@@ -270,7 +279,7 @@ def last_core() -> int | None:
 
 @contextmanager
 def delayed_interrupts() -> Iterator[None]:
-    """Delays Ctrl-C and SIGTERM to the end of the block, so that other processes are ended all or not at all.
+    """Delays Ctrl-C, SIGTERM and SIGHUP to the end of the block, so that other processes are ended all or not at all.
 
     Without effect in other threads than the main one, where signals do not arrive.
     """
@@ -280,7 +289,7 @@ def delayed_interrupts() -> Iterator[None]:
     received: list[int] = []
     before: dict[signal.Signals, Any] = {}
     try:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in _ENDING:
             before[number] = signal.signal(number, lambda number, _: received.append(number))
         yield
     finally:
@@ -403,8 +412,19 @@ def _initialize(initializer: Callable[[], None] | None, core: int | None) -> Non
 def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
+        _signal_at_end_of(parent.sentinel)
         parent.join()
     os._exit(1)
+
+
+def _signal_at_end_of(sentinel: int) -> None:
+    """On Linux the kernel itself ends this process with its parent, whose end of the pipe is closed then: an engine may
+    keep the interpreter's lock for long, so that no thread of Python would notice. Elsewhere the thread does."""
+    with suppress(ImportError, AttributeError, OSError):
+        import fcntl
+
+        fcntl.fcntl(sentinel, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(sentinel, fcntl.F_SETFL, fcntl.fcntl(sentinel, fcntl.F_GETFL) | os.O_ASYNC)
 
 
 def _answer(request: bytes) -> bytes:

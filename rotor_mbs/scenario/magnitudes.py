@@ -13,12 +13,16 @@ from collections.abc import Iterator
 
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import Table
-from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem
+from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError
 
 # Decimal exponents: the product of any three quantities inside stays a normal double.
 LARGEST, SMALLEST = 100.0, -100.0
 # (key path, what follows from its number, decimal exponent, unit)
 _Size = tuple[KeyPath, str, float, str]
+
+
+class MagnitudeError(TableError):
+    """Numbers of a scene from which follows what double precision cannot hold."""
 
 
 def unrepresentable(scene: Scene) -> list[KeyProblem]:

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.magnitudes import unrepresentable
+from rotor_mbs.scenario.magnitudes import MagnitudeError, unrepresentable
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
-from rotor_mbs.scenario.toml_file import TableError, parse_toml, read_toml, shown_path, toml_value
+from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_value
 
 
 def load_scene(path: Path | str, name: str | None = None) -> Scene:
@@ -55,7 +55,7 @@ def validated_scene(tables: Mapping[str, Any], name: str) -> Scene:
     scene = validate(SceneTable, tables).to_scene(name, "")
     problems = unrepresentable(scene)
     if problems:
-        raise TableError(problems)
+        raise MagnitudeError(problems)
     return scene
 
 

@@ -22,6 +22,9 @@ KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, mo
 KEY_ATTRIBUTE = "run_hash"
 _KEY_NAMES = (KEY_ATTRIBUTE, "bench_hash", "record_hash")
 
+# The attribute with the time limit, in s, of a run that it ended.
+LIMIT = "time_limit_s"
+
 # The attribute, equal for all records of a scene that one case writes: older ones of the same study go when they come.
 TOGETHER = "written_together"
 

@@ -8,21 +8,26 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.execution.output import RESULTS, writing
 from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.digests import DIGESTS
-from rotor_mbs.store.layout import KEYWORDS, TOGETHER, key_of
-from rotor_mbs.store.read import OpenResults, all_damages, open_results
+from rotor_mbs.store.layout import KEYWORDS, LIMIT, TOGETHER, key_of
+from rotor_mbs.store.read import OpenResults, StoredRun, all_damages, open_results
 from rotor_mbs.store.records import records_in
 from rotor_mbs.store.summary import put_summary
 
 
 @dataclass(frozen=True)
 class ResultsStore:
-    """The results file at `path`, which need not be there yet."""
+    """The results file at `path`, which need not be there yet.
+
+    time_limit_s   runs that were ended by a shorter one do not count as stored
+    """
 
     path: Path
+    time_limit_s: float = 0.0
 
     def stored_keys(self) -> set[str]:
         """Keys of all runs and records in the file that are what was written. Raises StoreError."""
@@ -31,12 +36,22 @@ class ResultsStore:
             return set()
         with open_results(self.path, verify=False) as results, hdf5.reading(self.path):
             damaged = {place for place, part in all_damages(results.root) if part != DIGESTS}
-            return {key for above, _, name, key in _members(results) if key and not damaged & {above, name}}
+            runs = {
+                f"{scene.name}/{run.method}": run for scene in results.scenes.values() for run in scene.runs.values()
+            }
+            again = damaged | {name for name, run in runs.items() if self._is_over(run)}
+            return {key for above, _, name, key in _members(results) if key and not again & {above, name}}
+
+    def _is_over(self, run: StoredRun) -> bool:
+        """Whether it was ended by a shorter time limit than that of now."""
+        facts = run.attributes
+        return run.status == "timed_out" and "frozen_with" not in facts and facts.get(LIMIT, 0.0) < self.time_limit_s
 
     def merge(self, parts: Sequence[Path], without: Collection[str] = frozenset()) -> None:
         """The records of `parts` into the file, atomically, and those of these keys out of it. Raises StoreError."""
-        sources = [self.path, *parts] if self.path.exists() else parts
-        merge(self.path, sources, {**versions(), **machine()}, without)
+        with writing(self.path, RESULTS):
+            sources = [self.path, *parts] if self.path.exists() else parts
+            merge(self.path, sources, {**versions(), **machine()}, without)
 
 
 def merge(

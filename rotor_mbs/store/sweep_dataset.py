@@ -11,17 +11,17 @@ import errno
 import json
 import os
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.execution.output import SWEEP, writing
 from rotor_mbs.scenario.sweep_design import split_rows
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store import digests, hdf5, sweep_layout
 from rotor_mbs.store.layout import Column
 from rotor_mbs.store.read import damages_of
@@ -34,6 +34,8 @@ _HEAD_BYTES = 1 << 17  # of a file beside its runs, at most: descriptions and te
 class SweepDataset:
     """The runs of a sweep in the file `output`; a context manager that locks it against other processes.
 
+    time_limit_s   runs that were ended by a shorter one are missing
+
     Raises
     ------
     InputError
@@ -42,27 +44,21 @@ class SweepDataset:
         Where it cannot be read or written, or the disk has no room for all runs.
     """
 
-    def __init__(self, output: Path, layout: SweepLayout) -> None:
-        self.path = output.resolve() if output.is_symlink() else output  # a link stays one
-        self._layout = layout
-        self._lock = FileLock(self.path.with_name(f".{self.path.name}.lock"))
+    def __init__(self, output: Path, layout: SweepLayout, time_limit_s: float = 0.0) -> None:
+        self.path = output
+        self._layout, self._time_limit_s = layout, time_limit_s
+        self._writing = ExitStack()
         self.statuses = np.full(layout.last - layout.first, MISSING, np.int8)
         self.columns: RunColumns
 
     def __enter__(self) -> SweepDataset:
+        self._writing.enter_context(writing(self.path, SWEEP))
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._lock.acquire(timeout=0)
-        except Timeout:
-            raise InputError(
-                f"{self.path}: another sweep is writing it now; allowed: wait for its end, or another output file"
-            ) from None
-        except OSError as exc:
-            raise StoreError(f"{self.path}: cannot be written: {exc.strerror}") from exc
-        try:
+            if self.path.is_symlink():
+                self.path = self.path.resolve()  # a link stays one
             self._open()
         except BaseException:
-            self._release()
+            self._writing.close()
             raise
         return self
 
@@ -70,7 +66,7 @@ class SweepDataset:
         if (self.statuses == MISSING).all():
             with suppress(OSError):  # a sweep that stored nothing leaves nothing
                 self.path.unlink()
-        self._release()
+        self._writing.close()
 
     def missing(self) -> list[tuple[int, int]]:
         """(first, last) of every gap."""
@@ -99,17 +95,13 @@ class SweepDataset:
                 )
             row = self._layout.row
             offsets = {name: file[name].id.get_offset() for name in (*(row.names or ()), "crc32")}
-            marked = file["status"][()] != MISSING
+            marked, limits = file["status"][()] != MISSING, file["time_limit_s"][()]
             refuse_damages(file)
         inode = self.path.stat().st_ino
         self.columns = RunColumns(self.path, inode, self._layout.first, offsets, row)
         self.statuses = self.columns.stored(len(self.statuses))
+        self.statuses[(self.statuses == code_of("timed_out")) & (limits < self._time_limit_s)] = MISSING
         self.columns.mark_missing(self._layout.first + np.flatnonzero(marked & (self.statuses == MISSING)))
-
-    def _release(self) -> None:
-        with suppress(OSError):
-            Path(self._lock.lock_file).unlink()
-        self._lock.release()
 
 
 def _lay_out(path: Path, layout: SweepLayout) -> None:

@@ -36,6 +36,7 @@ METRICS = {
     "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, either way"),
     "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate, either way"),
     "pitch_max": Column(("run",), "rad", "largest pitch angle of any blade, either way"),
+    "time_limit_s": Column(("run",), "s", "time limit that ended the run, NaN where none did"),
     "message": Column(("run", "message_byte"), "1", "why the run did not end well: UTF-8 bytes, then zeros"),
 }
 # Asked for by `amplification = true`: the variational equations cost a hundred times the run itself.

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.errors import InputError, MethodRefusal, RotorError
+from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
+from rotor_mbs.execution.output import RESULTS, writing
 from rotor_mbs.execution.pool import one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
@@ -30,7 +31,7 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.layout import KEY_ATTRIBUTE
+from rotor_mbs.store.layout import KEY_ATTRIBUTE, LIMIT
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.store.write import write_run
@@ -43,10 +44,14 @@ _REPEAT_BUDGET_S = 0.05
 
 @dataclass(frozen=True)
 class RunReport:
-    """What became of a list of cases: those that this call computed, and how many were stored already."""
+    """What became of a list of cases: those that this call computed, and how many were stored already.
+
+    stored_failures   a line for each of the latter that should have succeeded and did not
+    """
 
     made: list[Outcome]
     kept: int
+    stored_failures: list[str] = field(default_factory=list)
 
     @property
     def failures(self) -> list[Outcome]:
@@ -93,12 +98,26 @@ def run_scenes(
     for scene in scenes:
         reference = reference_case(scene, use_frozen=use_frozen)
         cases += [reference, *run_cases(scene, methods[scene.name], reference, settings or {})]
-    refuse_losses(output, cases)
     # Slowest first, so that no long run starts last and keeps one process busy while the others wait.
     cases.sort(key=lambda case: -find_method(case.method).relative_cost)
     run = in_pool(perform_run, workers, timeout_s)
-    made = execute(cases, run, ResultsStore(output), on_progress, partial(store_failure, "timed_out"))
-    return RunReport(made, len(cases) - len(made))
+    with writing(output, RESULTS):
+        refuse_losses(output, cases)
+        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress, partial(store_failure, "timed_out"))
+        return RunReport(made, len(cases) - len(made), _stored_failures(output, cases, made))
+
+
+def _stored_failures(output: Path, cases: Sequence[Case], made: Sequence[Outcome]) -> list[str]:
+    """Runs that this call found in the file, and that are no success."""
+    new = {one.case.key for one in made}
+    kept = {(case.scene.name, case.method): case for case in cases if case.key not in new}
+    found = []
+    with open_results(output) as results:
+        for (scene, method), case in kept.items():
+            run = results.scenes[scene].runs.get(method) if scene in results.scenes else None
+            if run is not None and run.status != "ok" and is_corrected(method):
+                found.append(f"{case.label} {run.status}: {run.attributes.get('message', '')}")
+    return found
 
 
 def solve_judged(
@@ -192,6 +211,8 @@ def perform_run(job: Job) -> Result:
         attributes = {}
         try:
             run = solve(case.method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
+        except (MemoryError, OSError, ResourceError):  # what the machine lacks is no result of the run
+            raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return store_failure("timed_out", job, str(exc))
         except RotorError as exc:
@@ -210,6 +231,8 @@ def perform_run(job: Job) -> Result:
         KEY_ATTRIBUTE: case.key,
         **verdict.metrics,
     }
+    if verdict.status == "timed_out" and not is_read:
+        attributes[LIMIT] = job.time_limit_s
     write_run(job.part, case.scene_hash, run, attributes)
     message, seconds = str(attributes["message"]), 0.0 if is_read else float(np.median(run.run_times_s))
     return Result(verdict.status, message, seconds, is_read=is_read)
@@ -220,6 +243,8 @@ def store_failure(status: str, job: Job, message: str) -> Result:
     case = job.case
     run = _without_samples(case.scene, case.method, message, case.settings)
     attributes = {"status": status, "message": message, "false_success": False, KEY_ATTRIBUTE: case.key}
+    if status == "timed_out":
+        attributes[LIMIT] = job.time_limit_s
     write_run(job.part, case.scene_hash, run, attributes)
     return Result(status, message)
 

@@ -27,7 +27,7 @@ from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.layout import KEYWORDS
-from rotor_mbs.store.sweep_columns import Rows
+from rotor_mbs.store.sweep_columns import MISSING, Rows
 from rotor_mbs.store.sweep_dataset import SweepDataset
 from rotor_mbs.store.sweep_layout import SweepLayout, lost_rows
 from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, perform
@@ -38,7 +38,7 @@ _ENSEMBLE_RUNS = 128
 _LEAST_RUNS = 8
 _CHUNK_BYTES = 1 << 23
 
-_FORMAT = 4  # of rows and columns: a sweep begun by another version is not continued
+_FORMAT = 5  # of rows and columns: a sweep begun by another version is not continued
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 # From (runs stored, runs in all, statuses of those that have just been stored).
@@ -179,12 +179,13 @@ def plan_sweep(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time
 
 @dataclass(frozen=True)
 class SweepResult:
-    """A sweep that is complete.
+    """A sweep that is complete, but for runs that were lost.
 
     runs, made   in the dataset, and by this call
     statuses     how many runs have each status
     seconds      of this call
     is_ok        whether every run is ok whose method claims the correct equations
+    lost         a line for each run whose process died or could not start, also when it was tried alone: not stored
     """
 
     path: Path
@@ -193,6 +194,7 @@ class SweepResult:
     statuses: Counter[str]
     seconds: float
     is_ok: bool
+    lost: tuple[str, ...] = ()
 
 
 def run_sweep(
@@ -236,22 +238,25 @@ def run_sweep(
     plan = plan_sweep(sweep, methods, part, timeout_s)
     start = time.monotonic()
     pool = open_task_pool(engine, workers or os.cpu_count() or 1) if isinstance(engine, str) else engine
-    with nullcontext() if pool is engine else closing(pool), SweepDataset(output, plan.layout) as dataset:
+    with nullcontext() if pool is engine else closing(pool), SweepDataset(output, plan.layout, timeout_s) as dataset:
         gaps = dataset.missing()
         missing = sum(last - first for first, last in gaps)
-        done = plan.runs - missing
+        done, lost = plan.runs - missing, list[str]()
         on_progress(done, plan.runs, Counter())
         columns = dataset.columns if pool.shares_disk else None
         chunks = (replace(chunk, columns=columns) for chunk in plan.chunks(gaps, pool.workers))
         for end in run_in(pool, work, chunks, _hard_limit, Chunk.split):
+            if end.failure == "worker_died":  # nothing is known of these runs: they stay missing
+                lost += [f"run {run}: {end.message}" for run in range(end.task.first, end.task.last)]
+                on_progress(done, plan.runs, Counter({end.failure: len(end.task.values)}))
+                continue
             first, found = end.task.first, _found(end)
             stored = dataset.write(first, found) if isinstance(found, dict) else dataset.note(first, found)
             done += len(stored)
             on_progress(done, plan.runs, Counter(STATUSES[code] for code in stored.tolist()))
-        statuses = Counter(STATUSES[code] for code in dataset.statuses.tolist())
-        return SweepResult(
-            dataset.path, plan.runs, missing, statuses, time.monotonic() - start, _is_ok(plan, dataset.statuses)
-        )
+        statuses = Counter(STATUSES[code] for code in dataset.statuses.tolist() if code != MISSING)
+        seconds, is_ok = time.monotonic() - start, _is_ok(plan, dataset.statuses)
+        return SweepResult(dataset.path, plan.runs, missing, statuses, seconds, is_ok, tuple(lost))
 
 
 def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.int8]:
@@ -260,7 +265,9 @@ def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.i
         raise end.error
     if end.value is None:
         status = "solver_failed" if end.failure == "error" else end.failure
-        return lost_rows(len(end.task.values), end.task.row, status, end.message)
+        rows = lost_rows(len(end.task.values), end.task.row, status, end.message)
+        rows["time_limit_s"][:] = end.task.time_limit_s if status == "timed_out" else np.nan
+        return rows
     return end.value
 
 

@@ -15,6 +15,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import error_growth
+from rotor_mbs.scenario.magnitudes import MagnitudeError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
@@ -25,7 +26,7 @@ from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.sweep_columns import Rows, RunColumns
-from rotor_mbs.store.sweep_layout import AMPLIFICATION, MESSAGE_BYTES, METRICS, empty_rows
+from rotor_mbs.store.sweep_layout import AMPLIFICATION, MESSAGE_BYTES, METRICS, empty_rows, lost_rows
 
 ENSEMBLE_METHOD = "lagrange/taylor"
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that `solve_many` computes
@@ -74,12 +75,20 @@ def perform(chunk: Chunk) -> Rows | NDArray[np.int8]:
     Raises InputError, MethodRefusal, StoreError; a run's own failure is in its row.
     """
     rows = rows_of(chunk)
+    rows["time_limit_s"][rows["status"] == code_of("timed_out")] = chunk.time_limit_s
     return rows if chunk.columns is None else chunk.columns.write(chunk.first, rows)
 
 
 def rows_of(chunk: Chunk) -> Rows:
     """(runs, ...) columns of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
-    scenes = _scenes(chunk)
+    try:
+        scenes = _scenes(chunk)
+    except MagnitudeError as error:
+        parts = chunk.split()
+        if not parts:
+            return lost_rows(1, chunk.row, "solver_failed", str(error))
+        found = [rows_of(part) for part in parts]
+        return {name: np.concatenate([rows[name] for rows in found]) for name in chunk.row.names or ()}
     if chunk.method == ENSEMBLE_METHOD and _has_all_of(scenes[0].outputs):
         rows = _ensemble(chunk, scenes)
     else:
@@ -108,6 +117,8 @@ def _has_all_of(outputs: Sequence[str]) -> bool:
 def _scenes(chunk: Chunk) -> list[Scene]:
     try:
         return [chunk.variants.scene(values) for values in chunk.values.tolist()]
+    except MagnitudeError:
+        raise
     except TableError as error:
         keys = ", ".join(chunk.variants.keys)
         last = chunk.first + len(chunk.values) - 1

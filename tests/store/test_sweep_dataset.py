@@ -233,11 +233,12 @@ time.sleep(60)
 
 
 def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", _HOLDER, str(tmp_path / ".s.h5.lock")]
+    (tmp_path / "s.h5.parts").mkdir()
+    command = [sys.executable, "-c", _HOLDER, str(tmp_path / "s.h5.parts" / "lock")]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as holder:
         assert holder.stdout is not None
         holder.stdout.readline()
-        with pytest.raises(InputError, match=r"s\.h5: another sweep is writing it now; allowed: wait"):
+        with pytest.raises(InputError, match=r"s\.h5: another process is writing it now; allowed: wait"):
             SweepDataset(tmp_path / "s.h5", _layout()).__enter__()
         holder.kill()
         holder.wait()

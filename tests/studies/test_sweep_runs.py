@@ -21,8 +21,7 @@ from support.sweeps import command, stored_runs, wait_for_runs, workers_of
 from rotor_mbs.cli import main
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep, sweep_of
-from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store.sweep_columns import Rows
+from rotor_mbs.store.sweep_columns import MISSING, Rows
 from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.sweep import run_sweep
 from rotor_mbs.studies.sweep_work import Chunk, perform
@@ -118,15 +117,19 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     monkeypatch.setenv("ROTOR_TEST_MARKS", str(marks))
     sweep = load_sweep(_file(tmp_path, draws=16))
     result = run_sweep(sweep, output, methods=[method], workers=2, work=_killing)
-    assert result.statuses == {"ok": 31, "worker_died": 1}
+    assert result.statuses == {"ok": 31}
     assert not result.is_ok
+    (line,) = result.lost
+    assert line.startswith("run 5: its process died")
+    assert line.endswith("and again when it was tried alone")
     # Tried with its chunk, then once more, alone.
     assert marks.read_text().split() == (["8", "1"] if method == "lagrange/taylor" else ["1", "1"])
     stored = StoredSweep(output)
-    assert STATUSES[stored.column("status")[5]] == "worker_died"
-    assert np.isnan(stored.column("angles")[5]).all()
+    assert stored.column("status")[5] == MISSING
     assert np.isfinite(np.delete(stored.column("angles"), 5, axis=0)).all()
-    assert stored.column("message")[5].tobytes().startswith(b"its process died")
+    # The same sweep tries it again; nothing of the machine's trouble stays in the file.
+    again = run_sweep(sweep, output, methods=[method], workers=1)
+    assert (again.made, again.statuses, again.is_ok, again.lost) == (1, {"ok": 32}, True, ())
 
 
 def _hanging(chunk: Chunk) -> Rows | NDArray[np.int8]:
@@ -140,6 +143,11 @@ def test_a_run_that_hangs_is_ended_and_the_others_go_on(tmp_path: Path) -> None:
     result = run_sweep(load_sweep(_file(tmp_path)), output, workers=2, timeout_s=6.0, work=_hanging)
     assert result.statuses == {"ok": 7, "timed_out": 1}
     assert StoredSweep(output).column("message")[2].tobytes().rstrip(b"\0") == b"ended after 11 s"
+    assert StoredSweep(output).column("time_limit_s")[2] == 6.0
+    for limit, made in ((5.0, 0), (6.0, 0), (7.0, 1)):  # a longer limit tries it again
+        again = run_sweep(load_sweep(_file(tmp_path)), output, workers=1, timeout_s=limit)
+        assert again.made == made
+    assert again.statuses == {"ok": 8}
 
 
 def test_progress_counts_what_was_there_and_what_is_made(tmp_path: Path) -> None:

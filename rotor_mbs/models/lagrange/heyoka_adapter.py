@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.errors import MethodRefusal, ResourceError
 
 # Of any processor that the engine runs on. A time limit for a chunk counts on no more.
 LEAST_LANES = 2
@@ -23,7 +23,11 @@ def heyoka() -> ModuleType:
     """The engine, imported when first asked for. Raises MethodRefusal with the way to get it."""
     try:
         import heyoka as engine
+    except MemoryError as exc:
+        raise ResourceError("heyoka cannot be loaded: not enough memory") from exc
     except ImportError as exc:
+        if not isinstance(exc, ModuleNotFoundError):  # it is there, and the system could not load it
+            raise ResourceError(f"heyoka cannot be loaded: {exc}") from exc
         raise MethodRefusal(f"heyoka is not installed: {HINT}; lagrange/dop853 needs SciPy only") from exc
     return engine  # type: ignore[no-any-return]
 
