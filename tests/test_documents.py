@@ -73,3 +73,16 @@ def test_the_readmes_python_runs(tmp_path: Path) -> None:
         script.write_text(code)
         done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
+
+
+def test_the_tour_prints_what_it_says(tmp_path: Path) -> None:
+    pytest.importorskip("heyoka")
+    tour = (ROOT / "docs" / "tour.md").read_text()
+    (scene,) = re.findall(r"```toml\n(title.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", tour, re.DOTALL)
+    (tmp_path / "my.toml").write_text(scene)
+    (tmp_path / "tour.py").write_text(code)
+    done = subprocess.run([sys.executable, "tour.py"], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+    assert set(done.stdout.split("\n")) <= {line.removeprefix("    ") for line in tour.split("\n")}

@@ -127,17 +127,17 @@ def test_the_shipped_study_has_every_claim_and_number() -> None:
     assert study.numbers.numbers == [item.id for item in published() if item.is_number]
 
 
-def test_the_readme_counts_the_claims_as_the_shipped_study_does() -> None:
+def test_the_findings_count_the_claims_as_the_shipped_study_does() -> None:
     study = stored_claims()
     assert study is not None
-    readme = " ".join((Path(__file__).parents[2] / "README.md").read_text().split())
+    findings = " ".join((Path(__file__).parents[2] / "docs/findings.md").read_text().split())
     printed, corrected = (study.shares.count(method) for method in (PRINTED, CLOSED_FORM))
     assert printed["fails"] == 0
     assert (
         f"**Of the paper's {len(study.shares.claims)} claims in words** {printed['holds']} hold in the printed model "
         f"whatever the rounding and the length of the run, and {printed['undecided']} are undecided; in the corrected "
         f"model {corrected['holds']} hold, {corrected['fails']} fail and {corrected['undecided']} are undecided"
-    ) in readme
+    ) in findings
 
 
 def test_all_numbers_come_out_under_the_papers_tolerances_and_for_12_s_alone() -> None:
@@ -146,6 +146,6 @@ def test_all_numbers_come_out_under_the_papers_tolerances_and_for_12_s_alone() -
     trials = study.numbers
     assert trials.durations_of_all(trials.usual.gravity_row) == [trials.usual.duration] == [12.0]
     assert [one for one in trials.with_tolerances() if trials.reproduces_all(one)] == [trials.usual]
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
-    assert "for {} of {} ways of writing that row".format(*count_of_rows(trials, 12.0)) in readme
+    findings = (Path(__file__).parents[2] / "docs/findings.md").read_text()
+    assert "for {} of {} ways of writing that row".format(*count_of_rows(trials, 12.0)) in findings
     assert [count_of_rows(trials, duration)[0] for duration in (8.0, 9.0, 10.0, 11.0, 13.0)] == [0] * 5
