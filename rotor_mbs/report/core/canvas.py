@@ -177,9 +177,9 @@ def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, labe
     return levels
 
 
-def has_map(figure: Figure) -> bool:
-    """Whether the figure has a `growth_map`."""
-    return any(isinstance(one, QuadMesh) for axes in figure.axes for one in axes.collections)
+def is_map(artist: Any) -> bool:
+    """Whether an artist is the map of `growth_map`, or a part of its colour scale."""
+    return isinstance(artist, QuadMesh)
 
 
 def hex_colour(colour: Any) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from rotor_mbs.report.core.canvas import Panels, has_map, hex_colour, style, svg_text
+from rotor_mbs.report.core.canvas import Panels, hex_colour, is_map, style
 from rotor_mbs.report.core.elements import MARKS, LegendEntry, Picture
 from rotor_mbs.report.core.looks import INK, PAPER, class_of
 
@@ -26,9 +26,7 @@ _DASHES = {"--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
 _ANCHORS = {"left": "start", "right": "end", "center": "middle"}
 _EDGE = 3.0  # points around the axes in which markers and wide lines may stand out
 _FONT = 9.5
-_DROPPED = re.compile(
-    r'^.*?(?=<svg)|<!--.*?-->|<metadata>.*?</metadata>|<style type=.*?</style>|<g id="[^"]*"/>|(?<=<g) id="[^"]*"', re.S
-)
+_SHADES = 16  # of a map
 
 
 def picture(
@@ -44,22 +42,12 @@ def drawing(panels: Panels, name: str, title: str, description: str) -> str:
     """The figure as an `svg` element, with title and description as its alternative text."""
     page = _Page(panels.figure)
     size = f"0 0 {_short(page.width)} {_short(page.height)}"
-    if has_map(panels.figure):
-        body = _rendered(panels, name)
-    else:
-        with style():
-            body = "".join(part for axes in panels.figure.axes for part in page.axes(axes))
+    with style():
+        body = "".join(part for axes in panels.figure.axes for part in page.axes(axes))
     return (
         f'<svg viewBox="{size}" role="img" aria-labelledby="{name}-t {name}-d">'
         f'<title id="{name}-t">{escape(title)}</title><desc id="{name}-d">{escape(description)}</desc>{body}</svg>'
     )
-
-
-def _rendered(panels: Panels, name: str) -> str:
-    """A map with a colour scale, by matplotlib's renderer: a light picture also on a dark page."""
-    text = _DROPPED.sub("", svg_text(panels.figure, name)).replace("xlink:href=", "href=")
-    inside = re.sub(r">\s+<", "><", text[text.index(">") + 1 : text.rindex("</svg>")]).strip()
-    return f'<g class="rendered">{inside}</g>'
 
 
 class _Page:
@@ -75,14 +63,18 @@ class _Page:
         axes.get_xlim(), axes.get_ylim()  # autoscale where nobody has set them
         left, bottom, right, top = axes.get_position().extents
         box = (left * self.width, (1.0 - top) * self.height, right * self.width, (1.0 - bottom) * self.height)
-        if axes.axison:
+        if axes.get_label() == "<colorbar>":
+            yield from self._scale(axes, box)
+        elif axes.axison:
             yield from self._frame(axes, box)
         x, y = box[0] - _EDGE, box[1] - _EDGE
         width, height = box[2] - box[0] + 2.0 * _EDGE, box[3] - box[1] + 2.0 * _EDGE
         yield f'<svg x="{_short(x)}" y="{_short(y)}" width="{_short(width)}" height="{_short(height)}">'
         drawn = [*axes.patches, *axes.collections, *axes.lines]
         for artist in sorted((one for one in drawn if one.get_visible()), key=lambda one: one.get_zorder()):
-            if hasattr(artist, "get_xydata"):
+            if is_map(artist):
+                yield from self._map(artist, (x, y))
+            elif hasattr(artist, "get_xydata"):
                 yield from self._line(artist, (x, y))
             elif hasattr(artist, "get_paths"):
                 yield from self._collection(artist, (x, y))
@@ -134,6 +126,16 @@ class _Page:
             if axes.get_title(loc=place):
                 yield _words((x, top - 6.0), axes.get_title(loc=place), _ANCHORS[place])
 
+    def _scale(self, axes: Any, box: tuple[float, float, float, float]) -> Iterator[str]:
+        """Ticks and label of a colour scale, on its right."""
+        _, top, right, bottom = box
+        places, labels = _ticks(axes.yaxis)
+        points = self._placed(axes.get_yaxis_transform().transform(np.stack([np.zeros(len(places)), places], axis=1)))
+        for (_, y), label in zip(points, labels, strict=True):
+            yield _words((right + 4.0, y + 3.4), label, "start")
+        turned = f'transform="translate({_short(right + 30.0)} {_short(0.5 * (top + bottom))})rotate(-90)"'
+        yield f'<text {turned} text-anchor="middle">{escape(axes.get_ylabel())}</text>'
+
     def _line(self, line: Any, corner: tuple[float, float]) -> Iterator[str]:
         """A curve, then its markers."""
         colour, width = line.get_color(), float(line.get_linewidth())
@@ -165,6 +167,27 @@ class _Page:
         fill = " filled" if face and face != PAPER else " open" if face else ""
         colour = line.get_markeredgecolor()
         yield f'<path{_ink(colour, fill)} stroke-width="{float(line.get_markeredgewidth()):.2g}" d="{text}"/>'
+
+    def _map(self, mesh: Any, corner: tuple[float, float]) -> Iterator[str]:
+        """Cells as colour, in shades; neighbours in a row that have the same shade are one rectangle."""
+        corners = np.asarray(mesh.get_coordinates(), float)
+        rows, columns = corners.shape[0] - 1, corners.shape[1] - 1
+        edges = self._placed(mesh.axes.transData.transform(corners.reshape(-1, 2))).reshape(corners.shape) - corner
+        levels: Array = np.ma.filled(np.ma.asarray(mesh.get_array(), float), np.nan).reshape(rows, columns)
+        low, high = mesh.get_clim()
+        shades = np.floor((levels - low) / (high - low) * _SHADES)
+        shades = np.where(np.isfinite(shades), np.clip(shades, 0, _SHADES - 1), -1).astype(int)
+        parts: dict[int, list[str]] = {}
+        for row in range(rows):
+            ends = np.flatnonzero(np.diff(shades[row], append=-2)) + 1
+            for first, end in zip([0, *ends[:-1]], ends, strict=True):
+                (x, y), (far, deep) = edges[row, first], edges[row + 1, end]
+                box = f"M{_short(x)} {_short(y)}H{_short(far)}V{_short(deep)}H{_short(x)}z"
+                parts.setdefault(int(shades[row, first]), []).append(box)
+        for shade, boxes in sorted(parts.items()):
+            if shade >= 0:
+                colour = hex_colour(mesh.cmap((shade + 0.5) / _SHADES))
+                yield f'<path class="filled" style="color:{colour}" stroke-width=".3" d="{"".join(boxes)}"/>'
 
     def _collection(self, collection: Any, corner: tuple[float, float]) -> Iterator[str]:
         """Areas, or bundles of lines: those have no face."""

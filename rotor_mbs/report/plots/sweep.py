@@ -1,17 +1,21 @@
-"""The pictures of a sweep as SVG text: divergence of nearby initial states, stability map."""
+"""The pictures of a sweep: divergence of nearby initial states, stability map, distribution of a column."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap
-from rotor_mbs.report.core.canvas import growth_map, log_axis, panels, svg_text
+from rotor_mbs.report.core.canvas import Panels, growth_map, log_axis, panels, svg_text
+from rotor_mbs.report.core.numbers import power
 
 _INK, _ACCENT = "#0072b2", "#d55e00"  # Okabe-Ito blue and vermillion
+Array = NDArray[np.float64]
+_MOST_POINTS = 200  # of a distribution
 _MOST_GROWTH = 1e4  # the colours end there: the pitch has turned many times
 
 
-def spread_figure(spread: Spread, title: str) -> str:
+def spread_panels(spread: Spread) -> Panels:
     """Separation over time on a log scale, with the fitted exponential growth."""
     panel = panels((3.6,), "time (s)")
     axes = panel.axes[0]
@@ -27,24 +31,59 @@ def spread_figure(spread: Spread, title: str) -> str:
               label=f"growth {spread.exponent:.2f} ± {spread.uncertainty:.2f} per s")  # fmt: skip
     log_axis(axes, float(spread.low[seen].min()), float(spread.high.max()))
     axes.set_ylabel("separation of the angles (rad)")
-    axes.legend(loc="lower right", frameon=False)
-    axes.set_title(title, fontsize=9.5)
-    panel.figure.subplots_adjust(left=0.18, top=0.92)
-    return svg_text(panel.figure)
+    return panel
 
 
-def map_figure(found: StabilityMap, title: str) -> str:
+def spread_figure(spread: Spread, title: str) -> str:
+    """The same as a file, with its title and legend."""
+    panel = spread_panels(spread)
+    panel.axes[0].legend(loc="lower right", frameon=False)
+    return _titled(panel, title)
+
+
+def map_panels(found: StabilityMap, x_label: str = "", y_label: str = "") -> Panels:
     """Growth of the pitches as colour over both axes, with the line where they grew tenfold."""
-    panel = panels((3.8,), f"{found.x_key} ({found.x_unit})")
+    panel = panels((3.8,), x_label or f"{found.x_key} ({found.x_unit})")
     axes = panel.axes[0]
     label = "largest pitch, of its start (powers of ten)"
     levels = growth_map(panel, found.x, found.y, found.growth, _MOST_GROWTH, label)
     if found.unstable.any() and not found.unstable.all():
         axes.contour(found.x, found.y, levels, levels=[np.log10(GROWN)], colors=[_ACCENT], linewidths=1.0)
         axes.plot([], [], color=_ACCENT, lw=1.0, label=f"{GROWN:g} times its start")
-        axes.legend(loc="upper right")
     axes.ticklabel_format(style="plain")
-    axes.set_ylabel(f"{found.y_key} ({found.y_unit})")
-    axes.set_title(title, fontsize=9.5)
+    axes.set_ylabel(y_label or f"{found.y_key} ({found.y_unit})")
+    panel.figure.subplots_adjust(left=0.18)
+    return panel
+
+
+def map_figure(found: StabilityMap, title: str) -> str:
+    """The same as a file, with its title and legend."""
+    panel = map_panels(found)
+    if panel.axes[0].get_lines():
+        panel.axes[0].legend(loc="upper right")
+    return _titled(panel, title)
+
+
+def distribution(values: Array, label: str, *, logarithmic: bool) -> Panels:
+    """How many runs have how large a value: the share of runs up to each value, as a rising curve."""
+    panel = panels((1.9,), label)
+    axes = panel.axes[0]
+    known = np.sort(values[np.isfinite(values) & ((values > 0.0) | (not logarithmic))])
+    if len(known) > _MOST_POINTS:
+        known = known[np.linspace(0, len(known) - 1, _MOST_POINTS).round().astype(int)]
+    axes.plot(known, np.linspace(0.0, 100.0, len(known)), color=_INK, drawstyle="default")
+    if logarithmic:
+        axes.set_xscale("log")
+        low, high = np.floor(np.log10(known[0])), np.ceil(np.log10(known[-1]))
+        exponents = np.arange(low, max(high, low + 1) + 1, max(1, np.ceil((high - low) / 6)))
+        axes.set_xticks(10.0**exponents, [power(int(e)) for e in exponents])
+        axes.set_xticks([], minor=True)
+    axes.set_ylim(0.0, 101.0)
+    axes.set_ylabel("share of runs (%)")
+    return panel
+
+
+def _titled(panel: Panels, title: str) -> str:
+    panel.axes[0].set_title(title, fontsize=9.5)
     panel.figure.subplots_adjust(left=0.18, top=0.92)
     return svg_text(panel.figure)

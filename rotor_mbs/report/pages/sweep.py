@@ -1,0 +1,157 @@
+"""The page of a sweep, from its dataset alone: what was varied, how the runs ended, its picture, distributions."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rotor_mbs.analysis.sweep_numbers import GROWN, spread_of, stability_map
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
+from rotor_mbs.report.core.files import INDEX, render, write_pages
+from rotor_mbs.report.core.looks import Look, with_capital
+from rotor_mbs.report.core.numbers import number, with_unit
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages.scene_tables import status_text
+from rotor_mbs.report.plots import sweep as plots
+from rotor_mbs.scenario.scene_file import parse_scene
+from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.sweep_dataset import StoredSweep
+
+_SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
+_COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
+_COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
+
+
+def write_sweep_report(dataset: Path, output: Path) -> Path:
+    """Write the page into the folder `output`; its path. Raises StoreError where `dataset` is no sweep."""
+    write_pages(output, {INDEX: render("sweep", sweep_page(StoredSweep(dataset)))})
+    return output / INDEX
+
+
+def sweep_page(sweep: StoredSweep) -> dict[str, object]:
+    """What the template needs."""
+    shown, lines = _asked_picture(sweep)
+    statuses = sweep.column("status")
+    return {
+        "title": sweep.title,
+        "summary": [with_capital(sweep.summary.rstrip(".")) + ".", *lines],
+        "picture": Section([shown] if shown else []),
+        "statuses": Section(tables=[_status_table(statuses)]),
+        "parameters": Section(tables=[_parameter_table(sweep)]),
+        "distributions": Section(_distributions(sweep, statuses == STATUSES.index("ok"))),
+        "toml": str(sweep.attributes.get("sweep_toml", "")),
+        "versions": [
+            (name, str(sweep.attributes[name]))
+            for name in ("rotor_mbs", "python", "heyoka", "exudyn", "numpy", "h5py", "platform", "cpu")
+            if name in sweep.attributes
+        ],
+    }
+
+
+def field_name(key: str) -> str:
+    """A varied parameter as one speaks of it: "initial pitch of blade 2" for "initial.angles[2]"."""
+    found = _COORDINATE.fullmatch(key)
+    if found is None:
+        return re.sub(r"[._]", " ", key)
+    is_rate, coordinate = found[1] == "rates", int(found[2])
+    if not coordinate:
+        return "initial rotor speed" if is_rate else "initial rotor angle"
+    return f"initial pitch {'rate' if is_rate else 'angle'} of blade {coordinate}"
+
+
+def _asked_picture(sweep: StoredSweep) -> tuple[Picture | None, list[str]]:
+    """The picture that the sweep's file asks for, and what it says; neither where it cannot be drawn (yet)."""
+    try:
+        asked = tomllib.loads(str(sweep.attributes.get("sweep_toml", "")))
+    except tomllib.TOMLDecodeError:
+        return None, []
+    try:
+        if asked.get("picture") == "spread":
+            return _spread(sweep)
+        if asked.get("picture") == "map":
+            return _map(sweep, asked.get("change", {}))
+    except (InputError, StoreError) as exc:
+        return None, [f"No picture: {exc}."]
+    return None, []
+
+
+def _spread(sweep: StoredSweep) -> tuple[Picture, list[str]]:
+    found = spread_of(sweep)
+    line = (
+        f"Nearby starts part with the largest Lyapunov exponent {found.exponent:.3f} ± {found.uncertainty:.3f} per s "
+        f"({found.pairs} pairs, {found.start:.2f} to {found.end:.2f} s)."
+    )
+    legend = [
+        line_entry(f"10 to 90 % of {found.pairs} pairs", "#0072b2", width=8.0),
+        line_entry("median", "#0072b2"),
+        line_entry(f"growth {found.exponent:.2f} ± {found.uncertainty:.2f} per s", "#d55e00", "--"),
+    ]
+    return picture(plots.spread_panels(found), "spread", "Separation of nearby starts", line, legend=legend), [line]
+
+
+def _map(sweep: StoredSweep, change: dict[str, object]) -> tuple[Picture, list[str]]:
+    found = stability_map(sweep, _largest_start(sweep, change))
+    labels = [f"{field_name(key)} ({unit})" for key, unit in ((found.x_key, found.x_unit), (found.y_key, found.y_unit))]
+    line = f"The pitches grow {GROWN:g}-fold in {found.unstable.sum()} of {found.growth.size} runs."
+    legend: Sequence[LegendEntry] = [LegendEntry(f"{GROWN:g} times its start", Look("#d55e00", "-", ""))]
+    if found.unstable.all() or not found.unstable.any():
+        legend = []
+    caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
+    return picture(plots.map_panels(found, *labels), "map", caption, f"{caption}. {line}", legend=legend), [line]
+
+
+def _largest_start(sweep: StoredSweep, change: dict[str, object]) -> float:
+    """rad: the largest pitch at the start, of the base scene as the sweep changes it."""
+    scene = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"]))
+    angles = list(scene.initial_angles)
+    for key, value in change.items():
+        found = _COORDINATE.fullmatch(key)
+        if found and found[1] == "angles" and isinstance(value, int | float):
+            angles[int(found[2])] = float(value)
+    return max((abs(angle) for angle in angles[1:]), default=0.0)
+
+
+def _status_table(statuses: object) -> PageTable:
+    codes, counts = np.unique(np.asarray(statuses), return_counts=True)
+    total = int(counts.sum())
+    rows = [
+        (status_text(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / total:.1f} %")
+        for code, count in sorted(zip(codes.tolist(), counts.tolist(), strict=True), key=lambda pair: -pair[1])
+    ]
+    return PageTable("How the runs ended", ("Status", "Runs", "Share"), rows, (1, 2))
+
+
+def _parameter_table(sweep: StoredSweep) -> PageTable:
+    rows = []
+    for key, unit in zip(sweep.keys, sweep.units, strict=True):
+        values = sweep.parameter(key)
+        limits = [with_unit(float(value), unit, 4) for value in (np.nanmin(values), np.nanmax(values))]
+        rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
+    return PageTable("Varied parameters", ("Parameter", "Key", "From", "To", "Values"), rows, (2, 3, 4))
+
+
+def _distributions(sweep: StoredSweep, ok: object) -> list[Picture]:
+    """A picture for each number of the runs that ended well."""
+    found = []
+    varied = {re.sub(r"\W+", "_", key).strip("_") for key in sweep.keys}
+    for variable in sweep.variables():
+        is_metric = variable.dimensions == ("run",) and variable.kind == "f" and variable.name not in varied
+        if not is_metric or variable.name in _COUNTS:
+            continue
+        values = sweep.column(variable.name)[np.asarray(ok)]
+        values = values[np.isfinite(values)]
+        if len(values) < 2 or not np.ptp(values):
+            continue
+        positive = values[values > 0.0]
+        logarithmic = len(positive) > 1 and positive.max() > _SPAN * positive.min() and len(positive) == len(values)
+        low, middle, high = (number(float(x), 3) for x in np.quantile(values, (0.05, 0.5, 0.95)))
+        unit = "" if variable.units == "1" else f" ({variable.units})"
+        caption = f"{with_capital(variable.long_name)}: median {middle}, 5 to 95 % from {low} to {high}{unit}"
+        panels = plots.distribution(values, f"{variable.name.replace('_', ' ')}{unit}", logarithmic=logarithmic)
+        found.append(picture(panels, f"of-{variable.name}", caption, f"{caption}, over {len(values)} runs."))
+    return found
