@@ -27,7 +27,7 @@ OUTCOMES = {
     "says_so": ("✗", "fails and reports it"),
     "false_success": ("!", "fails and claims success"),
     "refuses": ("–", "refuses a scene in which no motion exists"),
-    "timed_out": ("⧗", "too slow for the time limit"),
+    "timed_out": ("T", "too slow for the time limit"),
     "unchecked": ("?", "ends; there is nothing to judge it by"),
 }
 

@@ -21,7 +21,7 @@ def default_results() -> Path:
 
 def pages_beside(results: Path) -> Path:
     """The folder for the pages of a file where none is named: `report` beside results.h5, x-report beside x.h5."""
-    return results.with_name("report" if results.name == "results.h5" else f"{results.stem}-report")
+    return results.parent / ("report" if results.name == "results.h5" else f"{results.stem}-report")
 
 
 def path(text: str) -> Path:

@@ -260,7 +260,7 @@ def _add_claims(commands: _Commands) -> None:
 
 
 def _add_report(commands: _Commands) -> None:
-    report = _command(commands, "report", "HTML pages from a results file", "reports:report", "my.h5 --open")
+    report = _command(commands, "report", "HTML pages from any file of this program", "reports:report", "my.h5 --open")
     _add_results(report)
     report.add_argument("-o", "--output", type=path, metavar="DIR", help=_PAGES)
     report.add_argument("--open", action="store_true", help="show the index in the browser")

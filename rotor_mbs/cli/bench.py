@@ -11,7 +11,7 @@ from rotor_mbs.cli.arguments import cores
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import check_names
-from rotor_mbs.report.pages.bench import write_bench_report
+from rotor_mbs.report.build import write_report
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.records import read_records
 from rotor_mbs.studies.bench import run_bench
@@ -36,7 +36,7 @@ def bench(arguments: argparse.Namespace) -> int:
         print(line, file=sys.stderr)
     names = {scene.name for scene in scenes}
     print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
-    index = write_bench_report(output, pages_beside(output))
+    index = write_report(output, pages_beside(output))
     print(f"{output}: {report.measured} scenes measured, {report.kept} there already\nreport: {index}")
     lost = [one for one in made if not one.is_computed]
     print_not_computed(lost)

@@ -10,7 +10,7 @@ from rotor_mbs.analysis.campbell import mode_rows, modes_summary
 from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.cli.argument_values import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine
-from rotor_mbs.report.pages.modes import write_modes_report
+from rotor_mbs.report.build import write_report
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.modes import modes_of_scenes
 
@@ -33,5 +33,5 @@ def modes(arguments: argparse.Namespace) -> int:
         for one in chosen:
             print("\n".join(modes_summary(one)))
         folder = arguments.report or pages_beside(arguments.output)
-        print(f"report: {write_modes_report(arguments.output, folder)}")
+        print(f"report: {write_report(arguments.output, folder)}")
     return 1 if missing or not all(one.agrees for one in chosen) else 0

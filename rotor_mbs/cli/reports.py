@@ -1,4 +1,4 @@
-"""`report`, `figures` and `animate`: pages and pictures from a results file; no model is loaded."""
+"""`report`, `figures` and `animate`: pages and pictures from stored files; no model is loaded."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from rotor_mbs.cli.argument_values import pages_beside
 from rotor_mbs.execution.provenance import fingerprint
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.records import read_records
 
 _STAMP = ".made-from"
 _SUMMARY = "summary.txt"  # what `reproduce` prints at its end
@@ -23,23 +21,11 @@ _SUMMARY = "summary.txt"  # what `reproduce` prints at its end
 def report(arguments: argparse.Namespace) -> int:
     """Pages from `arguments.file` into `arguments.output`, or beside the file."""
     from rotor_mbs.report.build import write_report
-    from rotor_mbs.report.pages.bench import write_bench_report
-    from rotor_mbs.report.pages.modes import write_modes_report
 
-    output = arguments.output or pages_beside(arguments.file)
-    has_modes = bool(read_records(arguments.file, "modes"))
-    with open_results(arguments.file) as results:
-        has_scenes = bool(results.scenes)
-    pages = []
-    if has_scenes or not has_modes:
-        pages.append(write_report(arguments.file, output, jobs=os.cpu_count() or 1))
-    if has_modes:
-        pages.append(write_modes_report(arguments.file, output / "modes" if has_scenes else output))
-    if read_records(arguments.file, "bench"):
-        pages.append(write_bench_report(arguments.file, output / "bench"))
-    print(*pages, sep="\n")
+    index = write_report(arguments.file, arguments.output or pages_beside(arguments.file), jobs=os.cpu_count() or 1)
+    print(index)
     if arguments.open:
-        webbrowser.open(pages[0].resolve().as_uri())
+        webbrowser.open(index.resolve().as_uri())
     return 0
 
 
@@ -65,12 +51,13 @@ def render_if_changed(results: Path, output: Path, jobs: int, summary: Callable[
 
     Both are made anew unless the same data and code have made them before. Raises StoreError.
     """
-    from rotor_mbs.report.build import write_report
     from rotor_mbs.report.core.files import INDEX
 
     made_from = _digest(results)
     stamp, index, text = output / _STAMP, output / INDEX, output / _SUMMARY
     if not (stamp.is_file() and stamp.read_text() == made_from and index.is_file() and text.is_file()):
+        from rotor_mbs.report.build import write_report  # late: matplotlib
+
         write_report(results, output, jobs)
         replace_file(text, summary(results).encode())
         replace_file(stamp, made_from.encode())

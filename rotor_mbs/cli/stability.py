@@ -9,7 +9,7 @@ import time
 from rotor_mbs.analysis.stability import advice_lines, unreached
 from rotor_mbs.cli.argument_values import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_not_computed
-from rotor_mbs.report.pages.stability import write_stability_report
+from rotor_mbs.report.build import write_report
 from rotor_mbs.studies.stability import run_suite
 
 
@@ -28,7 +28,7 @@ def stability(arguments: argparse.Namespace) -> int:
     print(*advice_lines(report.runs), sep="\n")
     print(f"{output}: {report.scenes} scenes, {len(report.runs)} runs, {time.monotonic() - start:.0f} s in all")
     pages = arguments.report or pages_beside(output)
-    print(f"report: {write_stability_report(output, pages)}")
+    print(f"report: {write_report(output, pages)}")
     missing = unreached(report.runs)
     for scene in missing:
         print(f"{scene}: no method reaches 1e-6 rad", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""The report of a results file: every page is made in a process pool, then all are written."""
+"""The report of a file, whatever it has: all pages are made, those of scenes in a process pool, then written."""
 
 from __future__ import annotations
 
@@ -11,17 +11,23 @@ from rotor_mbs.analysis import errata as errata_analysis
 from rotor_mbs.analysis import published, run_selection
 from rotor_mbs.analysis.claim_records import ClaimStudy, stored_claims
 from rotor_mbs.analysis.claims import Claim, claims
+from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.report.core.files import ERRATA, INDEX, WALK, page_names, render, write_pages
+from rotor_mbs.report.core.files import BENCH, ERRATA, INDEX, MODES, WALK, Site, page_names, render, write_pages
+from rotor_mbs.report.pages.bench import bench_pages
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
+from rotor_mbs.report.pages.modes import modes_page
+from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
+from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.report.paper_figures import PaperFigure, available
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import OpenResults, StoredScene, open_results
 from rotor_mbs.store.records import Record, read_records
+from rotor_mbs.store.sweep_dataset import StoredSweep, is_sweep
 
 Part = str | PaperFigure  # a scene by its name, or a figure of the paper
 _GROUPS = 2  # per worker
@@ -39,48 +45,97 @@ class Context:
     files: Mapping[str, str]
     claims: tuple[Claim, ...]
     conditions: Mapping[str, str]
-    has_errata: bool
     study: ClaimStudy | None
     curves: Mapping[str, Sequence[Record]]
+    site: Site
 
 
 def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
-    """Write the pages about the results file into the folder `output`, with `jobs` processes.
+    """Write the pages about any file that this program writes into the folder `output`, with `jobs` processes.
 
-    Returns the path of the index. Nothing is written before every page is made. Raises StoreError where the file
-    cannot be read or has no scene, or where the folder cannot be written.
+    Runs, the stability suite, a bench, modes, a sweep: what the file has is one site with one navigation. Returns the
+    path of the index. Nothing is written before every page is made. Raises StoreError where the file cannot be read or
+    has nothing to report, or where the folder cannot be written.
     """
-    with open_results(results) as opened:
-        context, pages, figures = _prepared(opened)
-    parts = _parts(context, figures, jobs)
-    if figures:
-        walk = [parts[figure] for figure in figures]
-        pages[WALK] = render("walk", {"figures": walk, "has_errata": context.has_errata})
-    pages |= {file: str(parts[scene]) for scene, file in context.files.items()}
+    if is_sweep(results):
+        pages = {INDEX: render("sweep", sweep_page(StoredSweep(results)))}
+    else:
+        with open_results(results) as opened:
+            pages = _pages(opened, jobs)
     write_pages(output, pages)
     return output / INDEX
 
 
-def _prepared(opened: OpenResults) -> tuple[Context, dict[str, str], tuple[PaperFigure, ...]]:
-    """The context, the pages that need the whole file, and the figures that it has."""
-    scenes = {name: opened.scenes[name] for name in natural_order(opened.scenes)}
+def _pages(opened: OpenResults, jobs: int) -> dict[str, str]:
+    """By file name. What comes first is the index."""
+    modes, bench = read_records(opened.path, "modes"), read_records(opened.path, "bench")
+    has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench)
+    is_suite = has_runs and is_stability_suite(opened)
+    kinds = [
+        (has_runs, INDEX, "Stability suite" if is_suite else "Overview"),
+        (bool(bench), BENCH, "Error against run time"),
+    ]
+    kinds.append((bool(modes), MODES, "Modes"))
+    there = [(file, label) for has, file, label in kinds if has]
+    names = {file: INDEX if not place else file for place, (file, _) in enumerate(there)}
+    main = [(names[file], label) for file, label in there]
+    pages: dict[str, str] = {}
+    site = Site(tuple(main))
+    if is_suite:
+        pages |= stability_pages(opened, INDEX, site)
+    elif has_runs:
+        context, figures = _prepared(opened, main)
+        site = context.site
+        pages |= _run_pages(opened, context, figures, jobs)
+    if bench:
+        pages |= bench_pages(opened, names[BENCH], site)
+    if modes:
+        pages[names[MODES]] = modes_page(list(read_modes(opened.path).values()), site, names[MODES])
+    return pages
+
+
+def _prepared(opened: OpenResults, main: Sequence[tuple[str, str]]) -> tuple[Context, tuple[PaperFigure, ...]]:
+    """What every page needs, and the figures that the file has; main: the site's pages that are known so far."""
+    scenes = _scenes(opened)
     if not scenes:
         raise StoreError(f"{opened.path}: no scene in it, nothing to report")
-    files = page_names(scenes)
-    decided = tuple(claims(scenes))
-    conditions = published.conditions() if decided else {}
-    study = stored_claims(opened) if decided else None
-    entries = errata_analysis.entries(opened)
-    errata = published.errata() if entries or _has_printed_model(scenes) else ()
-    figures = available(scenes)
-    curves = by_scene(read_records(opened.path, "bench"))
-    index = index_page(
-        opened, scenes, files, decided, conditions, errata, has_walk=bool(figures), study=study, curves=curves
+    decided, figures = tuple(claims(scenes)), available(scenes)
+    has_errata = bool(errata_analysis.entries(opened)) or _has_printed_model(scenes)
+    more = [(WALK, "The paper's figures")] if figures else []
+    more += [(ERRATA, "Errata")] if has_errata else []
+    context = Context(
+        opened.path,
+        page_names(scenes),
+        decided,
+        published.conditions() if decided else {},
+        stored_claims(opened) if decided else None,
+        by_scene(read_records(opened.path, "bench")),
+        Site((main[0], *more, *main[1:])),
     )
-    pages = {INDEX: render("index", index)}
-    if errata:
-        pages[ERRATA] = render("errata", errata_page(errata, entries, scenes, files))
-    return Context(opened.path, files, decided, conditions, bool(errata), study, curves), pages, figures
+    return context, figures
+
+
+def _scenes(opened: OpenResults) -> dict[str, StoredScene]:
+    return {name: opened.scenes[name] for name in natural_order(opened.scenes)}
+
+
+def _run_pages(opened: OpenResults, context: Context, figures: Sequence[PaperFigure], jobs: int) -> dict[str, str]:
+    """The index, errata, figures one by one, and a page per scene."""
+    scenes, site = _scenes(opened), context.site
+    parts = _parts(context, figures, jobs)
+    has_errata = any(file == ERRATA for file, _ in site.pages)
+    errata = published.errata() if has_errata else ()
+    index = index_page(
+        opened, scenes, context.files, context.claims, context.conditions, errata,
+        study=context.study, curves=context.curves,
+    )  # fmt: skip
+    pages = {INDEX: render("index", index, site, INDEX)}
+    if has_errata:
+        entries = errata_analysis.entries(opened)
+        pages[ERRATA] = render("errata", errata_page(errata, entries, scenes, context.files), site, ERRATA)
+    if figures:
+        pages[WALK] = render("walk", {"figures": [parts[figure] for figure in figures]}, site, WALK)
+    return pages | {file: str(parts[scene]) for scene, file in context.files.items()}
 
 
 def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
@@ -122,8 +177,8 @@ def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, object]:
             own = [claim for claim in context.claims if part in claim.published.scenes]
             page = scene_page(
                 opened.scenes[part], own, context.conditions,
-                has_errata=context.has_errata, previous=previous, following=following, study=context.study,
+                previous=previous, following=following, study=context.study,
                 curves=context.curves.get(part, ()),
             )  # fmt: skip
-            found[part] = render("scene", page)
+            found[part] = render("scene", page, context.site)
     return found

@@ -20,8 +20,9 @@ from rotor_mbs.analysis.work_precision import (
     succeeded,
     time_to_reach,
 )
+from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.looks import look_of
-from rotor_mbs.report.pages.bench import omissions, overview, summary, write_bench_report
+from rotor_mbs.report.pages.bench import omissions, overview, summary
 from rotor_mbs.report.pages.bench_tables import (
     csv_text,
     failure_table,
@@ -238,14 +239,14 @@ def test_curves_of_a_scene_with_other_numbers_are_dropped(tmp_path: Path) -> Non
 
 def test_pages_and_csv_are_written(tmp_path: Path) -> None:
     write_records(tmp_path / "a.h5", [FAST, SLOW])
-    index = write_bench_report(tmp_path / "a.h5", tmp_path / "report")
+    index = write_report(tmp_path / "a.h5", tmp_path / "report")
     names = {path.name for path in index.parent.iterdir()}
-    assert names == {"index.html", "paper-fig09.html", "paper-fig09.csv", "bench.csv"}
-    page = (index.parent / "paper-fig09.html").read_text()
-    assert 'href="paper-fig09.csv"' in page
+    assert names == {"index.html", "bench-paper-fig09.html", "bench-paper-fig09.csv", "bench.csv"}
+    page = (index.parent / "bench-paper-fig09.html").read_text()
+    assert 'href="bench-paper-fig09.csv"' in page
     assert "ended after 10 s" in page
     assert "horizon at 6.00" in page
     assert page.count("<svg viewBox") >= 2
     first = index.read_text()
-    assert first.count('href="paper-fig09.html"') == 2  # in the table, and under the small picture
+    assert first.count('href="bench-paper-fig09.html"') == 2  # in the table, and under the small picture
     assert first.index('id="fastest"') < first.index('id="scenes"')

@@ -70,7 +70,7 @@ def test_the_report_says_what_was_found(reproduced: Path) -> None:
     index = (reproduced / "report" / "index.html").read_text()
     assert "4 of 4 published numbers are reproduced" in index
     pages = list((reproduced / "report").glob("*.html"))
-    assert len(pages) == len(PAPER) + 3  # index, errata, the figures one by one
+    assert len(pages) == len(PAPER) + 5  # index, errata, the figures one by one, the bench and its scene
     for page in pages:
         assert not re.search(r'(?:src|href)="(?:https?:)?//', page.read_text())
 

@@ -12,7 +12,8 @@ import pytest
 from rotor_mbs.analysis.stability import OUTCOMES, advice_lines, reached_by, suite_runs, unreached
 from rotor_mbs.cli import main
 from rotor_mbs.execution.execute import Outcome
-from rotor_mbs.report.pages.stability import NOT_COMPARED, write_stability_report
+from rotor_mbs.report.build import write_report
+from rotor_mbs.report.pages.stability import NOT_COMPARED
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.records import Record, read_records, write_records
 from rotor_mbs.studies.run import run_scenes
@@ -79,7 +80,7 @@ def test_a_run_judged_by_its_energy_alone_says_so(tmp_path: Path) -> None:
     assert not cell.reaches_target
     assert reached_by([cell], one.name) is None
     assert advice_lines([cell])[0].startswith("lagrange/taylor: holds on 1 of 1 (1 by its energy alone)")
-    page = write_stability_report(path, tmp_path / "report").read_text(encoding="utf-8")
+    page = write_report(path, tmp_path / "report").read_text(encoding="utf-8")
     assert cell.message in page
     assert NOT_COMPARED in page
     assert "closed form, Taylor: holds on 1 of 1 (1 by its energy alone); use for “on a needle”" in page

@@ -9,6 +9,7 @@ import base64
 import hashlib
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from rotor_mbs.report.core.looks import palette_css, with_light_palette
 from rotor_mbs.store.hdf5 import replace_file
 
 GENERATOR = "rotor_mbs report"
-INDEX, ERRATA, WALK = "index.html", "errata.html", "figures.html"
+INDEX, ERRATA, WALK, BENCH, MODES = "index.html", "errata.html", "figures.html", "bench.html", "modes.html"
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 
@@ -32,7 +33,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
-    taken = {INDEX, ERRATA, WALK}
+    taken = {INDEX, ERRATA, WALK, BENCH, MODES}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
@@ -67,9 +68,25 @@ def _is_ours(path: Path) -> bool:
         return f'<meta name="generator" content="{GENERATOR}">' in file.read(2000)
 
 
-def render(template: str, page: Mapping[str, object]) -> str:
-    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have."""
-    return _environment().get_template(f"{template}.html.j2").render(page=page)
+@dataclass(frozen=True)
+class Site:
+    """The navigation that every page of a report has: (file, label) of its main pages, in order."""
+
+    pages: tuple[tuple[str, str], ...] = ()
+
+    def links(self, here: str) -> list[tuple[str, str, bool]]:
+        """(file, label, whether it is this page); none where there is nowhere else to go."""
+        found = [(file, label, file == here) for file, label in self.pages]
+        return found if any(not is_here for _, _, is_here in found) else []
+
+
+def render(template: str, page: Mapping[str, object], site: Site | None = None, here: str = "") -> str:
+    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have.
+
+    site, here: the navigation, and the file that the page is
+    """
+    links = [] if site is None else site.links(here)
+    return _environment().get_template(f"{template}.html.j2").render(page=page, site=links)
 
 
 @cache

@@ -241,7 +241,7 @@ def _place_of(text: Any) -> tuple[float, float]:
 
 
 def _text(place: Array, words: str, text: Any) -> str:
-    drop = {"center": 3.4, "top": 8.0, "center_baseline": 3.4}.get(
+    drop = {"center": 3.4, "top": 11.0, "center_baseline": 3.4}.get(
         text.get_va(), -2.0 if text.get_va() == "bottom" else 0.0
     )
     size = float(text.get_fontsize())

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from markupsafe import Markup
 
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, by_scene, fastest, left_out
-from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import model_label
 from rotor_mbs.report.core.elements import Section
-from rotor_mbs.report.core.files import INDEX, page_names, render, write_pages
+from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
@@ -22,33 +20,25 @@ from rotor_mbs.report.pages.cost import cost_legend
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import open_results
+from rotor_mbs.store.read import OpenResults
 from rotor_mbs.store.records import COST_SCALING, Record, read_records
 
 Curves = Sequence[Record]
 
 
-def write_bench_report(results: Path, output: Path) -> Path:
-    """Write the pages on the curves of `results` into the folder `output`; returns the path of the index.
-
-    Raises StoreError where the file cannot be read or has no bench, or where the folder cannot be written.
-    """
-    grouped = by_scene(read_records(results, "bench"))
-    if not grouped:
-        raise StoreError(f"{results}: no bench in it, nothing to report")
-    with open_results(results) as opened:
-        made_with = versions(opened)
+def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
+    """By file name, the pages on the curves of `results`, and CSV; `main`: the file of the one over all scenes."""
+    grouped, made_with = by_scene(read_records(results.path, "bench")), versions(results)
     scaling = {name: curves for name, curves in grouped.items() if name.startswith(f"{COST_SCALING}/")}
     scenes = {name: grouped[name] for name in natural_order(grouped) if name not in scaling}
-    files = page_names(scenes)
-    pages = {INDEX: render("bench", _index(scenes, scaling, files, made_with))}
+    files = dict(zip(scenes, page_names(f"bench/{name}" for name in scenes).values(), strict=True))
+    pages = {main: render("bench", _index(scenes, scaling, files, made_with), site, main)}
     pages["bench.csv"] = tables.csv_text([curve for curves in scenes.values() for curve in curves])
     for name, curves in scenes.items():
         csv = files[name].removesuffix(".html") + ".csv"
-        pages[files[name]] = render("bench_scene", _scene(name, curves, csv))
+        pages[files[name]] = render("bench_scene", _scene(name, curves, csv), site)
         pages[csv] = tables.csv_text(curves)
-    write_pages(output, pages)
-    return output / INDEX
+    return pages
 
 
 def _scene(name: str, curves: Curves, csv: str) -> dict[str, object]:

@@ -9,6 +9,7 @@ from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
+from rotor_mbs.report.pages.formulas import matrices
 from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.store.read import StoredScene
 
@@ -22,7 +23,7 @@ def errata_page(
     """scenes: in order; files: the file name of each scene's page."""
     agreeing = [entry for entry in entries if entry.agrees]
     return {
-        "errata": errata,
+        "errata": [(one, matrices(entries, one.stands_in)) for one in errata],
         "differing": Section(tables=[_differing_table([one for one in entries if not one.agrees], len(entries))]),
         "effects": Section(tables=[_effects_table(scenes, files)]),
         "agreeing": _agreeing_table(agreeing),

@@ -25,7 +25,7 @@ _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py"
 
 def index_page(
     results: OpenResults, scenes: Mapping[str, StoredScene], files: Mapping[str, str], claims: Sequence[Claim],
-    conditions: Mapping[str, str], errata: Sequence[Erratum], *, has_walk: bool, study: ClaimStudy | None = None,
+    conditions: Mapping[str, str], errata: Sequence[Erratum], *, study: ClaimStudy | None = None,
     curves: Mapping[str, Sequence[Record]] | None = None,
 ) -> dict[str, object]:  # fmt: skip
     """scenes: in order; files: the file name of each scene's page; errata: empty where there is no such page.
@@ -47,7 +47,6 @@ def index_page(
         "errata": Section(tables=[_errata_table(errata)]),
         "versions": versions(results),
         "is_paper": bool(claims),
-        "has_walk": has_walk,
     }
 
 

@@ -9,26 +9,25 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence
-from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.modes import multiblade
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.files import INDEX, render, write_pages
+from rotor_mbs.report.core.files import INDEX, Site, render, write_pages
 from rotor_mbs.report.core.looks import with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import modes as plots
 
 
-def write_modes_report(results: Path, output: Path) -> Path:
-    """The page of all modes in a results file into a folder; its path. Raises StoreError where the file has none."""
-    return write_modes_pages(list(read_modes(results).values()), output)
-
-
 def write_modes_pages(modes: Sequence[SceneModes], output: Path) -> Path:
     """The page of modes that are in memory; its path. Raises StoreError where it cannot be written."""
-    parts = [scene_part(one, f"scene{i}") for i, one in enumerate(modes)]
-    write_pages(output, {INDEX: render("modes", {"scenes": parts})})
+    write_pages(output, {INDEX: modes_page(modes)})
     return output / INDEX
+
+
+def modes_page(modes: Sequence[SceneModes], site: Site | None = None, here: str = INDEX) -> str:
+    """The page of the modes of some scenes."""
+    parts = [scene_part(one, f"scene{i}") for i, one in enumerate(modes)]
+    return render("modes", {"scenes": parts}, site, here)
 
 
 def scene_part(modes: SceneModes, name: str) -> dict[str, object]:

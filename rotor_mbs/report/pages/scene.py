@@ -72,7 +72,7 @@ class DrawnRuns:
 
 def scene_page(
     scene: StoredScene, claims: Sequence[Claim], conditions: Mapping[str, str], *,
-    has_errata: bool, previous: str, following: str, study: ClaimStudy | None = None,
+    previous: str, following: str, study: ClaimStudy | None = None,
     curves: Sequence[Record] = (),
 ) -> dict[str, object]:  # fmt: skip
     """The content of the page of a scene.
@@ -108,7 +108,6 @@ def scene_page(
         "quantities": quantity_sections(scene, drawn.all, drawn.horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
         "has_horizon": drawn.horizon is not None,
-        "has_errata": has_errata,
         "previous": previous,
         "next": following,
     }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -18,17 +17,20 @@ from rotor_mbs.analysis.stability import (
     suite_runs,
 )
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.files import INDEX, page_names, render, write_pages
+from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
+from rotor_mbs.report.core.numbers import number
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import error_pictures
 from rotor_mbs.report.pages.quantities import plotted_quantities, sizes
 from rotor_mbs.report.pages.scene import motion_of, opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon
 from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.store.read import StoredRun, StoredScene, open_results
+from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.store.records import Record, read_records
 
+_FOLDERS = ("stiff", "extreme")
+_SUITE = ("steps", "limits", "conservation")
 NOT_COMPARED = "horizon before the second sample"
 _FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
 _CONSERVED = {
@@ -41,24 +43,26 @@ _CONSERVED = {
 _NOT_BAD = ("holds", "energy_alone", "smaller_step", "refuses")
 
 
-def write_stability_report(results: Path, output: Path) -> Path:
-    """Write the map and a page per scene into the folder `output`; returns the path of the map.
+def is_stability_suite(results: OpenResults) -> bool:
+    """Whether the file is of the suite: it has ladders of steps, limits or conservation, or all its scenes are."""
+    folders = {name.partition("/")[0] for name, scene in results.scenes.items() if scene.methods}
+    return bool(read_records(results.path, *_SUITE)) or (bool(folders) and folders <= set(_FOLDERS))
 
-    Raises StoreError where the file cannot be read or the folder cannot be written.
-    """
-    found, records = suite_runs(results), read_records(results, "steps", "limits", "conservation")
-    with open_results(results) as opened:
-        names = list(dict.fromkeys(cell.scene for cell in found))
-        files = page_names(names)
-        titles = {name: opened.scenes[name].title for name in names}
-        pages = {INDEX: render("stability", _map(found, records, files, titles))}
-        for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
-            own = [cell for cell in found if cell.scene == name]
-            ladders = [record for record in records if record.kind == "steps" and record.scene == name]
-            around = {"previous": files.get(previous, ""), "next": files.get(following, "")}
-            pages[files[name]] = render("stability_scene", _scene_page(opened.scenes[name], own, ladders) | around)
-    write_pages(output, pages)
-    return output / INDEX
+
+def stability_pages(opened: OpenResults, main: str, site: Site) -> dict[str, str]:
+    """By file name, the map, in the file `main`, and a page per scene."""
+    found, records = suite_runs(opened.path), read_records(opened.path, *_SUITE)
+    names = list(dict.fromkeys(cell.scene for cell in found))
+    files = page_names(names)
+    titles = {name: opened.scenes[name].title for name in names}
+    pages = {main: render("stability", _map(found, records, files, titles), site, main)}
+    for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
+        own = [cell for cell in found if cell.scene == name]
+        ladders = [record for record in records if record.kind == "steps" and record.scene == name]
+        around = {"previous": files.get(previous, ""), "next": files.get(following, "")}
+        page = _scene_page(opened.scenes[name], own, ladders) | around
+        pages[files[name]] = render("stability_scene", page, site)
+    return pages
 
 
 def _map(
@@ -134,7 +138,7 @@ def _conservation(records: Sequence[Record]) -> Section:
 
 
 def _shown(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2g}"
+    return number(value)
 
 
 def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[Record]) -> dict[str, object]:
@@ -154,7 +158,6 @@ def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[R
         "motion": _motion(run_selection.reference_or_corrected_run(scene)),
         "errors": _errors(scene, runs),
         "steps": _error_over_step(ladders),
-        "has_errata": False,
     }
 
 
@@ -169,8 +172,8 @@ def _lead(scene: StoredScene, own: Sequence[SuiteRun]) -> list[str]:
     assert reference is not None  # has_reference says so
     uncertainty, growth = (float(reference.array(name).max()) for name in ("angle_uncertainty", "error_growth"))
     return [
-        f"{scene.name}: no method reaches 1e-6 rad. The uncertainty of the reference is {uncertainty:.1e} rad, and an "
-        f"initial error has grown {growth:.1e}-fold by the end: "
+        f"{scene.name}: no method reaches 10⁻⁶ rad. The uncertainty of the reference is {number(uncertainty)} rad, "
+        f"and an initial error has grown {number(growth)}-fold by the end: "
         f"the cause is {'the problem, not a code' if growth >= 1e10 else 'the methods'}."
     ]
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, spread_of, stability_map
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
-from rotor_mbs.report.core.files import INDEX, render, write_pages
 from rotor_mbs.report.core.looks import Look, with_capital
 from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.report.core.svg import picture
@@ -25,12 +23,6 @@ from rotor_mbs.store.sweep_dataset import StoredSweep
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
-
-
-def write_sweep_report(dataset: Path, output: Path) -> Path:
-    """Write the page into the folder `output`; its path. Raises StoreError where `dataset` is no sweep."""
-    write_pages(output, {INDEX: render("sweep", sweep_page(StoredSweep(dataset)))})
-    return output / INDEX
 
 
 def sweep_page(sweep: StoredSweep) -> dict[str, object]:

@@ -52,7 +52,7 @@ def departure(
         if parted is not None and 0.0 < parted < end:
             axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
             if not place:
-                axes.text(parted, axes.get_ylim()[0], " they part", color=GREY, ha="left", va="bottom", fontsize=8.5)
+                axes.text(parted, axes.get_ylim()[1], " they part", color=GREY, ha="left", va="top", fontsize=8.5)
     return picture
 
 
@@ -135,4 +135,6 @@ def drive(time: Array, torque: Array, power_w: Array) -> Panels:
     for axes, values, label in zip(picture.axes, (torque, power_w), ("torque (kN m)", "power (kW)"), strict=True):
         axes.plot(*thin(time, 1e-3 * values), color=coordinate_look(0).colour)
         axes.set_ylabel(label)
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, 0.0), max(high, 0.0))
     return picture

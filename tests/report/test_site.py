@@ -1,0 +1,110 @@
+"""One site of any file: its navigation, the page of a sweep, formulas of the errata."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import paper
+from support.stored import Made, rotor, store
+
+from rotor_mbs.analysis.errata import CheckedEntry
+from rotor_mbs.report.build import write_report
+from rotor_mbs.report.core.files import Site
+from rotor_mbs.report.pages.formulas import formula, matrices
+from rotor_mbs.report.pages.sweep import field_name
+from rotor_mbs.report.plots.sweep import distribution
+from rotor_mbs.scenario.sweep import load_sweep
+from rotor_mbs.store.sweep_dataset import SweepDataset
+from rotor_mbs.studies.sweep import plan_sweep
+from rotor_mbs.studies.sweep_work import rows_of
+
+FIG11 = paper("fig11", samples=101)
+SWING = rotor(lambda t: 0.5 + 0.2 * t, lambda t: np.sin(t), np.cos, np.sin)
+
+
+def test_every_page_has_the_same_navigation(tmp_path: Path) -> None:
+    runs = [Made(FIG11, name, SWING) for name in ("reference", "printed/ode45", "lagrange/taylor")]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
+    wanted = ["index.html", "figures.html", "errata.html"]
+    for path in folder.glob("*.html"):
+        nav = re.search(r'<nav class="site" aria-label="Report">(.*?)</nav>', path.read_text(encoding="utf-8"), re.S)
+        assert nav is not None, path.name
+        assert re.findall(r'href="([^"]*)"', nav[1]) == wanted
+        here = re.findall(r'href="([^"]*)" aria-current="page"', nav[1])
+        assert here == ([path.name] if path.name in wanted else [])
+
+
+def test_a_single_page_needs_no_navigation() -> None:
+    assert Site((("index.html", "Overview"),)).links("index.html") == []
+    assert Site((("index.html", "Overview"),)).links("paper-fig11.html") == [("index.html", "Overview", False)]
+
+
+def _sweep(folder: Path, text: str) -> Path:
+    (folder / "s.toml").write_text(text)
+    plan = plan_sweep(load_sweep(folder / "s.toml"), (), (1, 1), 60.0)
+    with SweepDataset(folder / "s.h5", plan.layout) as dataset:
+        for chunk in plan.chunks(dataset.missing()):
+            dataset.write(chunk.first, rows_of(chunk))
+    return folder / "s.h5"
+
+
+def test_a_sweep_has_a_page_from_its_dataset_alone(tmp_path: Path) -> None:
+    pytest.importorskip("heyoka")
+    path = _sweep(
+        tmp_path,
+        'title = "Speed & stiffness"\nscene = "paper/fig06"\nsamples = 51\noutputs = []\npicture = "map"\n'
+        '[change]\n"initial.angles[1]" = 1e-6\nduration = 2\n'
+        '[[axis]]\nkey = "bearing.stiffness"\nlinear = {start = 500, end = 40000, count = 3}\n'
+        '[[axis]]\nkey = "initial.rates[0]"\nlinear = {start = 0.25, end = 20, count = 4}\n',
+    )
+    text = write_report(path, tmp_path / "out").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert "<h1>Speed &amp; stiffness</h1>" in text
+    assert "12 runs of paper/fig06 by lagrange/taylor" in text
+    assert ">initial rotor speed (rad/s)<" in text  # the axes, named as in the field
+    assert ">bearing stiffness (N m/rad)<" in text
+    assert re.search(r"The pitches grow 10-fold in \d+ of 12 runs", text)
+    assert re.search(r'<th scope="row">ok</th><td class="n">12</td><td class="n">100.0 %</td>', text)
+    assert text.count("<figure>") >= 3  # the map, and distributions
+    assert "<script" not in text
+    assert len(text.encode()) < 250_000
+
+
+def test_keys_are_named_as_in_the_field() -> None:
+    assert field_name("initial.angles[0]") == "initial rotor angle"
+    assert field_name("initial.rates[2]") == "initial pitch rate of blade 2"
+    assert field_name("bearing.stiffness") == "bearing stiffness"
+
+
+def test_a_distribution_rises_from_none_to_all_runs() -> None:
+    (axes,) = distribution(np.array([3.0, 1e-3, 10.0, np.nan, 0.1]), "error (rad)", logarithmic=True).axes
+    x, y = axes.get_lines()[0].get_xydata().T
+    assert x.tolist() == [1e-3, 0.1, 3.0, 10.0]
+    assert (y[0], y[-1]) == (0.0, 100.0)
+    assert axes.get_xscale() == "log"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("error (rad)", "share of runs (%)")
+
+
+def test_formulas_are_typeset() -> None:
+    assert formula("c² m c3²") == (
+        '<math><mrow><msup><mi>c</mi><mn>2</mn></msup><mspace width="0.2em"/><mi>m</mi><mspace width="0.2em"/>'
+        "<msup><msub><mi>c</mi><mn>3</mn></msub><mn>2</mn></msup></mrow></math>"
+    )
+    assert formula("what <is> this?") == "what &lt;is&gt; this?"
+
+
+def test_the_faulty_entry_of_a_matrix_is_marked_and_corrected() -> None:
+    entries = [
+        CheckedEntry("(8)", "row 1 column 1", "-s2 c3", "-s2 c3", 0.0, True, ""),
+        CheckedEntry("(8)", "row 1 column 2", "c c3", "0", 1.0, False, "E1"),
+        CheckedEntry("(25)", "D(1,1)", "c", "d", 1.0, False, "E1"),
+    ]
+    ((equation, text),) = matrices(entries, ("(8)", "(25)"))
+    assert equation == "(8)"
+    assert text.count("<mtd") == 2
+    assert text.count('<mtd class="fault">') == 1
+    fault = text[text.index('class="fault"') :]
+    assert fault.index('class="printed"') < fault.index('class="right"')
+    assert "<mn>0</mn>" in fault
