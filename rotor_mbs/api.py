@@ -327,6 +327,12 @@ class SweepData:
 
         return StoredSweep(self.path).column(name)
 
+    def at(self, name: str, sample: int) -> Any:
+        """(runs, ...) a trajectory, such as "angles", at one sample of all runs; the others are not read."""
+        from rotor_mbs.store.sweep_dataset import StoredSweep
+
+        return StoredSweep(self.path).at(name, sample)
+
     def to_xarray(self) -> Any:
         """The dataset as an xarray.Dataset, opened lazily: one variable for each parameter, with its unit."""
         return need_xarray().open_dataset(self.path)

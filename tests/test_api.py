@@ -141,5 +141,6 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
     for i, stiffness in enumerate(values):
         single = rm.run(scene.replace(samples=11, **{"bearing.stiffness": stiffness}), "lagrange/dop853")
         np.testing.assert_array_equal(data.column("angles")[i], single.angles)
+    np.testing.assert_array_equal(data.at("angles", 7), data.column("angles")[:, 7])
     with pytest.raises(rm.InputError, match=r"bearing\.stifness"):
         rm.sweep(scene, {"bearing.stifness": values})

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.run_selection import corrected_runs
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
 
@@ -146,7 +146,7 @@ def own_points(scene: StoredScene) -> list[Record]:
             numbers = dict.fromkeys(("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s"), seconds)
             numbers |= {one: run.attributes.get(one, math.nan) for one in ("setup_time_s", "output_time_s")}
             arrays = {one: np.array([value]) for one, value in {"angle_error_max": error, **numbers}.items()}
-            arrays["status"] = np.array([STATUSES.index("ok")])
+            arrays["status"] = np.array([code_of("ok")])
             found.append(Record("bench", scene.name, name, {"status_meanings": " ".join(STATUSES)}, arrays))
     return found
 

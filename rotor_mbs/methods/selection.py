@@ -62,7 +62,7 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
         if not blade.has_pitch_inertia:
             continue
         x, y, z = blade.centre_of_mass
-        inertia = blade.inertia[2] + blade.mass * (x * x + y * y)
+        inertia = blade.pitch_inertia
         stiffness, damping = scene.bearing(i)
         torque = max((abs(value) for _, value in scene.pitch_load(i)[0]), default=0.0)
         moment = stiffness + torque + blade.mass * (scene.gravity + driven * abs(z)) * math.hypot(x, y)

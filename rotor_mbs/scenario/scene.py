@@ -72,6 +72,12 @@ class Blade:
         return not any(self.inertia)
 
     @property
+    def pitch_inertia(self) -> float:
+        """kg m² about the pitch axis."""
+        x, y, _ = self.centre_of_mass
+        return self.inertia[2] + self.mass * (x * x + y * y)
+
+    @property
     def has_pitch_inertia(self) -> bool:
         """Whether the blade resists pitching at all: Jzz about the pitch axis is not exactly zero (paper, Fig. 4b)."""
         x, y, _ = self.centre_of_mass

@@ -132,6 +132,15 @@ def member(group: Any, name: str) -> Any:
     return group[name]
 
 
+def mapped(dataset: Any) -> NDArray[Any]:
+    """A contiguous array as it lies in the file, read where it is indexed: for reading across its first dimension."""
+    offset = dataset.id.get_offset()
+    if offset is None:
+        raise StoreError(f"{dataset.file.filename}: {dataset.name} is not contiguous")
+    values: NDArray[Any] = np.memmap(dataset.file.filename, dataset.dtype, "r", offset, dataset.shape)
+    return values
+
+
 def values_of(dataset: Any) -> NDArray[Any]:
     """An array, whole. Raises StoreError where it is not in the file, or claims far more than the file holds."""
     place = f"{dataset.file.filename}: {dataset.name}"

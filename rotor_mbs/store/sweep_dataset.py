@@ -250,6 +250,11 @@ class StoredSweep:
         with hdf5.open_file(self._path) as file, hdf5.reading(self._path, name):
             return hdf5.values_of(self._dataset(file, name))
 
+    def at(self, name: str, sample: int) -> NDArray[Any]:
+        """(runs, ...) a trajectory at one sample of all runs, without reading the others. Raises StoreError."""
+        with hdf5.open_file(self._path) as file, hdf5.reading(self._path, name):
+            return np.array(hdf5.mapped(self._dataset(file, name))[:, sample])
+
     def damaged_runs(self) -> NDArray[np.int64]:
         """Numbers of the stored runs that are not what was written, by their checksums. Reads all of the file."""
         with hdf5.open_file(self._path) as file, hdf5.reading(self._path):

@@ -27,7 +27,7 @@ from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.solution.status import COMPLETE, STATUSES
+from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import Record, write_records
 from rotor_mbs.store.results_file import ResultsStore
@@ -203,7 +203,7 @@ def curve_record(case: Case, ladder: Ladder, rows: Sequence[Mapping[str, Any]], 
     }
     if ladder.order is not None:
         attributes["order_expected"] = ladder.order
-    ok = arrays["status"] == STATUSES.index("ok")
+    ok = arrays["status"] == code_of("ok")
     errors = np.maximum(arrays["angle_error_max"][ok], SMALLEST_ERROR)
     if ladder.kind == STEP and (order := fitted_order(arrays["setting"][ok], errors)) is not None:
         attributes["order"] = order
@@ -241,12 +241,12 @@ class Measured:
         names = ("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s")
         others = ("setup_time_s", "setup_again_time_s", "output_time_s")
         row: dict[str, Any] = {"setting": point.setting, **dict.fromkeys((*_ERRORS, *names, *others), np.nan)}
-        row |= {"repeats": 0, "steps": 0, "status": STATUSES.index("left_out"), "false_success": 0, "message": ""}
+        row |= {"repeats": 0, "steps": 0, "status": code_of("left_out"), "false_success": 0, "message": ""}
         if point in self.timings.left_out:
             row["message"] = self.timings.left_out[point]
         elif point in self.unanswered:
             status, row["message"] = self.unanswered[point]
-            row["status"] = STATUSES.index(status)
+            row["status"] = code_of(status)
             row["run_time_s"] = self.timings.warm[point].seconds
         else:
             row |= statistics(self.timings.times[point])
@@ -258,7 +258,7 @@ class Measured:
                 "setup_again_time_s": prepared.setup_again_s,
                 "output_time_s": judged.output_s,
                 "steps": judged.steps,
-                "status": STATUSES.index(judged.status),
+                "status": code_of(judged.status),
                 "false_success": int(judged.false_success),
                 "message": judged.message,
             }

@@ -21,7 +21,7 @@ from rotor_mbs.execution.pool import Finished
 from rotor_mbs.methods.catalogue import methods as all_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import COST_SCALING, Record
 from rotor_mbs.store.results_file import ResultsStore
@@ -129,7 +129,7 @@ def _curve(study: CostStudy, case: Case, rows: Sequence[Mapping[str, Any]], star
         "scene_hash": case.scene_hash,
         KEY_ATTRIBUTE: case.key,
     }
-    ok = arrays["status"] == STATUSES.index("ok")
+    ok = arrays["status"] == code_of("ok")
     rate = arrays["run_time_s"] / arrays["simulated_s"]
     if (exponent := cost_exponent(arrays["setting"][ok], rate[ok])) is not None:
         attributes["exponent"] = exponent

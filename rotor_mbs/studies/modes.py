@@ -184,9 +184,7 @@ def _modes_over_speed(
     messages: Sequence[str],
     symmetric: bool,
 ) -> LinearModes:
-    from rotor_mbs.models.lagrange.linearization import moving_coordinates
-
-    columns = list(moving_coordinates(scene))
+    columns = scene.moving_coordinates
     n = len(columns)
     unknown = np.full((n, n), np.nan)
     sets = []

@@ -21,7 +21,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.record import Trajectory
-from rotor_mbs.solution.status import COMPLETE, STATUSES
+from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.store.records import Record
 from rotor_mbs.studies.stored_references import load_reference
 
@@ -61,7 +61,7 @@ def ladder_record(job: Job) -> Record:
     errors = [one.metrics.get("angle_error_max", np.nan) if one.status in COMPLETE else np.nan for one in judgements]
     arrays = {
         "step": np.array([step for step, _ in rows]),
-        "status": np.array([STATUSES.index(one.status) for one in judgements], dtype=np.int64),
+        "status": np.array([code_of(one.status) for one in judgements], dtype=np.int64),
         "angle_error_max": np.array(errors),
         "energy_drift_max": np.array([one.metrics.get("energy_drift_max", np.nan) for one in judgements]),
     }
@@ -125,9 +125,7 @@ def limit_record(job: Job) -> Record:
 
 def _modes(scene: Scene, blade: int) -> tuple[complex, complex]:
     """Of one pitch about zero, with the rotor fixed: gravity and rotation are negligible beside such a spring."""
-    x, y, _ = scene.blades[blade].centre_of_mass
-    inertia = scene.blades[blade].inertia[2] + scene.blades[blade].mass * (x * x + y * y)
-    return oscillator_modes(inertia, *scene.bearing(blade))
+    return oscillator_modes(scene.blades[blade].pitch_inertia, *scene.bearing(blade))
 
 
 def _stays(scene: Scene, method: str, steps: int) -> bool:

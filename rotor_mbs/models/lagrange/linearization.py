@@ -86,17 +86,12 @@ def cosine(x: Jet) -> Jet:
     return x.function(c, -s, -c)
 
 
-def moving_coordinates(scene: Scene) -> tuple[int, ...]:
-    """Columns of the scene's angles that move: the rotor's, and those of the blades with pitch inertia."""
-    return (0, *(i + 1 for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia))
-
-
 def linearize(
     scene: Scene, angles: Sequence[float] | Array, rates: Sequence[float] | Array, torque: float
 ) -> Linearization:
     """The closed form linearized about `angles` (1 + blades,) rad and `rates` rad/s, under `torque` N m on the rotor.
 
-    Its coordinates are `moving_coordinates(scene)`. Pitch torques and rest angles are those at t = 0.
+    Its coordinates are `scene.moving_coordinates`. Pitch torques and rest angles are those at t = 0.
 
     Raises ZeroDivisionError at the singular configuration.
 
@@ -107,7 +102,7 @@ def linearize(
     >>> linearize(scene, (0, 0, 0, 0), (0, 0, 0, 0), 0.0).stiffness.shape
     (4, 4)
     """
-    form, columns = rotor_form(scene), moving_coordinates(scene)
+    form, columns = rotor_form(scene), scene.moving_coordinates
     n = len(columns)
     state = Jet.variables([*(angles[i] for i in columns), *(rates[i] for i in columns)])
     loads = loads_at_start(scene, torque)
@@ -144,7 +139,7 @@ def equilibrium(scene: Scene) -> Array:
 
 def _stationary(scene: Scene, speed: float, *, fixed_rotor: bool) -> Array:
     """Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes downhill."""
-    form, columns, loads = rotor_form(scene), list(moving_coordinates(scene)), loads_at_start(scene)
+    form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene)
     angles = np.array(scene.initial_angles, dtype=float)
     free = slice(1, None) if fixed_rotor else slice(None)
     changed = columns[free]

@@ -23,7 +23,6 @@ from rotor_mbs.models.lagrange.linearization import (
     cosine,
     holding_torque,
     linearize,
-    moving_coordinates,
     sine,
     steady_rotation,
 )
@@ -85,7 +84,7 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
     n = system.coordinates
     if guess is None:
         try:
-            angles = steady_rotation(scene, speed)[list(moving_coordinates(scene))]
+            angles = steady_rotation(scene, speed)[scene.moving_coordinates]
         except InputError as exc:
             return _not_found(speed, n, str(exc))
         state, torque = np.concatenate([angles, [speed], np.zeros(n - 1)]), holding_torque(scene, speed)
