@@ -19,6 +19,7 @@ from rotor_mbs.foreign.table import DataTable, table_of
 from rotor_mbs.scenario.scene import Scene
 
 Array = NDArray[np.float64]
+_FEW_DIGITS, _ALL_DIGITS = 9, 17
 _FEWEST = 3  # rows: fewer have no motion to be compared
 
 
@@ -35,6 +36,7 @@ class ForeignData:
     read : a line for each channel: column, unit, and what was assumed.
     unused : names of the columns that are no channel.
     wrapped : for each channel, whether whole turns are missing from it.
+    digits : how many significant digits the numbers have, at most; 17 where they have all.
     """
 
     source: str
@@ -44,6 +46,7 @@ class ForeignData:
     read: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     wrapped: tuple[bool, ...] = ()
+    digits: int = _ALL_DIGITS
 
     @property
     def columns(self) -> list[int]:
@@ -82,6 +85,7 @@ def _data(table: DataTable, found: Sequence[Source]) -> ForeignData:
         tuple(str(source) for source in found),
         tuple(name for name in table.columns if name not in used),
         tuple(source.wrapped for source in found[1:]),
+        max(_digits(table[source.column].values) for source in found[1:]),
     )
 
 
@@ -96,6 +100,17 @@ def _values(table: DataTable, source: Source) -> Array:
         )
     found: Array = source.sign * (values + source.offset) * source.factor
     return np.unwrap(found) if source.wrapped else found
+
+
+def _digits(values: Array) -> int:
+    """With how many significant digits the numbers may have been written."""
+    some = values[values != 0.0][:200]
+    sizes = 10.0 ** np.floor(np.log10(np.abs(some)))
+    for digits in range(1, _FEW_DIGITS + 1):
+        unit = sizes * 10.0 ** (1 - digits)
+        if np.allclose(some, np.round(some / unit) * unit, rtol=1e-12, atol=0.0):
+            return digits
+    return _ALL_DIGITS
 
 
 def _refuse_wrong_times(source: str, time: Array) -> None:

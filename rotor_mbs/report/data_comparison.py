@@ -16,6 +16,7 @@ from rotor_mbs.foreign.trajectory import load_data
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.pages.data_comparison import error_panels, write_comparison_page
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
 
@@ -98,8 +99,30 @@ class DataComparison:
         return TextTable((*head, "lag (s)", "scale - 1", "offset"), [_row(one) for one in self.verdict.channels])
 
     def plot(self) -> Panels:
-        """The error of each channel over time, and what the tolerance allows it."""
-        return error_panels(self.study)
+        """The error of each channel per unit of error growth over time, and the tolerance."""
+        return error_panels(self.study, per_growth=True)
+
+    def to_xarray(self) -> Any:
+        """Data, reference, and what an error of 1 rad at the start may have become, as an xarray.Dataset over time.
+
+        Variables by channel, with units: `pitch_1`, `pitch_1_reference`, `pitch_1_growth`. Raises InputError where
+        xarray is not installed.
+        """
+        study, verdict = self.study, self.verdict
+        states = np.hstack([study.reference.angles, study.reference.rates])[:, study.data.columns]
+        found: dict[str, Any] = {}
+        for j, channel in enumerate(study.data.channels):
+            arrays = {
+                "": study.data.values[: verdict.rows, j],
+                "_reference": states[:, j],
+                "_growth": study.carried[:, j],
+            }
+            found |= {
+                f"{channel.key}{end}": ("time", values, {"units": channel.unit}) for end, values in arrays.items()
+            }
+        facts = {"scene": verdict.scene, "source": verdict.source, "status": verdict.status, "message": verdict.message}
+        time = ("time", study.reference.time, {"units": "s"})
+        return need_xarray().Dataset(found, {"time": time}, facts | {"tolerance": verdict.tolerance})
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -146,7 +147,7 @@ def _verdict(
         status, message = _uncovered(scene, compared, exact, until) or (status, message)
     return DataVerdict(
         scene.name, data.source, status, message, tolerance, errors, rows, float(reference.time[-1]), horizon_s,
-        metrics.get("energy_drift_max"), data.read, data.unused, tuple(_notes(scene, whole, data, run)),
+        metrics.get("energy_drift_max"), data.read, data.unused, tuple(_notes(scene, whole, data, run, tolerance)),
     )  # fmt: skip
 
 
@@ -198,10 +199,13 @@ def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: in
     return None
 
 
-def _notes(scene: Scene, whole: ForeignData, data: ForeignData, run: Solution) -> Sequence[str]:
+def _notes(scene: Scene, whole: ForeignData, data: ForeignData, run: Solution, tolerance: float) -> Sequence[str]:
     notes = []
     if len(whole.time) > len(data.time):
         notes.append(f"{len(whole.time) - len(data.time)} rows after the scene's {scene.duration:g} s are not compared")
+    if 1 < data.digits <= -math.log10(tolerance):
+        rounding = 0.5 * 10.0 ** (1 - data.digits)
+        notes.append(f"numbers of {data.digits} digits: their rounding alone is {rounding:.0e} of their size")
     missing = [label for i, label in enumerate(scene.coordinate_labels) if i not in data.columns]
     if missing:
         notes.append(f"no angle of: {', '.join(missing)}")

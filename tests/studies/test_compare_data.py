@@ -182,6 +182,28 @@ def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
     assert wrong.verdict.channels[0].scale == pytest.approx(1.001, abs=1e-9)
 
 
+def test_numbers_of_few_digits_are_noticed(tmp_path: Path) -> None:
+    """OpenFAST's usual four digits: a right run is not within the tolerance, and the page says why; 1e-3 it is."""
+    run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
+    head = "\n".join(["", "OpenFAST", "", "", "", "", "Time Azimuth BldPitch1", "(s) (deg) (deg)"])
+    rows = np.column_stack([run.time, np.degrees(run.angles)])
+    np.savetxt(tmp_path / "low.out", rows, header=head, comments="", fmt="%10.3E")
+    found = rm.compare_data(tmp_path / "low.out", run.scene)
+    assert found.status == "inaccurate"
+    assert "numbers of 4 digits: their rounding alone is 5e-04 of their size" in found.verdict.notes
+    assert rm.compare_data(tmp_path / "low.out", run.scene, tolerance=1e-3).agrees
+
+
+def test_the_comparison_as_a_dataset_has_units() -> None:
+    pytest.importorskip("xarray")
+    run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
+    data = rm.compare_data({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).to_xarray()
+    np.testing.assert_array_equal(data.rotor_rate, run.rates[:, 0])
+    assert data.rotor_rate_reference.attrs["units"] == "rad/s"
+    assert (data.attrs["status"], data.time.attrs["units"]) == ("ok", "s")
+    assert (data.rotor_rate_growth >= 1.0).all()
+
+
 def test_lag_scale_and_offset_are_those_that_were_put_in() -> None:
     """A smooth scene; the lag's own curvature error is of second order, 1e-6."""
     scene = rm.scene("paper/fig03")

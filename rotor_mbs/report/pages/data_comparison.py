@@ -19,7 +19,6 @@ from rotor_mbs.report.plots.time_histories import Series
 from rotor_mbs.studies.compare_data import DataStudy
 
 _ALLOWED = Look(GREY, ":", "")
-_SMALLEST = 1e-18
 
 
 def write_comparison_page(study: DataStudy, output: Path) -> Path:
@@ -58,38 +57,53 @@ def _lead(verdict: DataVerdict) -> list[str]:
     return sentences + [f"The difference looks like: {cause}." for cause in verdict.likely]
 
 
-def error_panels(study: DataStudy) -> Panels:
-    """The error of each channel (rad, rad/s) over time, on a logarithmic axis, and what the tolerance allows."""
-    time, expected = study.reference.time, np.hstack([study.reference.angles, study.reference.rates])
-    errors = np.abs(study.data.values[: len(time)] - expected[:, study.data.columns])
-    series = [Series(time, error, look) for error, look in zip(errors.T, _looks(study), strict=True)]
-    allowed = study.verdict.tolerance * study.carried.max(axis=1)
-    series.append(Series(time, np.maximum(allowed, _SMALLEST), _ALLOWED))
-    return time_histories.errors(series, "error (rad, rad/s)", study.verdict.horizon_s)
+def error_panels(study: DataStudy, *, per_growth: bool = False) -> Panels:
+    """The error of each channel over time, on a logarithmic axis: in rad, or per unit of growth with the tolerance.
+
+    Angles, or rates where the data have no angles.
+    """
+    time, chosen = study.reference.time, _drawn(study)
+    expected = np.hstack([study.reference.angles, study.reference.rates])[:, study.data.columns]
+    errors = np.abs(study.data.values[: len(time)] - expected)
+    if per_growth:
+        errors = errors / study.carried
+    series = [Series(time, errors[:, j], _look(study, j)) for j in chosen]
+    if not per_growth:
+        return time_histories.errors(series, f"error ({study.data.channels[chosen[0]].unit})", study.verdict.horizon_s)
+    series.append(Series(time, np.full(len(time), study.verdict.tolerance), _ALLOWED))
+    return time_histories.errors(series, "error per unit of growth", study.verdict.horizon_s)
 
 
-def _looks(study: DataStudy) -> list[Look]:
-    """As everywhere for the coordinates; rates thinly dotted."""
-    count = 1 + len(study.scene.blades)
-    looks = [coordinate_look(column % count) for column in study.data.columns]
-    return [
-        Look(look.colour, look.line if column < count else ":", "")
-        for look, column in zip(looks, study.data.columns, strict=True)
-    ]
+def _drawn(study: DataStudy) -> list[int]:
+    """Places of the channels that are drawn: the angles, else the rates."""
+    angles = [j for j, channel in enumerate(study.data.channels) if channel.kind == "angle"]
+    return angles or list(range(len(study.data.channels)))
+
+
+def _look(study: DataStudy, j: int) -> Look:
+    """Of a channel: that of its coordinate."""
+    return coordinate_look(study.data.columns[j] % (1 + len(study.scene.blades)))
 
 
 def _legend(study: DataStudy) -> list[LegendEntry]:
-    entries = [
-        LegendEntry(channel.name, look) for channel, look in zip(study.data.channels, _looks(study), strict=True)
-    ]
-    return [*entries, line_entry("allowed for the channel that grows most", GREY, ":")]
+    entries = [LegendEntry(study.data.channels[j].name, _look(study, j)) for j in _drawn(study)]
+    return [*entries, line_entry("tolerance", GREY, ":")]
 
 
 def _errors(study: DataStudy) -> list[Picture]:
-    caption = "Error of each channel against the reference at the times of the data; vertical line: horizon"
-    worst = max(study.verdict.channels, key=lambda one: one.error_max)
-    text = f"Largest error up to the horizon: {number(worst.error_max)} {worst.unit}, {worst.name}."
-    return [picture(error_panels(study), "errors", caption, text)]
+    worst = max(study.verdict.channels, key=lambda one: one.error_per_growth)
+    captions = (
+        "Error against the reference at the times of the data; vertical line: horizon",
+        "Error per unit of error growth, up to the horizon to be below the tolerance",
+    )
+    texts = (
+        f"Largest error up to the horizon of {worst.name}: {with_unit(worst.error_max, worst.unit)}.",
+        f"The largest is {number(worst.error_per_growth)}, {worst.name}.",
+    )
+    return [
+        picture(error_panels(study, per_growth=bool(i)), f"errors-{i}", caption, texts[i])
+        for i, caption in enumerate(captions)
+    ]
 
 
 def _motion(study: DataStudy) -> list[Picture]:
@@ -125,7 +139,7 @@ def _table(verdict: DataVerdict) -> PageTable:
     rows: list[Row] = []
     for one in verdict.channels:
         good = one.error_per_growth <= verdict.tolerance
-        until = [number(None) if np.isnan(time) else with_unit(time, "s", 4) for time in one.agrees_until]
+        until = [number(None) if np.isnan(time) else with_unit(time, "s", 3) for time in one.agrees_until]
         rows.append(
             [
                 one.name, with_unit(one.error_max, one.unit),
