@@ -150,6 +150,23 @@ def _corrections(kind: str, values: Array, expected: Array) -> Iterator[tuple[st
             yield ", ".join(said), corrected - zero
 
 
+def factors(search: CauseSearch) -> list[str]:
+    """A factor of each channel, where that explains every channel; a parameter of the scene may be it, too."""
+    inside = search.rows(search.data.time)
+    time, values = search.data.time[inside], search.data.values[inside]
+    expected = search.expected(time)
+    sizes = (expected**2).sum(axis=0)
+    found = np.where(sizes > 0.0, (values * expected).sum(axis=0) / np.where(sizes > 0.0, sizes, 1.0), 1.0)
+    if not found.all() or search.misfit(time, values / found, expected) > search.fitting:
+        return []
+    wrong = [
+        f"{channel.name} by {factor:.6g}"
+        for channel, factor in zip(search.data.channels, found, strict=True)
+        if abs(factor - 1.0) > search.tolerance
+    ]
+    return [f"too large by a factor: {', '.join(wrong)}"]
+
+
 def _exchanged(search: CauseSearch, time: Array, values: Array) -> list[str]:
     """Columns that are those of other channels, rates taken as angles among them."""
     reference = search.exact.trajectory

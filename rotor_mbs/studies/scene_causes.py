@@ -22,13 +22,15 @@ from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.solution.metrics import HORIZON_GROWTH
 from rotor_mbs.solution.record import Array
-from rotor_mbs.studies.data_causes import FEWEST, CauseSearch, states_at
+from rotor_mbs.studies.data_causes import FEWEST, CauseSearch, factors, states_at
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 _EARLY = 10.0  # growth up to which a cause is tried first: most are refuted there
 _STEP = 1.25e-3  # s, of what is interpolated: of the printed equations' own run, its error is some 1e-9
-# Growth up to which a parameter is fitted, one after another: a start too far off is useless once errors have grown.
-_LEVELS = (3.0, 1e1, 1e2, 1e3, 1e4, HORIZON_GROWTH)
+_EARLY_ROWS = 40  # so many rows are tried first at most
+# Growth, and rows, up to which a parameter is fitted, one after another: a start too far off is useless once errors
+# have grown, and most parameters are refuted by the first rows.
+_LEVELS = ((3.0, _EARLY_ROWS), (1e1, 200), (1e2, 1000), (1e3, 10**4), (1e4, 10**5), (HORIZON_GROWTH, 10**9))
 _LARGEST_CHANGE = 0.3
 _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
 _MOST = 6  # parameters that are named
@@ -39,15 +41,15 @@ Motion = Callable[[Array], Array | None]  # (n,) s -> (n, 2 (1 + blades)), None 
 def causes_in_the_scene(search: CauseSearch) -> list[str]:
     """What fits, in words: other scenes and equations; where none does, one parameter that is off."""
     found = [text for text, motion in _motions(search) if _fits(search, motion)]
-    return found or _one_parameter(search)
+    return found or [*_one_parameter(search), *factors(search)]
 
 
 def _fits(search: CauseSearch, motion: Motion) -> bool:
-    """First up to a growth of `_EARLY`, then up to the horizon."""
+    """First over the first rows, up to a growth of `_EARLY`, then up to the horizon."""
     data = search.data
-    for growth in (_EARLY, math.inf):
-        inside = search.rows(data.time, growth)
-        if growth == _EARLY and inside.sum() < FEWEST:
+    for growth, most in ((_EARLY, _EARLY_ROWS), (math.inf, 10**9)):
+        inside = np.flatnonzero(search.rows(data.time, growth))[:most]
+        if growth == _EARLY and len(inside) < FEWEST:
             continue
         try:
             states = motion(data.time[inside])
@@ -154,11 +156,11 @@ def _one_parameter(search: CauseSearch) -> list[str]:
 def _fitted(search: CauseSearch, changed: Callable[[float], Scene]) -> tuple[float, float]:
     """(change, error per unit of growth that is left) by Gauss and Newton's iteration over ever longer times."""
     change, left, before, rows = 0.0, math.inf, math.inf, 0
-    for level in _LEVELS:
-        inside = search.rows(search.data.time, level)
-        if inside.sum() < max(FEWEST, rows + 1):
+    for level, most in _LEVELS:
+        inside = np.flatnonzero(search.rows(search.data.time, level))[:most]
+        if len(inside) < max(FEWEST, rows + 1):
             continue
-        rows = int(inside.sum())
+        rows = len(inside)
         time, values = search.data.time[inside], search.data.values[inside]
         weights = 1.0 / search.carried(time)[:, search.data.columns]
 

@@ -110,6 +110,7 @@ PLANTS = {
         "sign reversed", spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
     ),
     "another zero": Plant("rotor: zero off by 1.5708", spoilt=lambda t, q, w: (t, q + QUARTER, w)),
+    "a factor": Plant("too large by a factor: rotor by 1.001", spoilt=lambda t, q, w: (t, 1.001 * q, 1.001 * w)),
     "blade order": Plant("columns exchanged: pitch 1 is pitch 3", spoilt=columns(0, 3, 1, 2)),
     "phase": Plant("blades numbered the other way round", mistakes=Mistakes(phases=(0.0, 2.0 * THIRD, THIRD))),
     "gravity": Plant("gravity of 9.81 m/s^2", changed=with_gravity(9.81)),
