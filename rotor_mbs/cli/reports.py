@@ -46,7 +46,9 @@ def animate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def render_if_changed(results: Path, output: Path, jobs: int, summary: Callable[[Path], str]) -> tuple[Path, str]:
+def render_if_changed(
+    results: Path, output: Path, jobs: int, summary: Callable[[Path], str], on_page: Callable[[int, int], None]
+) -> tuple[Path, str]:
     """The index of the report on `results` in `output`, and the text that `summary` makes of `results`.
 
     Both are made anew unless the same data and code have made them before. Raises StoreError.
@@ -58,7 +60,7 @@ def render_if_changed(results: Path, output: Path, jobs: int, summary: Callable[
     if not (stamp.is_file() and stamp.read_text() == made_from and index.is_file() and text.is_file()):
         from rotor_mbs.report.build import write_report  # late: matplotlib
 
-        write_report(results, output, jobs)
+        write_report(results, output, jobs, on_page)
         replace_file(text, summary(results).encode())
         replace_file(stamp, made_from.encode())
     return index, text.read_text(encoding="utf-8")

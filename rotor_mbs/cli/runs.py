@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from rotor_mbs.analysis.claim_records import stored_claims
@@ -19,6 +20,9 @@ from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.reference import compute_references
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
+
+# Of the time of `reproduce`: runs, error against run time, pages.
+_REPRODUCE_PARTS = (0.7, 0.1, 0.2)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -51,10 +55,10 @@ def reproduce(arguments: argparse.Namespace) -> int:
 
     start = time.monotonic()
     results = arguments.output / "results.h5"
-    with ProgressLine() as progress:
+    with ProgressLine(parts=_REPRODUCE_PARTS) as progress:
         report = reproduce_paper(results, workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress)
-        progress.stage("report: drawing the pages")
-        index, summary = render_if_changed(results, arguments.output / "report", arguments.jobs, _summary)
+        pages = partial(progress.stage, "pages and figures")
+        index, summary = render_if_changed(results, arguments.output / "report", arguments.jobs, _summary, pages)
     status = print_summary(report, results)
     print_text(summary)
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")

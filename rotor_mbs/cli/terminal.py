@@ -111,29 +111,49 @@ class _RenewedLine:
 
 
 class ProgressLine(_RenewedLine):
-    """Called after each case. What is left is estimated from the work done, not from the number of cases."""
+    """Called after each case. What is left is estimated from the work done, not from the number of cases.
 
-    def __init__(self, stream: TextIO | None = None) -> None:
+    parts: shares of the work, in order, of the lists of cases and of the stages that a command has. Where the lists are
+    more than these, each is estimated by itself.
+    """
+
+    def __init__(self, stream: TextIO | None = None, parts: Sequence[float] = (1.0,)) -> None:
         super().__init__(stream)
-        self._last = self._list_start = self._start
+        self._parts = parts
+        self._part = -1
+        self._last = self._part_start = self._start
 
     def __call__(self, done: int, total: int, outcome: Outcome) -> None:
         if done == 1:
-            self._list_start = self._last
+            self._begin_part()
         self._last = time.monotonic()
         result = outcome.result
         seconds = " (read, not computed)" if result.is_read else f" {result.seconds:.3f} s" if result.seconds else ""
         reason = f": {result.message}" if result.message else ""
         text = f"[{done:{len(str(total))}d}/{total}] {outcome.case.label} {result.status}{seconds}{reason}"
         keep = result.status != "ok"  # a person must not miss it
-        if self._is_terminal and done < total and not keep and outcome.share > 0.0:
-            left = (self._last - self._list_start) / outcome.share * (1.0 - outcome.share)
-            text = f"{outcome.share:4.0%}, about {span(left)} left  {text}"
-        self._show(text, keep=keep)
+        self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
-    def stage(self, text: str) -> None:
-        """What is done after the cases, such as drawing pages."""
-        self._show(text)
+    def stage(self, text: str, done: int, total: int) -> None:
+        """What is done beside cases, such as drawing pages: called before the first (done = 0) and after each."""
+        if done == 0:
+            self._begin_part()
+        self._last = time.monotonic()
+        self._show(f"{self._estimate(done / total)}{text} {done}/{total}")
+
+    def _begin_part(self) -> None:
+        self._part += 1
+        if self._part >= len(self._parts):  # by itself
+            self._part_start = self._last
+
+    def _estimate(self, share: float) -> str:
+        """ "40%, about 20 s left  ", for a terminal."""
+        if self._part < len(self._parts):
+            share = sum(self._parts[: self._part]) + share * self._parts[self._part]
+        if not self._is_terminal or not 0.0 < share < 1.0:
+            return ""
+        left = (self._last - self._part_start) / share * (1.0 - share)
+        return f"{share:4.0%}, about {span(left)} left  "
 
 
 class SweepProgress(_RenewedLine):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -50,7 +50,10 @@ class Context:
     site: Site
 
 
-def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
+OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
+
+
+def write_report(results: Path, output: Path, jobs: int = 1, on_page: OnPage = lambda *_: None) -> Path:
     """Write the pages about any file that this program writes into the folder `output`, with `jobs` processes.
 
     Runs, the stability suite, a bench, modes, a sweep: what the file has is one site with one navigation. Returns the
@@ -61,12 +64,12 @@ def write_report(results: Path, output: Path, jobs: int = 1) -> Path:
         pages = {INDEX: render("sweep", sweep_page(StoredSweep(results)))}
     else:
         with open_results(results) as opened:
-            pages = _pages(opened, jobs)
+            pages = _pages(opened, jobs, on_page)
     write_pages(output, pages)
     return output / INDEX
 
 
-def _pages(opened: OpenResults, jobs: int) -> dict[str, str]:
+def _pages(opened: OpenResults, jobs: int, on_page: OnPage) -> dict[str, str]:
     """By file name. What comes first is the index."""
     modes, bench = read_records(opened.path, "modes"), read_records(opened.path, "bench")
     has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench)
@@ -86,7 +89,7 @@ def _pages(opened: OpenResults, jobs: int) -> dict[str, str]:
     elif has_runs:
         context, figures = _prepared(opened, main)
         site = context.site
-        pages |= _run_pages(opened, context, figures, jobs)
+        pages |= _run_pages(opened, context, figures, jobs, on_page)
     if bench:
         pages |= bench_pages(opened, names[BENCH], site)
     if modes:
@@ -119,10 +122,12 @@ def _scenes(opened: OpenResults) -> dict[str, StoredScene]:
     return {name: opened.scenes[name] for name in natural_order(opened.scenes)}
 
 
-def _run_pages(opened: OpenResults, context: Context, figures: Sequence[PaperFigure], jobs: int) -> dict[str, str]:
+def _run_pages(
+    opened: OpenResults, context: Context, figures: Sequence[PaperFigure], jobs: int, on_page: OnPage
+) -> dict[str, str]:
     """The index, errata, figures one by one, and a page per scene."""
     scenes, site = _scenes(opened), context.site
-    parts = _parts(context, figures, jobs)
+    parts = _parts(context, figures, jobs, on_page)
     has_errata = any(file == ERRATA for file, _ in site.pages)
     errata = published.errata() if has_errata else ()
     index = index_page(
@@ -143,7 +148,7 @@ def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
     return any(name in scene.methods for scene in scenes.values() for name in printed)
 
 
-def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int) -> dict[Part, object]:
+def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int, on_page: OnPage) -> dict[Part, object]:
     """All scenes and figures, in `jobs` processes (in this one where it is 1)."""
     parts: list[Part] = [*context.files, *figures]
     workers = min(jobs, len(parts))
@@ -153,10 +158,12 @@ def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int) -> dict[
     # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
     count = _GROUPS * workers
     found: dict[Part, object] = {}
+    on_page(0, len(parts))
     for finished in run_tasks(work, [parts[start::count] for start in range(count)], workers, _TIMEOUT_S):
         if finished.value is None:
             raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")
         found |= finished.value
+        on_page(len(found), len(parts))
     return found
 
 

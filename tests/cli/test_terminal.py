@@ -60,3 +60,15 @@ def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("NO_COLOR", "1")
     assert not has_colour(Terminal())
     assert coloured("17 of 17 ok") == "17 of 17 \x1b[32mok\x1b[0m"
+
+
+def test_an_estimate_counts_what_comes_after_the_cases() -> None:
+    screen = Terminal()
+    with ProgressLine(screen, parts=(0.5, 0.5)) as progress:
+        progress(1, 2, outcome(share=0.5))
+        assert " 25%, about" in screen.getvalue()
+        progress(2, 2, outcome(share=1.0))
+        progress.stage("pages", 0, 10)
+        progress.stage("pages", 5, 10)
+        assert " 75%, about" in screen.getvalue()
+        assert "pages 5/10" in screen.getvalue()

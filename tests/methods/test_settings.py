@@ -10,10 +10,11 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import find_method, methods
+from rotor_mbs.methods.catalogue import find_method, ladders, methods, settings_for
 from rotor_mbs.methods.settings import Settings, choice, number
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.studies.bench import with_settings
 
 ALL = [*methods(), find_method("reference")]
 NUMBERS = [
@@ -88,3 +89,24 @@ def test_numbers_are_converted_to_the_declared_type() -> None:
         "stages (a whole number at least 1 and at most 8; default 4), step (a number above 0, in s; default 0.1), "
         "scheme (a or b; default a)"
     )
+
+
+def test_settings_go_to_the_methods_that_have_them() -> None:
+    names = ["lagrange/taylor", "exudyn_tree/rk67"]
+    assert settings_for(names, {"step": 1e-3}) == {"lagrange/taylor": {}, "exudyn_tree/rk67": {"step": 1e-3}}
+    with pytest.raises(
+        InputError, match=r"no setting 'stp', perhaps step; allowed: .*lagrange/taylor, exudyn_tree/rk67"
+    ):
+        settings_for(names, {"stp": 1e-3})
+    with pytest.raises(InputError, match=r"step = -1 is not allowed"):
+        settings_for(names, {"step": -1})
+
+
+def test_a_bench_keeps_settings_fixed_that_its_ladders_do_not_vary() -> None:
+    names = ("exudyn_tree/generalized_alpha", "lagrange/taylor")
+    fixed = with_settings(ladders(names), {"newton_relative_tolerance": 1e-6})
+    for ladder, plain in zip(fixed, ladders(names), strict=True):
+        own = {"newton_relative_tolerance": 1e-6} if ladder.method == names[0] else {}
+        assert ladder.choices == own | dict(plain.choices)
+    with pytest.raises(InputError, match="bench varies step itself"):
+        with_settings(ladders(names), {"step": 1e-3})
