@@ -33,8 +33,10 @@ from rotor_mbs.report.core.looks import (
     label_of,
     look_of,
 )
+from rotor_mbs.report.pages.scene_tables import range_table
 from rotor_mbs.report.plots import time_histories as figures
 from rotor_mbs.report.plots.paths import paths
+from rotor_mbs.store.read import open_results
 
 FIG11 = paper("fig11", samples=301)
 PLAIN = replace(FIG11, outputs=("angles",))
@@ -257,10 +259,11 @@ def test_energy_of_runs_that_ended_early_is_not_the_largest_of_the_finding(tmp_p
 def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) -> None:
     text = (report / "paper-fig11.html").read_text(encoding="utf-8")
     metrics = text[text.index('<section id="metrics">') :]
-    rows = dict(re.findall(r'<tr><th scope="row">([^<]*)</th><td>(.*?)</td>', metrics))
+    rows = dict(re.findall(r'<tr><th scope="row">([^<]*)<small>[^<]*</small></th><td>(.*?)</td>', metrics))
     assert rows["as printed, ode45"] == "runs to the end"
     assert rows["closed form, Taylor"] == '<span class="good">ok</span>'
     assert "is not thereby correct" in metrics
+    assert "<small>lagrange/taylor</small>" in metrics  # the name that the command line and the file have
 
 
 def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None:
@@ -274,6 +277,17 @@ def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None
         assert look.colour in (*COLOURS, GREY)
     assert look_of("mine/own").colour == GREY
     assert label_of("mine/own") == "mine/own"
+
+
+def test_extremes_are_those_of_the_points_that_the_published_numbers_are_read_off(tmp_path: Path) -> None:
+    """A crest between two samples: the table and the claim beside it must not differ."""
+    narrow = rotor(lambda t: 0.5 + 0.2315 * np.exp(-(((t - 5.02) / 0.01) ** 2)))
+    runs = [Made(FIG11, PRINTED, narrow, refined=True)]
+    with open_results(store(tmp_path / "r.h5", runs)) as opened:
+        run = opened.scenes["paper/fig11"].runs[PRINTED]
+        assert run.array("angles").max() < run.array("refined_angles").max()
+        (first, *_) = range_table({"As printed": run}).rows
+        assert str(first[1]).endswith(numbers.number(float(run.array("refined_angles")[:, 0].max()), 4))
 
 
 def test_no_caption_repeats_its_heading(report: Path) -> None:

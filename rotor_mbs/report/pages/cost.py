@@ -11,7 +11,6 @@ from rotor_mbs.report.core.elements import (
     Picture,
     Row,
     Section,
-    TableCell,
     line_entry,
     mark_entry,
 )
@@ -19,6 +18,7 @@ from rotor_mbs.report.core.looks import label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.bench_tables import target_text
+from rotor_mbs.report.pages.scene_tables import method_cell
 from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
 from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
@@ -75,7 +75,7 @@ def _times_table(curves: Sequence[Record]) -> PageTable:
     rows: list[Row] = []
     for curve in curves:
         good = succeeded(curve)
-        cell = TableCell(label_of(curve.name), note=curve.name)
+        cell = method_cell(curve.name)
         if not good.any():
             rows.append([cell, NOTHING, NOTHING])
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.exact import escape_rate
@@ -14,6 +15,8 @@ from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.store.read import StoredRun, StoredScene
+
+Array = NDArray[np.float64]
 
 
 def status_text(status: str) -> str:
@@ -26,6 +29,12 @@ def status_cell(run: StoredRun) -> TableCell | str:
     if run.status == "ok":
         return TableCell("ok", tone="good") if is_corrected(run.method) else "runs to the end"
     return TableCell(status_text(run.status), tone="bad")
+
+
+def method_cell(name: str) -> TableCell | str:
+    """A method's label, and below it the name that the command line and the file have."""
+    label = label_of(name)
+    return label if label == name else TableCell(label, note=name)
 
 
 def metric(run: StoredRun, name: str) -> float | None:
@@ -61,7 +70,7 @@ def _metrics_row(run: StoredRun) -> Row:
     counts = [metric(run, name) for name in ("steps", "rhs_evaluations")]
     texts += ["" if count is None else f"{count:.0f}" for count in counts]
     texts += [prefixed(metric(run, name), "s") for name in ("setup_time_s", "run_time_s")]
-    return [label_of(run.method), status_cell(run), *texts]
+    return [method_cell(run.method), status_cell(run), *texts]
 
 
 def _zero_pitch(run: StoredRun) -> str:
@@ -108,27 +117,34 @@ def failures(scene: StoredScene) -> list[str]:
 
 
 def range_table(runs: Mapping[str, StoredRun]) -> PageTable:
-    """Extremes of each coordinate in each of the runs (heading -> run)."""
+    """Extremes of each coordinate in each of the runs (heading -> run), where they are known from the integrator's own
+    output points, as the published numbers are: a sample need not meet a crest."""
     head = ["Coordinate"]
     columns: list[list[str]] = []
     for heading, run in runs.items():
         if "angles" in run:
-            low, high = run.array("angles").min(axis=0), run.array("angles").max(axis=0)
+            angles = _finest(run, "angles")
+            low, high = angles.min(axis=0), angles.max(axis=0)
             head.append(f"{heading}: angle (rad)")
             columns.append([f"{number(a, 4)} to {number(b, 4)}" for a, b in zip(low, high, strict=True)])
         if "rates" in run:
             head.append("largest rate (rad/s)")
-            columns.append([number(x, 3) for x in np.abs(run.array("rates")).max(axis=0)])
+            columns.append([number(x, 3) for x in np.abs(_finest(run, "rates")).max(axis=0)])
     labels = next(iter(runs.values())).labels
     rows = [[label, *(column[i] for column in columns)] for i, label in enumerate(labels)]
     return PageTable("Extremes", head, rows, numeric=range(1, len(head)))
+
+
+def _finest(run: StoredRun, name: str) -> Array:
+    refined = f"refined_{name}"
+    return run.array(refined if refined in run else name)
 
 
 def difference_table(runs: Mapping[str, StoredRun]) -> PageTable:
     """Errors of each run against the reference."""
     head = ("Method", "Up to the horizon (rad)", "Whole run (rad)", "At the end (rad)")
     names = ("angle_error_max", "angle_error_whole", "angle_error_end")
-    rows = [[label_of(name), *(number(metric(run, n)) for n in names)] for name, run in runs.items()]
+    rows = [[method_cell(name), *(number(metric(run, n)) for n in names)] for name, run in runs.items()]
     caption = "Largest difference from the reference, over all angles"
     return PageTable(caption, head, rows, numeric=(1, 2, 3)).without_empty_columns()
 
@@ -141,7 +157,7 @@ def energy_table(runs: Mapping[str, StoredRun]) -> PageTable:
         kinetic = float(run.array("kinetic_energy").max()) if "kinetic_energy" in run else None
         work = float(run.array("work")[-1]) if "work" in run and run.array("work").any() else None
         joules = [prefixed(x, "J") for x in (kinetic, work, metric(run, "energy_gain_J"))]
-        rows.append([label_of(name), *joules, number(metric(run, "energy_drift_max"))])
+        rows.append([method_cell(name), *joules, number(metric(run, "energy_drift_max"))])
     return PageTable("", head, rows, numeric=(1, 2, 3, 4)).without_empty_columns()
 
 
