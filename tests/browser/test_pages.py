@@ -22,6 +22,7 @@ import pytest
 from support.devtools import PROGRAM, Page
 from support.scenes import paper
 from support.stored import Made, rotor, store
+from support.sweeps import made_sweep
 
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.modes import write_modes_pages
@@ -49,6 +50,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
         runs.append(Made(scene, "printed/ode45", lambda t, c=curve: 1.1 * c(t), until=0.7, gain=1e6))
     results = store(folder / "r.h5", runs)
     out = write_report(results, folder / "out").parent
+    sweep = write_report(made_sweep(folder), folder / "sweep")
+    shutil.copy(sweep, out / "sweep.html")
     modes = write_modes_pages([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])], folder / "modes")
     return shutil.copy(modes, out / "modes.html").parent
 
@@ -159,7 +162,8 @@ def test_the_viewer_obeys_the_keyboard(page: Page, pages: list[Path]) -> None:
     page.key("Home", number=36)
     page.key(".", "Period", 190)
     time.sleep(0.2)
-    assert page.run(clock) == "0.05 s"  # one frame, which is one of 200 sample intervals
+    step = page.run("JSON.parse(document.querySelector('.viewer script').textContent).step")
+    assert page.run(clock) == f"{step:.2f} s"  # one frame
 
 
 def _fast() -> list[Made]:

@@ -19,7 +19,7 @@ from support.stored import Made, rotor, store
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.core import numbers, svg
+from rotor_mbs.report.core import canvas, numbers, svg
 from rotor_mbs.report.core.canvas import panels
 from rotor_mbs.report.core.elements import LegendEntry
 from rotor_mbs.report.core.files import page_names
@@ -180,6 +180,15 @@ def test_a_picture_has_every_point_label_and_colour_of_its_axes() -> None:
         drawn.cumsum(axis=0) + np.array([x, y]), wanted * (1, -1) + np.array([0.0, height]), atol=0.11
     )
     assert marks.count("M") == len(wanted)
+
+
+def test_no_tick_stands_outside_its_axes() -> None:
+    picture = panels((2.0,), "time (s)")
+    axes = picture.axes[0]
+    axes.plot([0.0, 1.0], [1e-16, 1e-13])
+    canvas.log_axis(axes, 1e-16, 1e-13)
+    text = svg.drawing(picture, "n", "t", "d")
+    assert re.findall(r">(10[⁻\d⁰¹²³⁴-⁹]+)<", text) == ["10⁻¹⁶", "10⁻¹⁵", "10⁻¹⁴", "10⁻¹³"]
 
 
 def test_every_colour_of_a_picture_is_in_the_style_sheet_light_and_dark(report: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
+from support.sweeps import made_sweep
 
 from rotor_mbs.analysis.errata import CheckedEntry
 from rotor_mbs.report.build import write_report
@@ -16,10 +17,6 @@ from rotor_mbs.report.core.files import Site
 from rotor_mbs.report.pages.formulas import formula, matrices
 from rotor_mbs.report.pages.sweep import field_name
 from rotor_mbs.report.plots.sweep import distribution
-from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.store.sweep_dataset import SweepDataset
-from rotor_mbs.studies.sweep import plan_sweep
-from rotor_mbs.studies.sweep_work import rows_of
 
 FIG11 = paper("fig11", samples=101)
 SWING = rotor(lambda t: 0.5 + 0.2 * t, lambda t: np.sin(t), np.cos, np.sin)
@@ -42,24 +39,9 @@ def test_a_single_page_needs_no_navigation() -> None:
     assert Site((("index.html", "Overview"),)).links("paper-fig11.html") == [("index.html", "Overview", False)]
 
 
-def _sweep(folder: Path, text: str) -> Path:
-    (folder / "s.toml").write_text(text)
-    plan = plan_sweep(load_sweep(folder / "s.toml"), (), (1, 1), 60.0)
-    with SweepDataset(folder / "s.h5", plan.layout) as dataset:
-        for chunk in plan.chunks(dataset.missing()):
-            dataset.write(chunk.first, rows_of(chunk))
-    return folder / "s.h5"
-
-
 def test_a_sweep_has_a_page_from_its_dataset_alone(tmp_path: Path) -> None:
     pytest.importorskip("heyoka")
-    path = _sweep(
-        tmp_path,
-        'title = "Speed & stiffness"\nscene = "paper/fig06"\nsamples = 51\noutputs = []\npicture = "map"\n'
-        '[change]\n"initial.angles[1]" = 1e-6\nduration = 2\n'
-        '[[axis]]\nkey = "bearing.stiffness"\nlinear = {start = 500, end = 40000, count = 3}\n'
-        '[[axis]]\nkey = "initial.rates[0]"\nlinear = {start = 0.25, end = 20, count = 4}\n',
-    )
+    path = made_sweep(tmp_path)
     text = write_report(path, tmp_path / "out").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert "<h1>Speed &amp; stiffness</h1>" in text
     assert "12 runs of paper/fig06 by lagrange/taylor" in text

@@ -227,10 +227,10 @@ class _Page:
 
 def _ticks(axis: Any) -> tuple[Array, Sequence[str]]:
     """Places and labels of the major ticks within the axis."""
-    low, high = sorted(axis.get_view_interval())
-    places = np.asarray(axis.get_majorticklocs(), float)
-    margin = 1e-6 * (high - low)
-    places = places[(places >= low - margin) & (places <= high + margin)]
+    places, scale = np.asarray(axis.get_majorticklocs(), float), axis.get_transform()
+    low, high = sorted(scale.transform(axis.get_view_interval()))
+    at, margin = scale.transform(places), 1e-6 * (high - low)
+    places = places[(at >= low - margin) & (at <= high + margin)]
     return places, axis.get_major_formatter().format_ticks(places) if len(places) else []
 
 

@@ -138,8 +138,9 @@ def energy_picture(runs: Sequence[StoredRun], horizon: float | None) -> Picture 
     if not series:
         return None
     caption = "Energy that comes from nothing: total energy less the work done, from its start"
-    notes = ["The axis is straight about zero and logarithmic beyond."]
     panels = comparisons.energy_from_start(series, horizon)
+    is_bent = panels.axes[0].get_yscale() == "symlog"
+    notes = ["The axis is straight about zero and logarithmic beyond."] if is_bent else []
     return picture(panels, "energy", caption, f"{caption}: {'; '.join(sizes)}.", notes, legend)
 
 
