@@ -136,7 +136,7 @@ def _numbers(value: Any, where: str = "") -> Iterator[tuple[str, Any]]:
 
 _SCENE_NUMBERS = (
     "gravity", "hub_inertia", "initial_angles", "initial_rates", "rotor_torque", "bearing_stiffness",
-    "bearing_damping", "shaft_damping",
+    "bearing_damping", "shaft_damping", "pitch_torque", "bearing_rest",
 )  # fmt: skip
 
 
@@ -176,4 +176,28 @@ def test_every_number_of_a_scene_counts(method: str, share: float, every: int, t
         if not failed(judged(path)):
             survivors.append(name)
     assert count == len(range(0, 63, every))
+    assert survivors == []
+
+
+@pytest.mark.parametrize(
+    ("method", "share", "every"),
+    [
+        ("lagrange/dop853", 1e-4, 5),
+        pytest.param("lagrange/dop853", 1e-4, 1, marks=pytest.mark.slow),
+        pytest.param("exudyn_tree/rk67", 1e-4, 1, marks=pytest.mark.slow),
+    ],
+)
+def test_every_number_of_torques_and_commands_of_pitches_counts(
+    method: str, share: float, every: int, tmp_path: Path
+) -> None:
+    """Times of jumps and kinks, too."""
+    scene = shipped("check/pitch-loads")
+    path = results_file(tmp_path / "numbers.h5", [scene.name], [])
+    wrong = [one for one in wrong_scenes(scene, share) if one[0].startswith(("pitch_torque", "bearing_rest"))]
+    survivors = []
+    for name, changed in wrong[::every]:
+        add_run(path, scene, solve(method, changed, {}))
+        if not failed(judged(path)):
+            survivors.append(name)
+    assert len(wrong) == 20
     assert survivors == []

@@ -433,14 +433,18 @@ def _verdicts_of(group: str) -> Iterator[list[Any]]:
         for one in check_probes.measure(probe):
             yield [check.judge_measured(one, load_bounds())]
     batches = {
-        "lagrange": [(("check/held",), "lagrange/dop853"), (("check/general",), "lagrange/dop853")],
+        "lagrange": [(("check/held",), "lagrange/dop853"), (("check/general",), "lagrange/dop853"),
+                     (("check/pitch-loads",), "lagrange/dop853")],
         "printed": [(("check/point-masses", "paper/fig04b"), "printed/ode45"),
                     (("paper/fig05", "paper/fig11"), "printed/ode45")],
         "multibody": [(("check/held",), "exudyn_tree/rk67"), (("check/general",), "exudyn_tree/rk67"),
+                      (("check/pitch-loads",), "exudyn_tree/rk67"),
                       (("check/held",), "exudyn_chain/generalized_alpha")],
         "chain": [(("check/held",), "exudyn_chain/generalized_alpha"),
-                  (("check/general",), "exudyn_chain/generalized_alpha")],
-        "mujoco": [(("check/held",), "mujoco/rk4"), (("check/general",), "mujoco/rk4")],
+                  (("check/general",), "exudyn_chain/generalized_alpha"),
+                  (("check/pitch-loads",), "exudyn_chain/generalized_alpha")],
+        "mujoco": [(("check/held",), "mujoco/rk4"), (("check/general",), "mujoco/rk4"),
+                   (("check/pitch-loads",), "mujoco/rk4")],
         "rules": [],
     }  # fmt: skip
     from support.checking import judged, results_file

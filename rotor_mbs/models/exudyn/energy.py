@@ -47,8 +47,8 @@ def work(scene: Scene, segments: Sequence[LoadSegment], time: Array, angles: Arr
     """
     drives = _drives(scene)
     if not work_needs_rows(scene):
-        exact = np.zeros(len(time))
-        for column, terms in drives:
+        exact: Array = scene.torque_at(0.0) * (angles[:, 0] - angles[:1, 0])
+        for column, terms in drives[1:]:
             for load, _ in terms:
                 exact = exact + segments[0].values[load] * (angles[:, column] - angles[:1, column])
         return exact

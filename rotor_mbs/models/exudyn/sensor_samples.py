@@ -131,8 +131,9 @@ def _fields(
         tips = [read.sampled(f"tip {i + 1}") for i in range(len(scene.blades))]
         fields["tip"] = np.stack(tips, axis=1)
     if scene.wants("energy"):
-        done = energy.work(scene, segments, read.time, angles, rates)[read.samples]
-        fields["work"] = done + energy.work_of_rests(scene, fields["angles"])
+        fields["work"] = energy.work(scene, segments, read.time, angles, rates)[read.samples]
+        if any(scene.bearing_rest):
+            fields["work"] += energy.work_of_rests(scene, fields["angles"])
         fields["potential_energy"] = energy.spring_energy(scene, fields["angles"])
         fields["kinetic_energy"] = np.zeros(len(read.samples))
         for name, body in bodies:

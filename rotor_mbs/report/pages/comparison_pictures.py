@@ -1,4 +1,4 @@
-"""Pictures of a scene in which the printed model stands beside the corrected one: motion, energy, tips, drive."""
+"""Pictures of a scene in which the printed model stands beside the corrected one: motion, energy, tips."""
 
 from __future__ import annotations
 
@@ -183,18 +183,3 @@ def _path_picture(name: str, run: StoredRun) -> Picture:
         text += f"; the rotor ends {number(turned, 3)} rad from its start"
     text += f"; tips leave the plane of rotation by up to {prefixed(float(np.abs(tip[:, :, 1]).max()), 'm')}."
     return picture(paths.paths(tip), name, with_capital(label), text)
-
-
-def drive_section(stored: StoredScene, run: StoredRun | None) -> Section:
-    """Torque and power of the rotor's drive; empty where there is none."""
-    scene = scene_of(stored)
-    if scene is None or run is None or "rates" not in run or not scene.has_torque:
-        return Section()
-    time = run.array("time")
-    torque = np.array([scene.torque_at(float(t)) for t in time])
-    power = torque * run.array("rates")[:, 0]
-    work = float(np.trapezoid(power, time)) if len(time) > 1 else 0.0
-    caption = f"Rotor torque and its power; work {prefixed(work, 'J')}"
-    most = [prefixed(float(np.abs(x).max()), unit) for x, unit in ((torque, "N m"), (power, "W"))]
-    described = f"{caption}: torque up to {most[0]}, power up to {most[1]}."
-    return Section([picture(comparisons.drive(time, torque, power), "drive", caption, described)])

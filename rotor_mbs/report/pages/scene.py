@@ -19,6 +19,7 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import claim_study, comparison_pictures, error_pictures, scene_tables
 from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages.cost import cost_section
+from rotor_mbs.report.pages.drive import drive_section
 from rotor_mbs.report.pages.quantities import quantity_sections
 from rotor_mbs.report.pages.scene_tables import metric
 from rotor_mbs.report.pages.viewer import viewer
@@ -103,7 +104,7 @@ def scene_page(
         "motion": motion_section(drawn),
         "difference": difference_section(drawn),
         "energy": energy_section(drawn),
-        "drive": comparison_pictures.drive_section(scene, drawn.corrected),
+        "drive": drive_section(scene, drawn.corrected),
         "cost": cost_section(scene, curves),
         "quantities": quantity_sections(scene, drawn.all, drawn.horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),

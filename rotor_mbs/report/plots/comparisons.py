@@ -129,12 +129,15 @@ def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]], lowest: f
     return picture
 
 
-def drive(time: Array, torque: Array, power_w: Array) -> Panels:
-    """Torque on the rotor (kN m) above its power (kW)."""
-    picture = canvas.panels((1.3, 1.3), TIME_AXIS)
-    for axes, values, label in zip(picture.axes, (torque, power_w), ("torque (kN m)", "power (kW)"), strict=True):
-        axes.plot(*thin(time, 1e-3 * values), color=coordinate_look(0).colour)
-        axes.set_ylabel(label)
+def stacked(rows: Sequence[tuple[str, Sequence[Series]]]) -> Panels:
+    """Panels one above the other, (label with a unit, curves) each; large numbers in k or M of the unit."""
+    picture = canvas.panels((1.3,) * len(rows), TIME_AXIS)
+    for axes, (label, curves) in zip(picture.axes, rows, strict=True):
+        largest = max(float(np.abs(one.values).max()) for one in curves)
+        factor, prefix = next(((f, p) for f, p in ((1e6, "M"), (1e3, "k")) if largest >= f), (1.0, ""))
+        for one in curves:
+            axes.plot(*thin(one.time, one.values / factor), color=one.look.colour, linestyle=one.look.line)
+        axes.set_ylabel(label.replace("(", f"({prefix}", 1))
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, 0.0), max(high, 0.0))
     return picture
