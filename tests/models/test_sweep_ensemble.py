@@ -93,7 +93,7 @@ def test_runs_side_by_side_are_the_runs_one_by_one(scenes: list[Scene]) -> None:
     for i, scene in enumerate(scenes):
         single = solve("lagrange/taylor", scene, {"tolerance": _EPS})
         assert block.integrations[i].success
-        assert block.integrations[i].steps == pytest.approx(single.integration.steps, abs=2)
+        assert 0 < block.integrations[i].steps <= single.integration.steps + 3  # most motions take fewer in momenta
         for name in _NAMES:
             expected, found = getattr(single.trajectory, name), getattr(block, name)[i]
             # Round-off of other instructions, which two seconds of fig11 carry on a thousandfold; rates by the

@@ -57,8 +57,8 @@ def accelerations(
     for weight, cos_phase, sin_phase in form.fixed:
         moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
     # s and c stand outside: an integrator that works with series pays for every product of two of them.
-    pitches = []
-    for blade, theta, rate, torque, rest in _pitches(form, angles, rates, loads):
+    pitched = []
+    for blade, theta, rate, torque, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
@@ -68,7 +68,7 @@ def accelerations(
         # ½ ∂a/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
         on_s = blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
         on_c = blade.half_slope_cs * c_turn - blade.weight_y * sin_phi
-        pitches.append((s, c, on_s, on_c, resistance))
+        pitched.append((s, c, on_s, on_c, resistance))
         # The rotor's moment, pitch eliminated; ½ ∂a/∂θ times drag: Coriolis, and b / Jzz times what turns the pitch.
         drag = 2.0 * (spin * rate) + (blade.ratio_s * s_turn + blade.ratio_c * c_turn)
         lever = blade.lever_cc * c + blade.lever_sc * s
@@ -80,13 +80,13 @@ def accelerations(
         schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
     rotor = moment / schur
     found = [rotor]
-    for blade, (s, c, on_s, on_c, resistance) in zip(form.blades, pitches, strict=True):
+    for blade, (s, c, on_s, on_c, resistance) in zip(form.blades, pitched, strict=True):
         driven = s * (on_s - blade.coupling_s * rotor) + c * (on_c - blade.coupling_c * rotor)
         found.append((driven - resistance) / blade.pitch_inertia)
     return found
 
 
-def _pitches(
+def pitches(
     form: RotorForm, angles: Sequence[Number], rates: Sequence[Number], loads: LoadValues
 ) -> Iterator[tuple[BladeForm, Number, Number, Number, Number]]:
     """Of each pitch that moves: blade, angle, rate, torque, rest angle."""
@@ -102,7 +102,7 @@ def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number
     """
     spin = rates[0]
     total = loads.rotor * spin - form.shaft_damping * (spin * spin)
-    for blade, rate, _, torque, rest in _pitches(form, rates, rates, loads):
+    for blade, rate, _, torque, rest in pitches(form, rates, rates, loads):
         total = total + (torque + blade.stiffness * rest) * rate - blade.damping * (rate * rate)
     return total
 
@@ -125,7 +125,7 @@ def energies(
     potential = 0.0 * sin_q
     for weight, cos_phase, sin_phase in form.fixed:
         potential = potential + weight * (cos_q * cos_phase - sin_q * sin_phase)
-    for blade, theta, rate, _, rest in _pitches(form, angles, rates, loads):
+    for blade, theta, rate, _, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
         kinetic = kinetic + _kinetic(blade, s, c, spin, rate)
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase

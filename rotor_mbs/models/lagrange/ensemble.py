@@ -1,12 +1,14 @@
 """Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure.
 
+In Hamilton's variables, whose equations take fewer and cheaper steps; what is stored are rates, as of a run alone.
+
 A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a sweep gives the same
 bits. Runs in one process and one thread: processes are the parallelism.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -15,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange import closed_form, hamilton
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.loads import sampled_loads
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
-from rotor_mbs.models.lagrange.samples import constant_work
+from rotor_mbs.models.lagrange.samples import at_constant_rests, constant_work
 from rotor_mbs.models.lagrange.system import (
-    build_system,
     compiled,
     equation_numbers,
     is_compact,
@@ -166,11 +167,33 @@ def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) ->
     """Compiled once per computer (engine's cache on disk)."""
 
     def make() -> Any:
-        equations = build_system(example).equations
+        equations = _equations(example)
         options = {"tol": tolerance, "compact_mode": is_compact(example), "high_accuracy": True}
         return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
 
     return compiled(("batch", tolerance, structure), make)
+
+
+def _equations(example: Scene) -> list[tuple[Any, Any]]:
+    """[(symbol, right-hand side)]: angles, momenta, and the work where it is not known in closed form."""
+    engine, parameters = heyoka(), Parameters()
+    form, loads = equation_numbers(example, parameters)
+    angles, momenta = state_symbols(form)
+    rates = hamilton.rates(angles, momenta, form, engine.sin, engine.cos)
+    forces = hamilton.forces(angles, rates, form, loads, engine.sin, engine.cos)
+    equations = [*zip(angles, rates, strict=True), *zip(momenta, forces, strict=True)]
+    if work_is_integrated(example):
+        equations.append((engine.make_vars("work"), closed_form.power(rates, form, at_constant_rests(example, loads))))
+    return equations
+
+
+def _converter(example: Scene, convert: Callable[..., list[Any]]) -> Any:
+    """Compiled code from angles and rates to momenta, or from angles and momenta to rates."""
+    engine, parameters = heyoka(), Parameters()
+    form, _ = equation_numbers(example, parameters)
+    angles, others = state_symbols(form)
+    rows = [engine.expression(0.0) + row for row in convert(angles, others, form, engine.sin, engine.cos)]
+    return engine.cfunc(rows, [*angles, *others], compact_mode=is_compact(example))
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
@@ -204,7 +227,7 @@ def _observables(example: Scene) -> Any:
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
-    """(rows, runs, samples): x y z in m of each blade's tip, then kinetic and potential energy in J, where asked for.
+    """(rows, runs, samples): what a compiled function gives, such as x y z in m of each tip, or the energies in J.
 
     states    (variables, runs, samples): angles and rates that move, rad and rad/s
     numbers   (parameters, runs): of equations and tips, then the pitches that are fixed
@@ -239,6 +262,9 @@ class _Group:
         self.integrator = _integrator(structure, tolerance, example)
         outputs = example.wants("tip"), example.wants("energy")
         self.observables = compiled(("observables", *outputs, structure), lambda: _observables(example))
+        to_momenta, to_rates = hamilton.momenta, hamilton.rates
+        self.to_momenta = compiled(("momenta", structure), lambda: _converter(example, to_momenta))
+        self.to_rates = compiled(("rates", structure), lambda: _converter(example, to_rates))
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
@@ -253,16 +279,19 @@ class _Group:
         width = self.integrator.state.shape[1]
         initial, times, numbers = self.initial[:, columns], self.times[:, columns], self.numbers[:, columns]
         states = np.empty((len(initial), len(columns), len(times)))
-        integrations = []
+        count, integrations = 2 * len(self.moving), []
+        start = initial.copy()
+        start[count // 2 : count] = _observed(self.to_momenta, initial[:, :, None], numbers)[:, :, 0]
         for i in range(0, len(columns), width):
             lanes = slice(i, i + width)
             self.integrator.set_time(np.zeros(width))
-            self.integrator.state[:] = initial[:, lanes]
+            self.integrator.state[:] = start[:, lanes]
             set_parameters(self.integrator, numbers[:, lanes])
             states[:, lanes] = self.integrator.propagate_grid(times[:, lanes])[1].transpose(1, 2, 0)
             for result in self.integrator.propagate_res:
                 message = failure(result[0])
                 integrations.append(Integration(not message, message, 0.0, int(result[3])))
+        states[count // 2 : count] = _observed(self.to_rates, states, numbers)
         states[:, :, 0] = initial  # which a run that fails in its first step has, too
         return states, integrations
 

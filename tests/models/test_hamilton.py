@@ -1,0 +1,105 @@
+"""Hamilton's equations are Lagrange's: exactly, in rational arithmetic, and along a run."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from support.references import reference, scene
+from support.scenes import general, paper
+
+from rotor_mbs.models.lagrange import hamilton
+from rotor_mbs.models.lagrange.closed_form import LoadValues, accelerations
+from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
+from rotor_mbs.scenario.scene import Scene
+
+
+class Exact:
+    """A rational number that takes floats for what they are."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value.value if isinstance(value, Exact) else Fraction(value)
+
+    def __add__(self, other: Any) -> Exact:
+        return Exact(self.value + Exact(other).value)
+
+    def __sub__(self, other: Any) -> Exact:
+        return Exact(self.value - Exact(other).value)
+
+    def __rsub__(self, other: Any) -> Exact:
+        return Exact(Exact(other).value - self.value)
+
+    def __mul__(self, other: Any) -> Exact:
+        return Exact(self.value * Exact(other).value)
+
+    def __truediv__(self, other: Any) -> Exact:
+        return Exact(self.value / Exact(other).value)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def sin(half_tangent: Exact) -> Exact:
+    """Of the angle whose half has this tangent: rational. An angle's own value enters the springs alone."""
+    t = half_tangent.value
+    return Exact(2 * t / (1 + t * t))
+
+
+def cos(half_tangent: Exact) -> Exact:
+    t = half_tangent.value
+    return Exact((1 - t * t) / (1 + t * t))
+
+
+def derivatives_of_momenta(angles: list[Exact], rates: list[Exact], found: list[Exact], form: RotorForm) -> list[Exact]:
+    """d(M q̇)/dt from accelerations: M q̈ + (dM/dt) q̇."""
+    spin, turned = rates[0], found[0]
+    total, out = form.inertia * turned, []
+    for blade, theta, rate, acceleration in zip(form.blades, angles[1:], rates[1:], found[1:], strict=True):
+        s, c = sin(theta), cos(theta)
+        a = blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
+        slope = (blade.inertia_ss - blade.inertia_cc) * (2 * (s * c)) + blade.inertia_sc * (c * c - s * s)
+        b, b_slope = blade.coupling_s * s + blade.coupling_c * c, blade.coupling_s * c - blade.coupling_c * s
+        total = total + a * turned + slope * rate * spin + b * acceleration + b_slope * (rate * rate)
+        out.append(b * turned + b_slope * rate * spin + blade.pitch_inertia * acceleration)
+    return [total, *out]
+
+
+@pytest.mark.parametrize(
+    "one", [general(), scene("check/general"), paper("fig11"), paper("fig03")], ids=lambda s: s.name
+)
+def test_both_forms_are_the_same_equations_exactly(one: Scene) -> None:
+    """Every term, at random rational states: no rounding, so that one wrong coefficient cannot hide in it."""
+    form, numbers = rotor_form(one, Exact), random.Random(5)
+
+    def some(count: int) -> list[Exact]:
+        return [Exact(Fraction(numbers.randint(-99, 99), numbers.randint(1, 50))) for _ in range(count)]
+
+    count = len(form.blades)
+    for _ in range(3):
+        angles, rates = some(1 + count), some(1 + count)
+        loads = LoadValues(some(1)[0], some(count), some(count))
+        p = hamilton.momenta(angles, rates, form, sin, cos)
+        rates_again = hamilton.rates(angles, p, form, sin, cos)
+        forces = hamilton.forces(angles, rates, form, loads, sin, cos)
+        expected = derivatives_of_momenta(angles, rates, accelerations(angles, rates, form, loads, sin, cos), form)
+        assert [one.value for one in rates_again] == [one.value for one in rates]
+        assert [one.value for one in forces] == [one.value for one in expected]
+
+
+def test_a_run_in_momenta_follows_the_reference() -> None:
+    """fig11 to its horizon, by Taylor's method at machine precision."""
+    heyoka = pytest.importorskip("heyoka")
+    one, exact = scene("paper/fig11"), reference("paper/fig11")
+    q, p = heyoka.make_vars(*(f"q{i}" for i in range(4))), heyoka.make_vars(*(f"p{i}" for i in range(4)))
+    form, loads = rotor_form(one), LoadValues(0.0)
+    rates = hamilton.rates(q, p, form, heyoka.sin, heyoka.cos)
+    forces = hamilton.forces(q, rates, form, loads, heyoka.sin, heyoka.cos)
+    angles, start = list(one.initial_angles), list(one.initial_rates)
+    state = [*angles, *hamilton.momenta(angles, start, form, np.sin, np.cos)]
+    integrator = heyoka.taylor_adaptive(
+        [*zip(q, rates, strict=True), *zip(p, forces, strict=True)], state, high_accuracy=True
+    )
+    states = integrator.propagate_grid(exact.time[:617])[-1]
+    assert np.abs(states[:, :4] - exact.angles[:617]).max() <= 1e-9
