@@ -14,14 +14,17 @@ import numpy as np
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
+from rotor_mbs.analysis.data_origin import copies, settings_faults, steps_off
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.rehydrate import Rehydrated, rehydrate
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
 from rotor_mbs.scenario.accuracy_bounds import Bounds
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import energy_slack, judge, quantity_bound, quantity_errors, start_slack
 from rotor_mbs.solution.metrics import Metrics, energy_scale, metrics_of
+from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
@@ -61,25 +64,37 @@ def verdicts(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds
     Raises InputError where a stored scene is none.
     """
     bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
-    shipped = {name: scene.reference for file in frozen for name, scene in file.scenes.items()}
+    shipped = {name: scene for file in frozen for name, scene in file.scenes.items()}
     found: list[Verdict] = []
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
         damages = _damages(results)
         for scene in results.scenes.values():
+            own = bounds.for_scene(scene.name if _is_shipped(scene) else "")
+            known = shipped.get(scene.name) if own.scene else None
             for run in scene.runs.values():
-                found += _of_stored_run(scene, run, bounds, damages.pop(f"{scene.name}/{run.method}", []))
-            found += _of_reference(scene, shipped.get(scene.name), bounds)
+                found += _of_stored_run(scene, run, own, damages.pop(f"{scene.name}/{run.method}", []))
+            found += _copies(scene, own)
+            found += _of_reference(scene, known.reference if known is not None else None, own)
         if results.scenes:
             found += [_integrity(place, "*", parts, bounds) for place, parts in damages.items()]
         found += _of_paper(results, bounds)
     return found
 
 
+def _is_shipped(scene: StoredScene) -> bool:
+    """Whether it is a scene of this package, number by number: the bounds of its name are for no other."""
+    try:
+        return any(scene_hash(one) == scene.attributes["scene_hash"] for one in find_scenes([scene.name]))
+    except InputError:
+        return False
+
+
 def _damages(results: OpenResults) -> dict[str, list[str]]:
     """Parts that are not what was written, by the path of their group; the root's is "file"."""
     found: dict[str, list[str]] = {}
-    for place, part in all_damages(results.root):
-        found.setdefault(place or "file", []).append(part)
+    with reading(results.path):
+        for place, part in all_damages(results.root):
+            found.setdefault(place or "file", []).append(part)
     return found
 
 
@@ -100,6 +115,24 @@ def _of_stored_run(scene: StoredScene, run: StoredRun, bounds: Bounds, damages: 
     except StoreError as exc:
         found.append(_make("complete", run, "all", math.nan, bounds, "faults", str(exc)))
     return found
+
+
+def _copies(scene: StoredScene, bounds: Bounds) -> list[Verdict]:
+    """One verdict for a scene with several runs; where there are copies, one for each pair."""
+    if len(scene.runs) < 2:
+        return []
+    try:
+        found = {(run, other): place for run, other, place in copies(scene)}
+    except StoreError:
+        return []  # the run that cannot be read has failed already
+    if not found:
+        bound = bounds.of("copied", "*").value
+        return [Verdict("copied", scene.name, "*", "all", 0.0, bound, "columns", "no two runs have the same bits")]
+    look = "{} is that of {} bit for bit: data stored, or read, under another method's name"
+    return [
+        _make("copied", run, place, 1.0, bounds, "columns", look.format(place, other))
+        for (run, other), place in found.items()
+    ]
 
 
 def _make(check: str, run: StoredRun, channel: str, value: float, bounds: Bounds, unit: str, look_at: str) -> Verdict:
@@ -126,6 +159,7 @@ def _of_run(run: StoredRun, bounds: Bounds, found: Rehydrated, motion_ends: bool
     if found.run is None:
         return
     yield _status(run, bounds, found, found.run)
+    yield from _of_settings(run, bounds, found.scene)
     if len(found.run.trajectory.time):
         yield from _of_samples(run, bounds, found.scene, found.run)
         if is_corrected(run.method) and run.method != REFERENCE:
@@ -142,6 +176,15 @@ def _status(run: StoredRun, bounds: Bounds, found: Rehydrated, recorded: Solutio
     return _make("status", run, "status", float(faults), bounds, "faults", look)
 
 
+def _of_settings(run: StoredRun, bounds: Bounds, scene: Scene) -> Iterator[Verdict]:
+    faults = settings_faults(run)
+    look = "; ".join(faults) or "the method's, each within its range"
+    yield _make("settings", run, "settings", float(len(faults)), bounds, "faults", look)
+    steps = steps_off(scene, run, bounds.scene)
+    if steps is not None:
+        yield _make("steps", run, "steps", steps[0], bounds, "relative", steps[1])
+
+
 def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution) -> Iterator[Verdict]:
     """What the samples say of each other, whatever equations moved them."""
     trajectory = recorded.trajectory
@@ -156,6 +199,13 @@ def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution
         length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
         look = "the tip point, a phase, or the rotation of a blade"
         yield _make("tip", run, "tip", float(away) / length, bounds, "of length", look)
+    if trajectory.energy_error is not None:
+        own = energy_error(trajectory)
+        off = math.nan if own is None else float(np.abs(trajectory.energy_error - own).max())
+        look = "the balance is not that of the stored energies"
+        yield _make(
+            "energies", run, "energy error", off / (energy_scale(scene, trajectory) or 1.0), bounds, "of scale", look
+        )
     if scene.wants("rates") and trajectory.kinetic_energy is not None:
         for name, off in _energies_off(scene, trajectory).items():
             look = "its own angles and rates give another energy: a mass, an inertia, a spring"
@@ -199,6 +249,9 @@ def _of_corrected_model(run: StoredRun, bounds: Bounds, found: Rehydrated, traje
         look = f"{metrics['angle_error_max']:.1e} rad up to {metrics['horizon_s']:.2f} s: a term, a parameter, the step"
         error = max(metrics["angle_error_per_growth"] - start_slack(scene), 0.0)
         yield _make("agreement", run, "angles", error, bounds, "per growth", look)
+        if bounds.find("horizon", run.method):
+            look = "the README's promise, up to the horizon"
+            yield _make("horizon", run, "angles", metrics["angle_error_max"], bounds, "rad", look)
     if "energy_drift_max" in metrics:
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
         look = "a force without its potential, a wrong mass matrix, or too long a step"
@@ -238,12 +291,25 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
             if name in stored:
                 off = _distance(shipped.array(name), stored.array(name))
                 yield _make("reference", stored, name, off, bounds, "rad, rad/s", look)
+        for name, check in (("error_growth", "growth"), ("angle_uncertainty", "uncertainty")):
+            if name in shipped:
+                off = _log_distance(shipped, stored, name)
+                yield _make(check, stored, name.replace("_", " "), off, bounds, "log", look)
 
 
 def _distance(first: Array, second: Array) -> float:
     if first.shape != second.shape or second.dtype.kind != "f":
         return math.nan
     return float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max()) if first.size else 0.0
+
+
+def _log_distance(shipped: StoredRun, stored: StoredRun, name: str) -> float:
+    """Largest |ln| of the ratio, as far as both are positive and finite; NaN where one is missing."""
+    first, second = shipped.array(name), stored.array(name) if name in stored else np.empty(0)
+    if first.shape != second.shape or second.dtype.kind != "f":
+        return math.nan
+    used = np.isfinite(first) & (first > 0.0)
+    return float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
 
 
 def _of_paper(results: OpenResults, bounds: Bounds) -> Iterator[Verdict]:

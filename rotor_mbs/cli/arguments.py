@@ -202,6 +202,7 @@ def _add_check(commands: _Commands) -> None:
     )
     check.add_argument("--speed", action="store_true", help="run times too, against a calibration run")
     check.add_argument("-v", "--verbose", action="store_true", help="print verdicts that pass, too")
+    check.add_argument("--margins", action="store_true", help="a table: largest value seen, bound, ratio, by method")
     _add_jobs(check)
 
 

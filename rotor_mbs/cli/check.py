@@ -48,6 +48,8 @@ def check(arguments: argparse.Namespace) -> int:
     failed = [verdict for verdict in found if not verdict.passed]
     for verdict in found if arguments.verbose else failed:
         print(verdict_formats.line(verdict), file=stream)
+    if arguments.margins:
+        print(verdict_formats.margins(found), file=stream)
     if arguments.github:
         _tell_github(found, stream)
     runs = ", ".join(f"{count} {method}" for method, count in judged_runs(found).items())

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from rotor_mbs.analysis.verdicts import Verdict
+from rotor_mbs.solution.text_table import TextTable
 
 WORST = 10  # annotations: GitHub shows as many of a step and drops the others silently
 
@@ -136,3 +137,18 @@ def _add_suite(root: ElementTree.Element, scene: str, mine: Sequence[Verdict]) -
 def printable(text: str) -> str:
     """`text` with escapes for what controls a terminal or is not allowed in XML: control characters, surrogates."""
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
+
+
+def margins(verdicts: Sequence[Verdict]) -> TextTable:
+    """For every check, method and bound: the largest value that was seen, the bound, their ratio, and where."""
+    worst: dict[tuple[str, str, float], Verdict] = {}
+    for one in verdicts:
+        key = (one.check, one.method, one.bound)
+        if key not in worst or not one.value <= worst[key].value:
+            worst[key] = one
+    rows = []
+    for one in worst.values():
+        ratio = f"{one.margin:.3g}" if math.isfinite(one.margin) else "-"
+        texts = (one.check, one.method, f"{one.value:.2e}", f"{one.bound:.2e}", ratio, f"{one.scene} {one.channel}")
+        rows.append(tuple(map(printable, texts)))
+    return TextTable(("check", "method", "seen", "bound", "ratio", "where"), rows)

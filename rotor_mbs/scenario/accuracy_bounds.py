@@ -8,9 +8,10 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import reference_folder
@@ -18,8 +19,8 @@ from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 CHECKS = (
     "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "impulse", "loads", "gap",
-    "exact", "published", "reference", "growth", "integrity", "frozen", "symmetry", "order", "extrapolated",
-    "ensemble", "printed", "rules", "speed",
+    "exact", "published", "reference", "growth", "integrity", "copied", "settings", "steps", "uncertainty", "horizon",
+    "frozen", "symmetry", "order", "extrapolated", "ensemble", "printed", "rules", "speed",
 )  # fmt: skip
 
 
@@ -27,6 +28,7 @@ CHECKS = (
 class Bound:
     """The largest value that passes, in the check's own unit, for methods that `method` (a pattern with *) fits.
 
+    scenes   the shipped scenes it is for, patterns with | between them; "*" for any scene, a user's own too
     fault, known_fault   the value that a known fault gives, and which one: what the bound must stay below; a user's
                          bound may leave them out (infinity, "")
     """
@@ -37,13 +39,26 @@ class Bound:
     reason: str
     fault: float = math.inf
     known_fault: str = ""
+    scenes: str = "*"
+
+    def is_for(self, scene: str) -> bool:
+        """Whether it counts for a shipped scene, or for one that is not ("")."""
+        return any(fnmatchcase(scene, pattern) for pattern in self.scenes.split("|"))
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds in the order in which they are tried: the first entry whose check and method fit counts."""
+    """Bounds in the order in which they are tried: the first entry whose check, method and scene fit counts.
+
+    scene   the shipped scene that they are for; "" for any
+    """
 
     entries: Sequence[Bound]
+    scene: str = ""
+
+    def for_scene(self, scene: str) -> Bounds:
+        """The bounds on runs of a shipped scene, which are near to what is seen there."""
+        return replace(self, scene=scene)
 
     def of(self, check: str, method: str) -> Bound:
         """The first that fits. Raises InputError where none does: a check without a bound would pass anything."""
@@ -55,7 +70,7 @@ class Bounds:
     def find(self, check: str, method: str) -> Bound | None:
         """The first that fits, or None."""
         fitting = (one for one in self.entries if one.check == check and fnmatchcase(method, one.method))
-        return next(fitting, None)
+        return next((one for one in fitting if one.is_for(self.scene)), None)
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
         """Bounds that try `entries` first, then these.
@@ -64,7 +79,13 @@ class Bounds:
         >>> bounds.with_entries([Bound("energy", "mine/*", 1e-3, "explicit")]).of("energy", "mine/euler").value
         0.001
         """
-        return Bounds([*entries, *self.entries])
+        return replace(self, entries=[*entries, *self.entries])
+
+
+@functools.cache
+def expected_settings() -> dict[str, dict[str, Any]]:
+    """By method, `settings` and `steps` by scene, of reference/settings.toml. Raises InputError where it is no TOML."""
+    return read_toml(reference_folder() / "settings.toml")[1]
 
 
 @functools.cache

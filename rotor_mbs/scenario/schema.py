@@ -392,6 +392,7 @@ class BoundTable(Table):
     reason: Text = Field(description="a sentence")
     fault: NotNegative | None = Field(None, description="a number from 0 to 1e300")
     known_fault: Text | None = Field(None, description="a sentence")
+    scenes: Text | None = Field(None, description="shipped scenes, patterns with |")
 
     @field_validator("check")
     @classmethod

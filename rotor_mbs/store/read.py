@@ -60,11 +60,12 @@ class StoredRun:
         return list(self._group)
 
     def __contains__(self, name: str) -> bool:
-        return name in self._group
+        with self._reading(name):
+            return name in self._group
 
     def array(self, name: str) -> NDArray[Any]:
         """A dataset, whole. Raises StoreError where the run has none of that name, or it is not what was written."""
-        if name not in self._group:
+        if name not in self:
             raise StoreError(f"{self._group.file.filename}: {self._group.name} has no readable {name}")
         with self._reading(name):
             dataset = hdf5.member(self._group, name)

@@ -9,12 +9,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rotor_mbs.analysis.data_origin import defaults_faults
 from rotor_mbs.analysis.verdicts import Verdict, verdicts
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import OnProgress, Outcome, compute, ignore_progress
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
-from rotor_mbs.scenario.accuracy_bounds import Bounds
+from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import changed_arrays
@@ -65,7 +66,7 @@ def check_default_set(
     chosen: DefaultSet, bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress
 ) -> list[Verdict]:
     """Computes the set and judges it, and the frozen references and bounds that it is judged by."""
-    found = [*judge_bounds(bounds), *judge_frozen(bounds)]
+    found = [*judge_bounds(bounds), *judge_frozen(bounds), *judge_defaults(bounds)]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
         report = run_scenes(
@@ -134,6 +135,17 @@ def judge_bounds(bounds: Bounds) -> list[Verdict]:
         for one in bounds.entries
         if math.isfinite(one.fault)
     ]
+
+
+def judge_defaults(bounds: Bounds) -> list[Verdict]:
+    """Every built-in method's defaults against the settings that its bounds were found with."""
+    found = []
+    for method in expected_settings():
+        faults = defaults_faults(method)
+        look = "; ".join(faults) or "those that the bounds were found with"
+        bound = bounds.of("settings", method).value
+        found.append(Verdict("settings", "defaults", method, "defaults", float(len(faults)), bound, "faults", look))
+    return found
 
 
 def judge_frozen(bounds: Bounds) -> list[Verdict]:

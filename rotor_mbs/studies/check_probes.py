@@ -15,11 +15,12 @@ from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, Result
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, running_growth
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.studies.check_printed import differences
 from rotor_mbs.studies.check_status_rules import SCENE, known_runs, metrics_off, shares_off
 from rotor_mbs.studies.ensembles import compare_ensembles
@@ -63,6 +64,9 @@ def speed_probes() -> list[Case]:
     """Run times; meaningful on an idle machine alone."""
     return [probe("speed", "paper/fig11", method) for method in SPEED_RATIOS]
 
+
+# |ln| of the error growth: how far the difference quotients of the fallback may be off.
+_QUOTIENTS = 0.02
 
 _ORDER_STEPS = (0.002, 0.001, 0.0005, 0.00025)  # s
 
@@ -184,11 +188,24 @@ def _reference(case: Case) -> list[Verdict]:
         worst = found.angle_uncertainty.max()
         look += f"; a fallback in double precision, uncertain to {worst:.0e} rad, which is allowed for"
     growth = np.abs(np.log(running_growth(found) / running_growth(frozen)))
+    if not is_available():  # its difference quotients decide no horizon
+        growth = np.maximum(growth - _QUOTIENTS, 0.0)
     until = horizon_samples(frozen)
     return [
         measured(case, "recomputed angles", beyond, "rad", look),
         replace(measured(case, "error growth", float(growth[:until].max()), "log", look), check="growth"),
+        *_uncertainty(case, found.angle_uncertainty, frozen),
     ]
+
+
+def _uncertainty(case: Case, found: Array, frozen: Trajectory) -> list[Verdict]:
+    """|ln| of its ratio to the frozen one; that of the fallback is another, and allowed for above."""
+    if not is_available() or frozen.angle_uncertainty is None:
+        return []
+    used = (found > 0.0) & (frozen.angle_uncertainty > 0.0)
+    off = float(np.abs(np.log(found[used] / frozen.angle_uncertainty[used])).max(initial=0.0))
+    look = "the tolerances of the two quad precision runs, or what is made of their difference"
+    return [replace(measured(case, "angle uncertainty", off, "log", look), check="uncertainty")]
 
 
 def _printed(case: Case) -> Iterator[Verdict]:

@@ -55,13 +55,13 @@ def load_reference(path: Path, scene: Scene) -> Trajectory | None:
 
 
 def load_frozen(name: str) -> Trajectory:
-    """Angles, rates and error growth of the shipped reference of a shipped scene. Raises StoreError without one."""
+    """Angles, rates, error growth and uncertainty of a scene's shipped reference. Raises StoreError without one."""
     for path in shipped_files():
         with open_results(path) as results:
             stored = results.scenes[name].reference if name in results.scenes else None
             if stored is not None:
-                time, angles, rates, growth = map(stored.array, ("time", "angles", "rates", "error_growth"))
-                return Trajectory(time, angles, rates, error_growth=growth)
+                names = ("time", "angles", "rates", "error_growth", "angle_uncertainty")
+                return Trajectory(**{name: stored.array(name) for name in names})
     raise StoreError(f"{reference_folder()}: no frozen reference of {name}; `rotor-mbs reference` makes one")
 
 

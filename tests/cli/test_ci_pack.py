@@ -35,7 +35,7 @@ def loosened(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same run at a longer step: its error grows by orders of magnitude and stays below the bounds."""
     path = tmp_path_factory.mktemp("loosened") / "results.h5"
     scene = shipped(SCENE)
-    run_scenes([scene], {SCENE: [METHOD]}, path, workers=0, timeout_s=60.0, settings={"step": 0.005})
+    run_scenes([scene], {SCENE: [METHOD]}, path, workers=0, timeout_s=60.0, settings={"step": 0.0025})
     return path
 
 

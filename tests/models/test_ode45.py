@@ -141,6 +141,9 @@ def test_steps_after_failures_by_hand():
     # From 0.4 the step 0.1 meets the wall at 0.4041: then a tenth, 0.01, then halves: 0.005, 0.0025 fits.
     result = ode45(wall(0.4041), 1.0, [1.0])
     np.testing.assert_allclose(result.time[4:6], [0.4, 0.4025], rtol=1e-12)
+    # Wall at 0.4013: a tenth, 0.01, then three halvings, 0.00125; from one quartering on it would be 0.0025, 0.000625.
+    result = ode45(wall(0.4013), 1.0, [1.0])
+    np.testing.assert_allclose(result.time[4:6], [0.4, 0.40125], rtol=1e-12)
     # Wall at 0.45: 0.1 fails, 0.01 fits; no growth after it: 0.01 again; then 0.05 fails, 0.005 fits, and 0.005 again.
     result = ode45(wall(0.45), 1.0, [1.0])
     np.testing.assert_allclose(result.time[4:9], [0.4, 0.41, 0.42, 0.425, 0.43], rtol=1e-12)

@@ -107,7 +107,7 @@ def faulty_run(check_name: str, scene: Scene, method: str, share: float) -> Solu
     if check_name == "energy":
         motion = run.trajectory
         motion.kinetic_energy = kinematics.kinetic_energy(scene, motion.angles, motion.rates)
-        motion.potential_energy = kinematics.potential_energy(scene, motion.angles)
+        motion.potential_energy = kinematics.potential_energy(scene, motion.time, motion.angles)
     return run
 
 

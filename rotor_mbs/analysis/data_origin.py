@@ -1,0 +1,101 @@
+"""Whether stored data are those of the method they are stored under: copies, settings, steps. Reads the store alone."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import look_up
+from rotor_mbs.scenario.accuracy_bounds import expected_settings
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.record import Array
+from rotor_mbs.store.read import StoredRun, StoredScene
+
+_COMPARED = ("angles", "rates")
+# Of a column's largest value: below it a column is a straight line, which methods of any kind may give exactly.
+_STRAIGHT = 1e-12
+
+
+def copies(scene: StoredScene) -> Iterator[tuple[StoredRun, str, str]]:
+    """(run, other method, array and column) of every column that two runs of a scene have bit for bit.
+
+    Methods round differently, so that equal bits are a copy. Columns that are zero, constant or a straight line do not
+    count; nor do two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
+    """
+    found = {name: _bent_columns(run) for name, run in scene.runs.items()}
+    for first, second in itertools.combinations(scene.runs, 2):
+        if first.endswith("/ode45") and second.endswith("/ode45"):
+            continue
+        for place in sorted(found[first].keys() & found[second].keys()):
+            if found[first][place] == found[second][place]:
+                yield scene.runs[second], first, f"{place[0]} {place[1]}"
+
+
+def _bent_columns(run: StoredRun) -> dict[tuple[str, int], bytes]:
+    columns = {}
+    for name in _COMPARED:
+        values = run.array(name) if name in run else np.empty((0, 0))
+        if values.ndim == 2 and values.dtype.kind == "f" and len(values) > 2:
+            for i in range(values.shape[1]):
+                if _is_bent(values[:, i]):
+                    columns[name, i] = values[:, i].tobytes()
+    return columns
+
+
+def _is_bent(column: Array) -> bool:
+    return bool(np.abs(np.diff(column, 2)).max() > _STRAIGHT * np.abs(column).max())
+
+
+def settings_faults(run: StoredRun) -> list[str]:
+    """What is wrong with the stored settings: each of the method's must be there, none else, each within its range."""
+    method = look_up(run.method)
+    if method is None:
+        return []
+    stored = run.settings
+    faults = [f"{name} is missing" for name in method.defaults if name not in stored]
+    try:
+        method.settings.of(method.name, stored)
+    except InputError as exc:
+        faults += exc.problems
+    return faults
+
+
+def steps_off(scene: Scene, run: StoredRun, name: str) -> tuple[float, str] | None:
+    """(relative, text) how far the number of steps is from what settings and duration make it; None where not known.
+
+    A fixed step is shortened to fit the interval between samples. Of an adaptive method the number is known where the
+    scene's is on file, for the settings on file; `name` is that of the shipped scene, "" for any other.
+    """
+    method, steps = look_up(run.method), run.attributes.get("steps")
+    if method is None or steps is None or len(run.array("time")) < scene.samples:
+        return None
+    if run.settings.get("extrapolation", "none") != "none":  # several runs, each with its own step
+        return None
+    if method.fixed_step and "step" in run.settings:
+        interval = scene.duration / (scene.samples - 1)
+        expected = (scene.samples - 1) * math.ceil(interval / float(run.settings["step"]) - 1e-9)
+    else:
+        known = expected_settings().get(run.method)
+        if known is None or name not in known["steps"] or _differ(run.settings, known["settings"]):
+            return None
+        expected = known["steps"][name]
+    return abs(float(steps) / expected - 1.0), f"{steps} steps, {expected} by settings and duration"
+
+
+def defaults_faults(method: str) -> list[str]:
+    """Where a method's defaults are not the settings that its bounds were found with."""
+    found = look_up(method)
+    known = expected_settings().get(method)
+    if found is None or known is None:
+        return ["no settings on file"]
+    return _differ(found.defaults, known["settings"])
+
+
+def _differ(settings: Mapping[str, object], expected: Mapping[str, object]) -> list[str]:
+    names = {**settings, **expected}
+    return [f"{name} is {settings.get(name)}, {expected.get(name)} on file" for name in names
+            if settings.get(name) != expected.get(name)]  # fmt: skip
