@@ -18,6 +18,7 @@ from rotor_mbs.models.lagrange.ensemble import solve_many
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.methods import METHODS as PRINTED
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.sweep import sweep_of
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.record import Trajectory
 
@@ -259,6 +260,18 @@ def test_the_printed_equations_take_the_torques_of_the_pitches(pitches: int) -> 
     mean = [0.5 * (value_at(table, 0.0) + value_at(table, 1e-2)) for table in tables]
     assert found.work[-1] == pytest.approx(np.dot([1e5, *mean], found.angles[-1] - found.angles[0]), rel=1e-3)
     assert "pitch torque" in [item.name for item in PRINTED[0].items(scene)]
+
+
+def test_a_sweep_over_torque_and_command() -> None:
+    """Keys of a sweep name a blade's torque, and a row of a command's table."""
+    keys = {"torque.pitch[1]": [0.0, 50.0], "bearing.rest[0][1][1]": [0.1, 0.3]}
+    base = replace(EVERYTHING, bearing_rest=(((0.4, 0.0), (0.4, 0.3)),) * 3)
+    sweep = sweep_of(base, keys)
+    assert sweep.design.count == 4
+    scenes = [sweep.variants().scene(row) for row in sweep.design.rows(0, 4)]
+    assert {(one.pitch_torque[1] or ((0.0, 0.0),))[0][1] for one in scenes} == {0.0, 50.0}
+    assert {one.bearing_rest[0] for one in scenes} == {((0.4, 0.0), (0.4, 0.1)), ((0.4, 0.0), (0.4, 0.3))}
+    assert len({run(one, "lagrange/dop853").angles[-1, 1] for one in scenes}) == 4
 
 
 def test_a_pitch_torque_changes_nothing_where_it_is_zero() -> None:

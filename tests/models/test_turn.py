@@ -105,6 +105,18 @@ def test_the_motion_repeats_itself_after_a_turn_also_by_other_equations():
     assert turn.torque == pytest.approx(50.0 * 1.2, rel=0.05)
 
 
+def test_a_turn_with_torques_and_rest_angles_of_the_pitches():
+    scene = replace(
+        DAMPED, pitch_torque=(((0.0, 300.0),), (), ((0.0, -200.0),)), bearing_rest=((), ((0.0, 0.2),), ((0.0, -0.1),))
+    )
+    turn = periodic_turn(scene, 1.2)
+    end = oracle(scene, turn).y[:, -1]
+    np.testing.assert_allclose(end - turn.start, [2.0 * math.pi, *[0.0] * 7], atol=1e-9)
+    assert np.abs(turn.start[1:4] - periodic_turn(DAMPED, 1.2).start[1:4]).max() > 1e-3
+    sizes = np.abs(floquet(turn.transition, turn.flow, turn.gradient, 1.2).multipliers)
+    assert np.log(sizes).sum() == pytest.approx(turn.trace_integral, rel=1e-8)
+
+
 def test_the_product_of_the_multipliers_is_the_exponential_of_the_integrated_trace():
     turn = periodic_turn(DAMPED, 1.2)
     multipliers = floquet(turn.transition, turn.flow, turn.gradient, 1.2).multipliers

@@ -19,6 +19,7 @@ from rotor_mbs.cli.arguments import EXPORT_FORMATS
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of
 from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.studies.export import FORMATS, export
@@ -112,7 +113,7 @@ def test_the_mujoco_file_in_plain_mujoco(name: str, tmp_path: Path) -> None:
     assert np.abs(found[:200] - ours[: len(found)][:200]).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [*SCENES, "check/pitch-loads"])
 def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     scene, exact = references.scene(name), references.reference(name)
     (path,) = export(scene, "exudyn", tmp_path / "scene.py")
@@ -133,12 +134,12 @@ def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     assert np.abs(found.rates[:until] - ours.rates[:until]).max() < 1e-10
 
 
-@pytest.mark.parametrize("name", ["check/general", "check/held"])
+@pytest.mark.parametrize("name", ["check/general", "check/held", "check/pitch-loads"])
 def test_the_equations_solved_by_scipy(name: str, tmp_path: Path) -> None:
     pytest.importorskip("sympy")
     scene, exact = references.scene(name), references.reference(name)
     (path,) = export(scene, "sympy", tmp_path / "equations.py")
-    kinks = [time for time, _ in scene.rotor_torque if 0.0 < time < scene.duration]
+    kinks = knots(scene.load_tables, scene.duration)
     found = run_exported(tmp_path, SOLVED_BY_SCIPY, path, scene.duration, scene.samples, "OUT", *kinks)
     assert per_growth(scene, found, exact) < 1e-10
 
