@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from rotor_mbs.errors import RotorError
+from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.at_times import LEFT_OUT, motion_without
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.models.printed.matrices import Errata
@@ -27,6 +28,7 @@ from rotor_mbs.studies.data_causes import FEWEST, CauseSearch, factors, states_a
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 _EARLY = 10.0  # growth up to which a cause is tried first: most are refuted there
 _STEP = 1.25e-3  # s, of what is interpolated: of the printed equations' own run, its error is some 1e-9
+_LONGEST_S = 5.0  # of one run: a scene of the catalogue may be so stiff that it would take minutes
 _EARLY_ROWS = 40  # so many rows are tried first at most
 # Growth, and rows, up to which a parameter is fitted, one after another: a start too far off is useless once errors
 # have grown, and most parameters are refuted by the first rows.
@@ -52,8 +54,9 @@ def _fits(search: CauseSearch, motion: Motion) -> bool:
         if growth == _EARLY and len(inside) < FEWEST:
             continue
         try:
-            states = motion(data.time[inside])
-        except RotorError:
+            with time_limit(_LONGEST_S):
+                states = motion(data.time[inside])
+        except (RotorError, OutOfTimeError):
             return False
         expected = None if states is None else states[:, data.columns]
         if not search.misfit(data.time[inside], data.values[inside], expected) <= search.fitting:
