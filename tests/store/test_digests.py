@@ -14,6 +14,7 @@ from support.checking import failed, judged, results_file
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
 from rotor_mbs.scenario.sweep import load_sweep
+from rotor_mbs.store.digests import seal
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.store.sweep_dataset import StoredSweep
@@ -107,6 +108,44 @@ def test_a_merge_does_not_bless_what_was_damaged(copy: Path) -> None:
         in_last_bit(file[RUN]["angles"])
     results_file(copy, ["check/held"], ["lagrange/radau"])
     assert [one.method for one in failed(judged(copy)) if one.check == "integrity"] == [METHOD]
+
+
+def sealed_anew(file: h5py.File, group: str) -> None:
+    """Digests as a careful forger leaves them."""
+    del file[group].attrs["digests"]
+    seal(file[group])
+
+
+def test_a_growth_that_hides_an_error_is_found_behind_new_digests(copy: Path) -> None:
+    """With a growth of 1e6 at the second sample nothing is compared any more, and a wrong run could be called ok."""
+    with h5py.File(copy, "r+") as file:
+        file["check/held/reference/error_growth"][1] = 1e6
+        sealed_anew(file, "check/held/reference")
+    checks = {one.check for one in failed(judged(copy))}
+    assert "growth" in checks
+    assert "integrity" not in checks
+
+
+def test_an_energy_error_that_is_not_the_balance_is_found_behind_new_digests(copy: Path) -> None:
+    with h5py.File(copy, "r+") as file:
+        values = file[RUN]["energy_error"][()]
+        values[5] += 1.0
+        file[RUN]["energy_error"][...] = values
+        sealed_anew(file, RUN)
+    (found,) = failed(judged(copy))
+    assert (found.check, found.channel) == ("energies", "energy error")
+
+
+def test_settings_and_steps_that_are_not_the_methods_are_found_behind_new_digests(copy: Path) -> None:
+    with h5py.File(copy, "r+") as file:
+        file[RUN].attrs["settings"] = '{"step": 0.001}'
+        file[RUN].attrs["steps"] = 1
+        sealed_anew(file, RUN)
+    assert {one.check for one in failed(judged(copy))} == {"settings"}
+    with h5py.File(copy, "r+") as file:
+        file[RUN].attrs["settings"] = '{"absolute_tolerance": 1e-16, "relative_tolerance": 3e-14}'
+        sealed_anew(file, RUN)
+    assert {one.check for one in failed(judged(copy))} == {"steps"}
 
 
 # What is refused: links, other files' arrays, claims

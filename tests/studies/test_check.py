@@ -87,6 +87,15 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
         assert not failed(judge(load_bounds()))
 
 
+def test_margins_are_a_table_of_seen_bound_and_ratio(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = told(capsys, good, "--margins", status=0)
+    assert lines[0].split() == ["check", "method", "seen", "bound", "ratio", "where"]
+    rows = {tuple(line.split()[:2]): line.split()[2:] for line in lines[1:-2]}
+    seen, bound, ratio, scene, channel = rows["agreement", METHOD]
+    assert float(ratio) == pytest.approx(float(bound) / float(seen), rel=0.02)
+    assert (scene.split("/")[0], channel) == ("check", "angles")
+
+
 @pytest.mark.parametrize(
     "case",
     [case for case in probes() if case.study in ("printed", "rules") or case.method == "exudyn_tree/rk67"],
