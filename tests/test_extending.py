@@ -122,7 +122,7 @@ def test_wrong_settings_of_the_package_are_refused_with_its_own(installed: Insta
 
 def test_bench_measures_its_ladder_and_its_order(installed: Installed) -> None:
     installed.command(
-        "bench", installed.scene("one"), "-m", "outside/rk4", "-o", "bench.h5", "--repeats", "2", "--budget", "4"
+        "bench", installed.scene("one"), "-m", "outside/rk4", "-o", "bench.h5", "--repeats", "2", "--budget", "30"
     )
     with h5py.File(installed.folder / "bench.h5") as file:
         curve = file["bench/one/outside/rk4"]

@@ -46,7 +46,8 @@ _ENTRY_NAMES = {
 class Table(BaseModel):
     """A table of a file: exact types, no key but its fields. A field's description is what a message allows."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+    # Built when first used: a sweep needs neither bounds nor claims.
+    model_config = ConfigDict(defer_build=True, strict=True, extra="forbid", frozen=True)
 
 
 M = TypeVar("M", bound=Table)

@@ -72,7 +72,8 @@ def test_list_and_show(tmp_path: Path) -> None:
 def test_list_has_headings_for_scenes_sweeps_and_methods(tmp_path: Path) -> None:
     text = rotor_mbs("list", cwd=tmp_path).stdout
     headings = [line for line in text.splitlines() if line and not line.startswith(" ")]
-    assert headings[:-1] == ["scenes: check", "scenes: extreme", "scenes: paper", "scenes: stiff", "sweeps", "methods"]
+    assert headings[-3:-1] == ["sweeps", "methods"]
+    assert {"scenes: paper", "scenes: stiff"} <= set(headings[:-3])
     assert "  sweeps/fig11-spread" in text
     assert "  lagrange/taylor" in text
     rows = json.loads(rotor_mbs("list", "--json", cwd=tmp_path).stdout)
