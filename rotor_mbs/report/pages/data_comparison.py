@@ -37,7 +37,8 @@ def comparison_page(study: DataStudy) -> dict[str, object]:
         "agrees": verdict.agrees,
         "status": verdict.status,
         "lead": _lead(verdict),
-        "errors": Section([*_motion(study), *_errors(study)], _legend(study), [_table(verdict)]),
+        "errors": Section([*_motion(study), *_errors(study)], _legend(study)),
+        "channels": Section(tables=[_table(verdict)]),
         "read": verdict.read,
         "unused": verdict.unused,
         "notes": verdict.notes,
@@ -147,6 +148,4 @@ def _table(verdict: DataVerdict) -> PageTable:
                 with_unit(one.lag_s, "s"), number(one.scale - 1.0), with_unit(one.offset, one.unit),
             ]
         )  # fmt: skip
-    return PageTable(
-        "Channels up to the horizon", (*head, "constant lag", "scale less 1", "offset"), rows, tuple(range(1, 9))
-    )
+    return PageTable("", (*head, "constant lag", "scale less 1", "offset"), rows, tuple(range(1, 9)))
