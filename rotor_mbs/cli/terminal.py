@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
 # How a status is coloured on a terminal: well; open to doubt; anything else went wrong.
 _COLOURS = {"ok": "32", "inaccurate": "33", "unchecked": "33"}
 _BAD = "31"
-_STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'error', 'no_reference'))})\b")
+_STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
 
 
 def has_colour(stream: TextIO) -> bool:

@@ -59,6 +59,7 @@ def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -
     assert not has_colour(io.StringIO())
     monkeypatch.setenv("NO_COLOR", "1")
     assert not has_colour(Terminal())
+    assert coloured("largest error (rad)") == "largest error (rad)"
     assert coloured("17 of 17 ok") == "17 of 17 \x1b[32mok\x1b[0m"
 
 
