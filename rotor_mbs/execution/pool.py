@@ -258,7 +258,7 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
         task, error = waiting.pop(future), future.exception()
         if error is None:
             yield Finished(task, future.result())
-        elif isinstance(error, MemoryError | OSError | ResourceError):  # of the machine, not of the task
+        elif isinstance(error, MemoryError | OSError | ImportError | ResourceError):  # of the machine, not of the task
             yield Finished(task, None, "worker_died", f"not enough memory, files or processes: {one_line(error)}")
         elif (failure := pool.failure(error)) == "error":
             yield Finished(task, None, failure, one_line(error), error)
@@ -329,7 +329,8 @@ class _Process:
         except (OSError, RuntimeError, CancelledError) as exc:
             self.close()
             code = getattr(exc, "exitcode", None)
-            reason = f"exit code {code}" if code is not None else str(exc) or "ended by this process"
+            text = " ".join(str(exc).split())[:200] or "ended by this process"
+            reason = f"exit code {code}" if code is not None else text
             raise TaskLostError(f"its process died ({reason})", "worker_died") from None
 
     def cancel(self) -> None:

@@ -8,18 +8,26 @@ from __future__ import annotations
 import os
 import pkgutil
 import re
-from collections.abc import Callable
-from concurrent.futures import Future
+import socket
+import threading
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
 from typing import Any, TypeVar
 
-from rotor_mbs.errors import InputError
-from rotor_mbs.execution.pool import TaskPool, WorkerPool
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.execution.pool import TaskPool, WorkerPool, one_line
+from rotor_mbs.execution.provenance import fingerprint, versions
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 _CONNECT_S = 3.0
+_NO_WORKERS_S = 30.0
+# Of the package: all that decides a number of a sweep.
+_CODE = ("scenario", "solution", "methods", "models", "execution", "store", "studies")
 
 # By its name: only the workers import it.
 _LOAD = "rotor_mbs.studies.sweep_work:prepare"
@@ -56,6 +64,17 @@ def _open_cluster(address: str) -> Cluster:
         raise InputError(f"--engine dask:{address}: no dask scheduler answers there; allowed: {ENGINE_FORMS}")
     make: Any = Client
     client = make(address, timeout=_CONNECT_S, set_as_default=False)
+    try:
+        for worker, found in client.run(identity).items():
+            _refuse_others(identity(), found, f"worker {worker}")
+    except BaseException as exc:
+        client.close()
+        if isinstance(exc, InputError):
+            raise
+        raise InputError(
+            f"--engine dask:{address}: a worker cannot tell its version ({one_line(exc)}); allowed: workers with "
+            "the same versions and code"
+        ) from exc
     workers = sum(client.nthreads().values())
     if not workers:
         client.close()
@@ -64,25 +83,71 @@ def _open_cluster(address: str) -> Cluster:
 
 
 class Cluster:
-    """Runs tasks on the workers of a dask client; a TaskPool."""
+    """Runs tasks on the workers of a dask client; a TaskPool.
+
+    A scheduler that is gone, or has no worker for a while, is a StoreError: what is stored is kept.
+    """
 
     shares_disk = False
 
     def __init__(self, client: Any, workers: int) -> None:
         self._client, self.workers = client, workers
         self._executor = client.get_executor(pure=False)  # two equal calls are two runs
+        self._waiting: set[Future[Any]] = set()
+        self._is_closed = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
-        future: Future[R] = self._executor.submit(_with_time_limit, work, task, timeout_s)
+        self._refuse_without_scheduler()
+        future: Future[R] = self._executor.submit(run_as_worker, work, task, timeout_s, identity())
+        self._waiting.add(future)
+        future.add_done_callback(self._waiting.discard)
         return future
 
     def failure(self, error: BaseException) -> str:
         from distributed import KilledWorker
 
-        return "worker_died" if isinstance(error, KilledWorker) else "error"
+        self._refuse_without_scheduler()
+        return "worker_died" if isinstance(error, KilledWorker | CancelledError) else "error"
 
     def close(self) -> None:
+        self._is_closed.set()
         self._client.close()
+
+    def _refuse_without_scheduler(self) -> None:
+        if self._client.status != "running":
+            raise StoreError("--engine dask: the scheduler is gone; what is stored is kept, the same command goes on")
+
+    def _watch(self) -> None:
+        """A cluster whose last worker is gone would be waited for without end."""
+        without_since = time.monotonic()
+        while not self._is_closed.wait(1.0):
+            if self._client.status != "running" or self._client.nthreads():
+                without_since = time.monotonic()
+            elif time.monotonic() - without_since > _NO_WORKERS_S:
+                error = StoreError(f"--engine dask: no workers for {_NO_WORKERS_S:g} s; what is stored is kept")
+                for future in list(self._waiting):
+                    with suppress(Exception):  # one that has just ended
+                        future.set_exception(error)
+                return
+
+
+def identity() -> dict[str, str]:
+    """What must be equal here and in a worker of a cluster, or its numbers would be others: versions and code."""
+    return {**versions(), "code of rotor_mbs": fingerprint(*_CODE)[:12]}
+
+
+def _refuse_others(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> None:
+    """Raises InputError where a worker has another version of anything that decides a number."""
+    wrong = [
+        f"{name} {found.get(name, 'missing')} (here {here})"
+        for name, here in expected.items()
+        if found.get(name) != here
+    ]
+    if wrong:
+        raise InputError(
+            f"--engine dask: {where} has {', '.join(wrong)}; allowed: workers with the same versions and code"
+        )
 
 
 def _answers(address: str) -> bool:
@@ -105,13 +170,14 @@ def _answers(address: str) -> bool:
     return True
 
 
-def _with_time_limit(work: Callable[[T], R], task: T, timeout_s: float) -> R:
+def run_as_worker(work: Callable[[T], R], task: T, timeout_s: float, expected: Mapping[str, str]) -> R:
     """Ends this worker process where the task takes too long (dask has no time limits); its nanny starts a new one.
 
     By a watchdog outside the interpreter: an engine that hangs may hold the interpreter's lock.
     """
     import faulthandler
 
+    _refuse_others(expected, identity(), f"the worker on {socket.gethostname()}")  # it may have joined later
     with open(os.devnull, "w") as nowhere:  # noqa: PTH123  (a device)
         faulthandler.dump_traceback_later(timeout_s, exit=True, file=nowhere)
         try:

@@ -134,6 +134,7 @@ SCALES = {
 }
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a runaway: the judgement sees what is not finite
 def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
     """(..., n) J: total energy less work, less its value at the start, of one run or of many."""
     total = kinetic + potential - work

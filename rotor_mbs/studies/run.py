@@ -211,7 +211,7 @@ def perform_run(job: Job) -> Result:
         attributes = {}
         try:
             run = solve(case.method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
-        except (MemoryError, OSError, ResourceError):  # what the machine lacks is no result of the run
+        except (MemoryError, OSError, ImportError, ResourceError):  # what the machine lacks is no result of the run
             raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return store_failure("timed_out", job, str(exc))

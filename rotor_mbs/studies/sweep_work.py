@@ -12,7 +12,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import RunBlock
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.scenario.magnitudes import MagnitudeError
@@ -126,10 +126,10 @@ def _scenes(chunk: Chunk) -> list[Scene]:
 
 
 def _solved(chunk: Chunk, scene: Scene) -> Solution | str:
-    """The run, or why there is none."""
+    """The run, or why there is none. Its time limit begins after the model is built: an interrupted import of an engine
+    could not be repeated in this process."""
     try:
-        with time_limit(chunk.time_limit_s):
-            return solve(chunk.method, scene, chunk.settings)
+        return solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
     except OutOfTimeError as exc:
         return str(exc)
 

@@ -8,12 +8,16 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import pytest
 from support.sweeps import stored_runs
 
 from rotor_mbs.cli import main
+from rotor_mbs.errors import InputError
+from rotor_mbs.execution import task_pools
+from rotor_mbs.execution.pool import SerialPool
 
 pytest.importorskip("distributed")
 
@@ -34,7 +38,7 @@ uniform = [0.5, 1.0]
 
 @pytest.fixture
 def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Address, and the two workers: without nannies, so that a killed one stays away."""
+    """Address, scheduler and two workers: without nannies, so that a killed one stays away."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -50,7 +54,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
             for command in commands
         ]
         _wait_for_workers(address)
-        yield address, processes[1:]
+        yield address, processes
         for process in processes:
             process.kill()
 
@@ -65,7 +69,7 @@ def _wait_for_workers(address: str) -> None:
 def test_a_killed_worker_of_a_cluster_loses_nothing(
     tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    address, workers = cluster
+    address, processes = cluster
     path, local, remote = tmp_path / "s.toml", tmp_path / "local.h5", tmp_path / "dask.h5"
     path.write_text(_SWEEP)
     command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(remote), "--engine", f"dask:{address}"]
@@ -73,9 +77,40 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
         while sweep.poll() is None and stored_runs(remote) < 5:
             time.sleep(0.01)
         assert sweep.poll() is None, sweep.communicate()
-        workers[0].kill()
+        processes[1].kill()
         output, errors = sweep.communicate(timeout=120)
     assert sweep.returncode == 0, (output, errors)
     assert b"60 runs: 60 ok" in output
     assert main(["sweep", str(path), "-o", str(local)]) == 0
     assert remote.read_bytes() == local.read_bytes()
+
+
+def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
+    here = task_pools.identity()
+    assert {"rotor_mbs", "numpy", "heyoka", "python", "code of rotor_mbs"} <= set(here)
+    for name in here:
+        other = SerialPool().submit(partial(_run_as_worker, here | {name: "other"}), 3, 1.0)
+        with pytest.raises(InputError, match=rf"has {name} .* \(here other\); allowed: workers with the same versions"):
+            other.result()
+    assert SerialPool().submit(partial(_run_as_worker, here), -3, 1.0).result() == 3
+
+
+def _run_as_worker(expected: dict[str, str], task: int) -> int:
+    return task_pools.run_as_worker(abs, task, 10.0, expected)
+
+
+def test_a_scheduler_that_dies_ends_in_one_line(
+    tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    address, processes = cluster
+    path, remote = tmp_path / "s.toml", tmp_path / "dask.h5"
+    path.write_text(_SWEEP.replace("draws = 60", "draws = 4000"))
+    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-o", str(remote), "--engine", f"dask:{address}"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as sweep:
+        while sweep.poll() is None and stored_runs(remote) < 5:
+            time.sleep(0.01)
+        processes[0].kill()
+        _, errors = sweep.communicate(timeout=120)
+    assert sweep.returncode == 1, errors
+    assert b"Traceback" not in errors
+    assert errors.strip().splitlines()[-1].startswith(b"--engine dask: the scheduler is gone; what is stored is kept")
