@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -58,7 +58,8 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
 
     Raises StoreError, InputError.
     """
-    found = judge_file(path, bounds)
+    with _damage_reported(path):
+        found = judge_file(path, bounds)
     return [*found, *_judge_presence(found, required)]
 
 
@@ -80,6 +81,15 @@ def check_default_set(
 def check_speed(bounds: Bounds) -> list[Verdict]:
     """Run times against those on file, in one process after the other."""
     return judge_probes(speed_probes(), bounds, 1)
+
+
+@contextmanager
+def _damage_reported(path: Path) -> Iterator[None]:
+    """What HDF5 finds wrong in a file, at whatever place, is a StoreError."""
+    try:
+        yield
+    except (RuntimeError, OSError) as exc:
+        raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
 
 
 def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
