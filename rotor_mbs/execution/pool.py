@@ -255,7 +255,7 @@ def _completed(
 
 def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, R]]:
     for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-        task, error = waiting.pop(future), future.exception()
+        task, error = waiting.pop(future), CancelledError() if future.cancelled() else future.exception()
         if error is None:
             yield Finished(task, future.result())
         elif isinstance(error, MemoryError | OSError | ImportError | ResourceError):  # of the machine, not of the task

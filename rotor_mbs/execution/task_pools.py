@@ -5,6 +5,7 @@ The only module that knows dask (an extra, and slow to load). A cluster needs no
 
 from __future__ import annotations
 
+import logging
 import os
 import pkgutil
 import re
@@ -75,11 +76,19 @@ def _open_cluster(address: str) -> Cluster:
             f"--engine dask:{address}: a worker cannot tell its version ({one_line(exc)}); allowed: workers with "
             "the same versions and code"
         ) from exc
+    _silence_dask()
     workers = sum(client.nthreads().values())
     if not workers:
         client.close()
         raise InputError(f"--engine dask:{address}: the scheduler has no workers; allowed: one with workers")
     return Cluster(client, workers)
+
+
+def _silence_dask() -> None:
+    """What it logs of a lost connection is what this program says in a line."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.startswith(("distributed", "tornado")):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 class Cluster:
@@ -153,7 +162,6 @@ def _refuse_others(expected: Mapping[str, str], found: Mapping[str, str], where:
 def _answers(address: str) -> bool:
     """Whether a scheduler answers there: a client that finds none, or another program, waits for minutes."""
     import asyncio
-    import logging
 
     from distributed.comm.core import connect
 
