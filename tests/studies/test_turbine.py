@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support import references
 
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.solution.metrics import metrics_of
 
 RATED = 12.1 * pi / 30.0  # rad/s
@@ -102,3 +103,13 @@ def test_the_taylor_method_on_the_step_of_the_command() -> None:
     found = references.run(scene).trajectory
     assert np.abs(found.angles - exact.angles).max() < 1e-13
     assert np.abs(found.work - exact.work).max() < 1e-12 * np.abs(exact.kinetic_energy).max()
+
+
+@pytest.mark.parametrize("name", ["steady", "imbalance"])
+def test_scipys_integrators_are_not_stopped_by_megawatts_that_balance(name: str) -> None:
+    """Drive less damper is rounding error, 1e-9 W: held to 1e-16 J as the work was, no step was short enough."""
+    scene, exact = references.scene(f"turbine/{name}"), references.reference(f"turbine/{name}")
+    found = solve("lagrange/dop853", scene, {}, time_limit_s=20.0)
+    assert found.integration.success
+    assert np.abs(found.trajectory.angles - exact.angles).max() < 1e-11
+    assert np.abs(found.trajectory.work - exact.work).max() < 1e-12 * np.abs(exact.kinetic_energy).max()

@@ -20,7 +20,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, hamilton
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.loads import sampled_loads
-from rotor_mbs.models.lagrange.parameters import work_is_integrated
+from rotor_mbs.models.lagrange.parameters import changing_loads, work_is_integrated
 from rotor_mbs.models.lagrange.samples import at_constant_rests, constant_work
 from rotor_mbs.models.lagrange.system import (
     compiled,
@@ -183,7 +183,8 @@ def _equations(example: Scene) -> list[tuple[Any, Any]]:
     forces = hamilton.forces(angles, rates, form, loads, engine.sin, engine.cos)
     equations = [*zip(angles, rates, strict=True), *zip(momenta, forces, strict=True)]
     if work_is_integrated(example):
-        equations.append((engine.make_vars("work"), closed_form.power(rates, form, at_constant_rests(example, loads))))
+        working = at_constant_rests(changing_loads(example), loads)
+        equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
     return equations
 
 

@@ -17,11 +17,12 @@ from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.parameters import (
     LoadSegment,
     RotorForm,
+    changing_loads,
     load_segments,
     rotor_form,
     work_is_integrated,
 )
-from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
+from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 
@@ -53,10 +54,10 @@ class OdeSolver:
         self._integrator = integrator
         self._form = rotor_form(scene)
         self._segments = load_segments(scene)
-        self._has_work = work_is_integrated(scene)
+        self._work_unit = work_unit(scene) if work_is_integrated(scene) else 0.0
         columns = scene.moving_coordinates
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
-        self._initial = np.concatenate([*start, np.zeros(int(self._has_work))])
+        self._initial = np.concatenate([*start, np.zeros(int(self._work_unit > 0.0))])
         self._times = np.linspace(0.0, scene.duration, scene.samples) if times is None else times
         self._states: Array = self._initial[None, :]
 
@@ -66,12 +67,30 @@ class OdeSolver:
 
     def _advance(self, segment: LoadSegment, state: Array, times: Array) -> Advance:
         function = right_hand_side(
-            self._scene, self._form, segment, with_work=self._has_work, accelerations=self._accelerations
+            self._scene, self._form, segment, work_unit=self._work_unit, accelerations=self._accelerations
         )
         return self._integrator(function, segment.start, segment.end, state, times)
 
     def observe(self) -> Trajectory:
-        return samples.trajectory(self._scene, self._times, self._states)
+        states = self._states.copy()
+        if self._work_unit:
+            states[:, -1] *= self._work_unit
+        return samples.trajectory(self._scene, self._times, states)
+
+
+def work_unit(scene: Scene) -> float:
+    """J of the work variable: the power of two below the scene's energies and torques, at least 1.
+
+    In J it would be held to an absolute tolerance far below its own rounding: where the drive balances megawatts of
+    damping, no step is short enough for that.
+    """
+    form, columns = rotor_form(scene), scene.moving_coordinates
+    angles, rates = ([values[i] for i in columns] for values in (scene.initial_angles, scene.initial_rates))
+    kinetic, _ = closed_form.energies(angles, rates, form, loads_at_start(scene), math.sin, math.cos)
+    weights = sum(blade.mass * scene.gravity * math.hypot(*blade.centre_of_mass) for blade in scene.blades)
+    torques = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0)
+    size = kinetic + weights + torques
+    return 2.0 ** max(math.floor(math.log2(size)), 0) if 0.0 < size < math.inf else 1.0
 
 
 def right_hand_side(
@@ -79,13 +98,17 @@ def right_hand_side(
     form: RotorForm,
     segment: LoadSegment,
     *,
-    with_work: bool,
+    work_unit: float = 0.0,
     accelerations: Accelerations | None = None,
 ) -> RightHandSide:
-    """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
+    """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays.
+
+    work_unit   J, that the work counts in; 0: without the work
+    """
     equations = accelerations or closed_form.accelerations
     count = 1 + len(form.blades)
     lines = [(float(offset), float(slope)) for offset, slope in segment.lines]
+    changing = changing_loads(scene)
     start = load_values([offset for offset, _ in lines])
     constant = start if not any(slope for _, slope in lines) else None
 
@@ -98,8 +121,9 @@ def right_hand_side(
         except (ZeroDivisionError, ValueError, OverflowError):
             # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
             return [math.nan] * len(values)
-        work = [closed_form.power(rates, form, at_constant_rests(scene, loads))] if with_work else []
-        return [*rates, *found, *work]
+        if not work_unit:
+            return [*rates, *found]
+        return [*rates, *found, closed_form.power(rates, form, at_constant_rests(changing, loads)) / work_unit]
 
     return derivative
 

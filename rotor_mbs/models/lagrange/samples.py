@@ -116,16 +116,16 @@ def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
     return load_values([torque, *(value_at(table, 0.0) for table in load_tables(scene)[1:])])
 
 
-def at_constant_rests(scene: Scene, loads: LoadValues) -> LoadValues:
-    """`loads` without the rest angles that are constant: those do no work."""
+def at_constant_rests(changing: Sequence[int], loads: LoadValues) -> LoadValues:
+    """`loads` without the rest angles that are constant, which do no work; changing: as of `changing_loads`."""
     first = 1 + len(loads.pitches)
-    rests = [rest if first + i in changing_loads(scene) else 0.0 for i, rest in enumerate(loads.rests)]
+    rests = [rest if first + i in changing else 0.0 for i, rest in enumerate(loads.rests)]
     return LoadValues(loads.rotor, loads.pitches, rests)
 
 
 def _work_of_rests(scene: Scene, form: RotorForm, angles: Sequence[Array], loads: LoadValues) -> Any:
     """(n,) J: what `closed_form.power` leaves out of the work of rest angles that move; 0 where none does."""
-    energy = closed_form.rest_energy(angles, form, at_constant_rests(scene, loads).rests)
+    energy = closed_form.rest_energy(angles, form, at_constant_rests(changing_loads(scene), loads).rests)
     return energy - energy[0] if isinstance(energy, np.ndarray) else 0.0
 
 

@@ -58,7 +58,8 @@ def build_system(scene: Scene) -> EquationSystem:
     found = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
     equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
     if work_is_integrated(scene):
-        equations.append((engine.make_vars("work"), closed_form.power(rates, form, at_constant_rests(scene, loads))))
+        working = at_constant_rests(changing_loads(scene), loads)
+        equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
     return EquationSystem(equations, parameters, changing_loads(scene))
 
 
