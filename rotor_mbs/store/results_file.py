@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 
 from rotor_mbs.errors import StoreError
@@ -35,7 +36,8 @@ class ResultsStore:
         if not self.path.exists():
             return set()
         with open_results(self.path, verify=False) as results, hdf5.reading(self.path):
-            damaged = {place for place, part in all_damages(results.root) if part != DIGESTS}
+            state = self.path.stat()
+            damaged = _damaged_places(self.path, (state.st_ino, state.st_mtime_ns, state.st_size))
             runs = {
                 f"{scene.name}/{run.method}": run for scene in results.scenes.values() for run in scene.runs.values()
             }
@@ -52,6 +54,13 @@ class ResultsStore:
         with writing(self.path, RESULTS):
             sources = [self.path, *parts] if self.path.exists() else parts
             merge(self.path, sources, {**versions(), **machine()}, without)
+
+
+@lru_cache(maxsize=8)
+def _damaged_places(path: Path, _state: tuple[int, int, int]) -> frozenset[str]:
+    """Of the file in this state (inode, time of change, size): read and verified once, and not again for each job."""
+    with open_results(path, verify=False) as results:
+        return frozenset(place for place, part in all_damages(results.root) if part != DIGESTS)
 
 
 def merge(

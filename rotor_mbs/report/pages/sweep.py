@@ -32,8 +32,8 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     return {
         "title": sweep.title,
         "summary": [with_capital(sweep.summary.rstrip(".")) + ".", *lines],
-        "picture": Section([shown] if shown else []),
-        "statuses": Section(tables=[_status_table(statuses)]),
+        "picture": Section([shown] if shown else [], tables=[_status_table(statuses)] if shown else []),
+        "statuses": Section(tables=[] if shown else [_status_table(statuses)]),
         "parameters": Section(tables=[_parameter_table(sweep)]),
         "distributions": Section(_distributions(sweep, statuses == STATUSES.index("ok"))),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
