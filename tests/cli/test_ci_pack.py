@@ -53,7 +53,7 @@ def test_a_loosened_run_that_passes_its_bounds_is_found(
     capsys.readouterr()
     assert main(["check", str(loosened), "--against", str(earlier)]) == 1
     lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("FAIL")]
-    assert any(line.startswith(f"FAIL against: {SCENE} {METHOD} agreement: angles") for line in lines), lines
+    assert any(line.startswith(f"FAIL against: {SCENE} {METHOD} energy: balance") for line in lines), lines
     assert main(["check", str(loosened), "--against", str(earlier), "--shrink", "1e9"]) == 0
     assert main(["check", str(earlier), "--against", str(loosened)]) == 0  # a gain is no loss
 
