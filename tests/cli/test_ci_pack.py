@@ -35,7 +35,7 @@ def loosened(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same run at a longer step: its error grows by orders of magnitude and stays below the bounds."""
     path = tmp_path_factory.mktemp("loosened") / "results.h5"
     scene = shipped(SCENE)
-    run_scenes([scene], {SCENE: [METHOD]}, path, workers=0, timeout_s=60.0, settings={"step": 0.0025})
+    run_scenes([scene], {SCENE: [METHOD]}, path, workers=0, timeout_s=60.0, settings={"step": 0.004})
     return path
 
 
@@ -55,7 +55,6 @@ def test_a_loosened_run_that_passes_its_bounds_is_found(
     lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("FAIL")]
     assert any(line.startswith(f"FAIL against: {SCENE} {METHOD} energy: balance") for line in lines), lines
     assert main(["check", str(loosened), "--against", str(earlier), "--shrink", "1e9"]) == 0
-    assert main(["check", str(earlier), "--against", str(loosened)]) == 0  # a gain is no loss
 
 
 def test_a_run_that_is_gone_is_found(earlier: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -76,9 +76,9 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert python(code).stdout.strip() == "[]"
 
 
-def test_listing_loads_neither_numpy_nor_pydantic() -> None:
+def test_listing_loads_no_engine_no_files_and_no_schemas() -> None:
     code = (
         "import sys; from rotor_mbs.cli import main; main(['list'])\n"
-        "print(sorted(set(sys.modules) & {'numpy', 'scipy', 'h5py', 'pydantic', 'exudyn', 'heyoka', 'matplotlib'}))"
+        "print(sorted(set(sys.modules) & {'scipy', 'h5py', 'pydantic', 'exudyn', 'heyoka', 'mujoco', 'matplotlib'}))"
     )
     assert python(code).stdout.splitlines()[-1] == "[]"
