@@ -18,13 +18,15 @@ from rotor_mbs.store.read import StoredRun, StoredScene
 _COMPARED = ("angles", "rates")
 # Of a column's largest value: below it a column is a straight line, which methods of any kind may give exactly.
 _STRAIGHT = 1e-12
+# Few samples of a short motion may be rounded alike by two methods that are right: fig11 over 0.1 s, 6 samples.
+_FEWEST = 100
 
 
 def copies(scene: StoredScene) -> Iterator[tuple[StoredRun, str, str]]:
     """(run, other method, array and column) of every column that two runs of a scene have bit for bit.
 
     Methods round differently, so that equal bits are a copy. Columns that are zero, constant or a straight line do not
-    count; nor do two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
+    count, nor do short ones; nor do two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
     """
     found = {name: _bent_columns(run) for name, run in scene.runs.items()}
     for first, second in itertools.combinations(scene.runs, 2):
@@ -39,7 +41,7 @@ def _bent_columns(run: StoredRun) -> dict[tuple[str, int], bytes]:
     columns = {}
     for name in _COMPARED:
         values = run.array(name) if name in run else np.empty((0, 0))
-        if values.ndim == 2 and values.dtype.kind == "f" and len(values) > 2:
+        if values.ndim == 2 and values.dtype.kind == "f" and len(values) >= _FEWEST:
             for i in range(values.shape[1]):
                 if _is_bent(values[:, i]):
                     columns[name, i] = values[:, i].tobytes()

@@ -39,9 +39,9 @@ class Balance(NamedTuple):
 def angular_balance(scene: Scene, run: Samples) -> Balance | None:
     """About the shaft, relative to the largest momentum, the torque's impulse, and what the weights give in a fall.
 
-    Returns None where the samples do not resolve the motion.
+    Returns None where the samples do not resolve the motion, or are too few to show what they leave open.
     """
-    if not _is_resolved(scene, run):
+    if len(run.time) < max(_WITH_SLOPES) or not _is_resolved(scene, run):
         return None
     angles, rates, step = run.angles, run.rates, run.time[1]
     moment, change = np.zeros((2, len(run.time)))
@@ -60,11 +60,13 @@ def linear_balance(scene: Scene, run: Samples) -> Balance | None:
     """In space, relative to the largest momentum and what the weights give in a fall.
 
     Returns None where the run has no force of the bearing, where a load has a kink (the force jumps there), or where
-    the samples do not resolve the motion or the oscillations of a stiff bearing.
+    the samples do not resolve the motion or the oscillations of a stiff bearing, or are too few to show what they leave
+    open.
     """
     force = run.get("shaft_force")
     if (
         force is None
+        or len(run.time) < max(_WITHOUT_SLOPES)
         or knots(scene.load_tables, scene.duration)
         or not _is_resolved(scene, run, _fastest_bearing(scene))
     ):

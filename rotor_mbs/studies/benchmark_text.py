@@ -138,7 +138,8 @@ separated by blanks, a row per sample. `results.txt` is the reference in that fo
 With reference angles r_j(t_i), and the amplification g(t_i) of a small error of the initial state (column
 `error growth` of `reference.csv`, its running maximum, at least 1):
 
-    e = max over samples i and coordinates j of |q_j(t_i) - r_j(t_i)| / (g(t_i) max(1, largest |r| up to t_i))
+    e = max over samples i and coordinates j of |q_j(t_i) - r_j(t_i)| / (g(t_i) s_j(t_i))
+    s_j = max(1, how far the rotor has turned from its start, or the largest pitch of any blade, up to t_i)
 
 over all samples before g reaches $growth, which is up to t = $horizon s here.
 
@@ -186,17 +187,20 @@ def read_results(path):
 
 def error(reference, results):
     """The error as in description.md; infinite where a sample or a number is missing."""
-    worst, growth, largest = 0.0, 1.0, 1.0
+    worst, growth, turned, pitched = 0.0, 1.0, 1.0, 1.0
+    start = reference[0][1][0]
     for number, (time, angles, now) in enumerate(reference):
         growth = max(growth, now)
         if growth >= HORIZON:
             break
-        largest = max(largest, *map(abs, angles))
+        turned = max(turned, abs(angles[0] - start))
+        pitched = max(pitched, *map(abs, angles[1:]))
         row = results[number] if number < len(results) else []
         if len(row) < 1 + COORDINATES or not all(map(math.isfinite, row)) or abs(row[0] - time) > 1e-9 * (1 + time):
             return math.inf
-        for angle, exact in zip(row[1:], angles):
-            worst = max(worst, abs(angle - exact) / (growth * largest))
+        for number_of_angle, (angle, exact) in enumerate(zip(row[1:], angles)):
+            size = pitched if number_of_angle else turned
+            worst = max(worst, abs(angle - exact) / (growth * size))
     return worst
 
 

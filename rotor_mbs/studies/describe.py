@@ -74,14 +74,17 @@ def describe(path: Path) -> list[Path]:
 def statistics(stored: StoredSweep) -> dict[str, Any]:
     """Mean, deviation, smallest and largest value of every variable of floating point numbers.
 
-    Over the runs that are ok and marked for training, and over their samples in time: one number for each remaining
-    entry (a coordinate, a blade and axis), as nested lists. NaN, of what a run did not reach, is left out.
+    Over the runs that are ok and, where runs are marked, marked for training, and over their samples in time: one
+    number for each remaining entry (a coordinate, a blade and axis), as nested lists. NaN, of what a run did not reach,
+    is left out.
 
     Examples
     --------
     `{"runs": 800, "variables": {"angles": {"unit": "rad", "mean": [...], "std": [...], ...}}}`
     """
-    chosen = (stored.column("status") == code_of("ok")) & (stored.column("split") == SPLITS.index("train"))
+    chosen = stored.column("status") == code_of("ok")
+    if "split" in {variable.name for variable in stored.variables()}:
+        chosen &= stored.column("split") == SPLITS.index("train")
     found = {}
     for variable in stored.variables():
         if variable.dimensions[0] == "run" and variable.kind == "f":

@@ -131,7 +131,7 @@ def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_pa
 
 def test_show_says_which_models_are_linearized(capsys):
     assert main(["show", "stiff/nrel-5mw"]) == 0
-    assert capsys.readouterr().out.count("linearized by rotor-mbs modes") >= 3
+    assert capsys.readouterr().out.count("linearized by `rotor-mbs modes`") >= 3
 
 
 @pytest.mark.parametrize("span", ["3", "0:3", "3:0:4", "0:3:1", "-1:3:4", "0:nan:4", "0:3:x"])

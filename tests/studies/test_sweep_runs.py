@@ -279,7 +279,7 @@ def test_a_second_sweep_on_one_output_is_refused_with_one_line(tmp_path: Path) -
         first.kill()
     assert second.returncode == 2
     assert len(second.stderr.splitlines()) == 1
-    assert "another sweep is writing it now" in second.stderr
+    assert "another process is writing it now" in second.stderr
 
 
 def _small_files() -> None:
@@ -339,7 +339,7 @@ def test_methods_and_settings_of_the_file_are_told_with_their_line(
 
 def test_a_sweep_too_large_by_mistake_is_asked_for_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sweep", str(_file(tmp_path, draws=600_000)), "-o", str(tmp_path / "o.h5")]) == 2
-    assert "1,200,000 runs; allowed without --yes" in capsys.readouterr().err
+    assert "1,200,000 runs; allowed: at most 1,000,000 (with --yes" in capsys.readouterr().err
     assert not list(tmp_path.glob("o.h5*"))
 
 
