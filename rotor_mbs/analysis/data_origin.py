@@ -26,7 +26,7 @@ def copies(scene: StoredScene) -> Iterator[tuple[StoredRun, str, str]]:
     """(run, other method, array and column) of every column that two runs of a scene have bit for bit.
 
     Methods round differently, so that equal bits are a copy. Columns that are zero, constant or a straight line do not
-    count, nor do short ones; nor do two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
+    count, nor short ones; nor two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
     """
     found = {name: _bent_columns(run) for name, run in scene.runs.items()}
     for first, second in itertools.combinations(scene.runs, 2):
