@@ -37,13 +37,26 @@ def scene_of(stored: StoredScene) -> Scene | None:
         return None
 
 
-def rehydrate(stored: StoredScene, run: StoredRun) -> Rehydrated:
-    """Raises InputError where the stored scene text is no scene."""
+def reference_of(stored: StoredScene) -> Trajectory | None:
+    """The scene's reference; None where there is none, or its arrays cannot be used.
+
+    Raises InputError where the stored scene text is no scene, StoreError where the reference cannot be read.
+    """
+    scene = parse_scene(str(stored.attributes["scene_toml"]), stored.name)
+    if stored.reference is None or _faults(scene, stored.reference, complete=False):
+        return None
+    return _trajectory(scene, stored.reference)
+
+
+def rehydrate(stored: StoredScene, run: StoredRun, reference: Trajectory | None = None) -> Rehydrated:
+    """`reference`: that of the scene, where it has been read already.
+
+    Raises InputError where the stored scene text is no scene.
+    """
     scene = parse_scene(str(stored.attributes["scene_toml"]), stored.name)
     faults = _faults(scene, run)
-    reference = None
-    if stored.reference is not None and not _faults(scene, stored.reference, complete=False):
-        reference = _trajectory(scene, stored.reference)
+    if reference is None:
+        reference = reference_of(stored)
     if faults and _faults(scene, run, complete=False):  # more is wrong than that the run stops early
         return Rehydrated(scene, None, reference, faults)
     facts = run.attributes

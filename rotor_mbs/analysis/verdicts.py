@@ -16,7 +16,7 @@ from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.data_origin import copies, settings_faults, steps_off
 from rotor_mbs.analysis.exact import exact_rotor_angle
-from rotor_mbs.analysis.rehydrate import Rehydrated, rehydrate
+from rotor_mbs.analysis.rehydrate import Rehydrated, reference_of, rehydrate
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
 from rotor_mbs.scenario.accuracy_bounds import Bounds
@@ -71,8 +71,9 @@ def verdicts(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds
         for scene in results.scenes.values():
             own = bounds.for_scene(scene.name if _is_shipped(scene) else "")
             known = shipped.get(scene.name) if own.scene else None
+            exact = _readable_reference(scene)
             for run in scene.runs.values():
-                found += _of_stored_run(scene, run, own, damages.pop(f"{scene.name}/{run.method}", []))
+                found += _of_stored_run(scene, run, exact, own, damages.pop(f"{scene.name}/{run.method}", []))
             found += _copies(scene, own)
             found += _of_reference(scene, known.reference if known is not None else None, own)
         if results.scenes:
@@ -106,12 +107,22 @@ def _integrity(scene: str, method: str, parts: Sequence[str], bounds: Bounds) ->
     return Verdict("integrity", scene, method, "digests", float(len(parts)), bound, "parts", look)
 
 
-def _of_stored_run(scene: StoredScene, run: StoredRun, bounds: Bounds, damages: Sequence[str]) -> list[Verdict]:
+def _readable_reference(scene: StoredScene) -> Trajectory | None:
+    """Read once for all runs of the scene; a reference that cannot be read fails with each of them."""
+    try:
+        return reference_of(scene)
+    except StoreError:
+        return None
+
+
+def _of_stored_run(
+    scene: StoredScene, run: StoredRun, reference: Trajectory | None, bounds: Bounds, damages: Sequence[str]
+) -> list[Verdict]:
     """Of a run that is known to be damaged, what can still be judged."""
     found = [_integrity(scene.name, run.method, damages, bounds)]
     try:
         with reading(str(scene.name), run.method) if damages else nullcontext():
-            found += _of_run(run, bounds, rehydrate(scene, run), _motion_ends(scene))
+            found += _of_run(run, bounds, rehydrate(scene, run, reference), _motion_ends(scene))
     except StoreError as exc:
         found.append(_make("complete", run, "all", math.nan, bounds, "faults", str(exc)))
     return found
