@@ -94,7 +94,7 @@ def run(
     timeout : s, after which the integration ends itself; `Run.status` is then "timed_out".
     reference : whether to compute the quad-precision reference of a scene that has no shipped one (up to some seconds).
         Without any, the status rests on the samples and the energy balance.
-    **settings : of the method, in place of its defaults; `find_method(method).settings` has names, units and ranges.
+    **settings : of the method, in place of its defaults; `rotor-mbs show METHOD` has names, units and ranges.
 
     Raises
     ------

@@ -261,7 +261,7 @@ def _of_corrected_model(run: StoredRun, bounds: Bounds, found: Rehydrated, traje
         error = max(metrics["angle_error_per_growth"] - start_slack(scene), 0.0)
         yield _make("agreement", run, "angles", error, bounds, "per growth", look)
         if bounds.find("horizon", run.method):
-            look = "the README's promise, up to the horizon"
+            look = "1e-9 rad, the promise of docs/findings.md, up to the horizon"
             yield _make("horizon", run, "angles", metrics["angle_error_max"], bounds, "rad", look)
     if "energy_drift_max" in metrics:
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 
+_SHOWN = 12  # names that a message lists
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
 
 
@@ -73,7 +74,7 @@ def named_unit(name: str) -> tuple[str, str]:
     return name[: match.start()].strip(), match[1].strip()
 
 
-def shown_names(names: list[str], most: int = 12) -> str:
+def shown_names(names: list[str]) -> str:
     """The first names, as a message can list them."""
-    more = f", ... ({len(names)} in all)" if len(names) > most else ""
-    return ", ".join(name if name.isprintable() else ascii(name) for name in names[:most]) + more
+    more = f", ... ({len(names)} in all)" if len(names) > _SHOWN else ""
+    return ", ".join(name if name.isprintable() else ascii(name) for name in names[:_SHOWN]) + more

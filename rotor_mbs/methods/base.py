@@ -86,7 +86,7 @@ class Method:
     is_corrected    whether it claims to solve the correct equations, so that any status but "ok" is a failure
     is_default      whether it belongs to the set that runs where no method is named
     erratum         "E1" ...: the one erratum of the printed equations it has; "" for others
-    distributions   packages it needs, by the names they are installed by; `hint` says how to get them
+    distributions   packages it needs, by the names they are installed by
     fallback        name of the method to take where these are not installed; "" for none
     order           order of convergence; None where it is not fixed
     fixed_step      whether the step is the setting `step`
@@ -112,7 +112,6 @@ class Method:
     is_default: bool = False
     erratum: str = ""
     distributions: tuple[str, ...] = ()
-    hint: str = ""
     fallback: str = ""
     order: float | None = None
     fixed_step: bool = False

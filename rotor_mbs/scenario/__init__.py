@@ -5,7 +5,7 @@ scene_file      a scene read from TOML, and written
 catalogue       the scenes that are shipped, and what a command's arguments mean
 variants        scenes with other numbers at some keys (Scene.replace, sweeps)
 sweep           a sweep file; sweep_design: its rows
-bounds          the bounds that results are judged by
+accuracy_bounds the bounds that results are judged by
 validation      pydantic types and error lines for all input files; schema: the keys of a scene and of a bounds file
 toml_file, expression    what these are built on
 """

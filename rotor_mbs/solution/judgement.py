@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -67,7 +67,7 @@ _CLEAR_SHARE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """status: one of RUN_STATUSES; message: one line, "" for ok; false_success: the engine claimed too much."""
+    """status: one of `status.STATUSES`; message: one line, "" for ok; false_success: the engine claimed too much."""
 
     status: str
     message: str
@@ -89,12 +89,6 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
     """The bound on a quantity's number for a method; None where the number is not judged."""
     entry = bounds.find(rule.check, method) if rule.check else None
     return entry.value if entry else rule.bound
-
-
-def judged(run: Solution, reference: Trajectory | None) -> Solution:
-    """The run with its status, message and metrics; reference: of the same scene, or None."""
-    found = judge(run.scene, run, reference)
-    return replace(run, status=found.status, message=found.message, metrics=found.metrics)
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 STATUSES = (
     "ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "left_out", "worker_died", "unchecked",
 )  # fmt: skip
-RUN_STATUSES = tuple(name for name in STATUSES if name not in ("left_out", "worker_died"))
 # Those of runs that reached the end.
 COMPLETE = ("ok", "inaccurate", "unchecked")
 

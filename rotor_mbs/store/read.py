@@ -73,10 +73,6 @@ class StoredRun:
             self._prove(name, lambda: digests.dataset_digest(values, dataset.attrs))
         return values
 
-    def damages(self) -> list[str]:
-        """The parts, "attributes" or names of datasets, that are not what was written, are new or are gone."""
-        return damages_of(self._group)
-
     @functools.cached_property
     def _digests(self) -> dict[str, str]:
         return digests.stored_digests(self._group.attrs)

@@ -260,7 +260,7 @@ def _calibration() -> float:
 
 
 _SPEED_RUNS = 15
-# On the machine named in the README, otherwise idle, twice by Python 3.11, 3.12, 3.13 each: 0.20 to 0.23, 13.0 to 13.2.
+# On the machine of docs/findings.md, otherwise idle, twice by Python 3.11, 3.12, 3.13: 0.20 to 0.23, 13.0 to 13.2.
 SPEED_RATIOS = {"lagrange/taylor": 0.23, "exudyn_tree/rk67": 13.1}
 
 

@@ -44,12 +44,12 @@ def conservation_record(job: Job) -> Record:
         return Record("conservation", scene.name, method, {"message": str(exc)})
 
 
-def drift_record(scene: Scene, method: str, starts: int = STARTS, duration: float = _LONG_S) -> Record:
+def drift_record(scene: Scene, method: str) -> Record:
     """Root mean square of the relative energy error over perturbed starts, over time, and its growth exponent."""
     generator = np.random.default_rng(_SEED)
-    long = replace(scene, duration=duration, samples=401, outputs=("angles", "rates", "energy"))
+    long = replace(scene, duration=_LONG_S, samples=401, outputs=("angles", "rates", "energy"))
     squares = np.zeros(long.samples)
-    for _ in range(starts):
+    for _ in range(STARTS):
         shift = _PERTURBATION * generator.standard_normal(len(long.initial_angles))
         start = replace(long, initial_angles=tuple((np.array(long.initial_angles) + shift).tolist()))
         run = _run(start, method)
@@ -57,8 +57,8 @@ def drift_record(scene: Scene, method: str, starts: int = STARTS, duration: floa
         assert error is not None  # the scene asks for energies
         squares += (error / energy_scale(start, run)) ** 2
         time = run.time
-    rms = np.sqrt(squares / starts)
-    attributes = {"exponent": theory.drift_exponent(time, rms), "starts": starts, "largest": float(rms.max())}
+    rms = np.sqrt(squares / STARTS)
+    attributes = {"exponent": theory.drift_exponent(time, rms), "starts": STARTS, "largest": float(rms.max())}
     return Record("conservation", scene.name, method, attributes, {"time": time, "energy_drift_rms": rms})
 
 

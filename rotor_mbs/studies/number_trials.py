@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials, trial
@@ -25,8 +25,6 @@ TOLERANCES = ((1e-5, 1e-9), (1e-6, 1e-8), (1e-6, 1e-9), (1e-6, 1e-10), (1e-7, 1e
 _AT_REST = "paper/fig05"
 _TIMEOUT_S = 600.0
 
-OnTrial = Callable[[int, int, str], None]
-
 
 @dataclass(frozen=True)
 class Trial:
@@ -44,7 +42,6 @@ def number_trials(
     tolerances: Sequence[tuple[float, float]] = TOLERANCES,
     *,
     workers: int = 0,
-    on_trial: OnTrial = lambda *_: None,
 ) -> NumberTrials:
     """All published numbers for every row and duration, and for every pair of tolerances with the usual ones.
 
@@ -77,9 +74,8 @@ def number_trials(
         for name, scene in scenes.items()
     ]
     found: dict[tuple[Conditions, str], NumberTrial] = {}
-    for number, (task, numbers) in enumerate(_results(tasks, workers), start=1):
+    for task, numbers in _results(tasks, workers):
         found |= {(task.conditions, one.number): one for one in numbers}
-        on_trial(number, len(tasks), f"{task.scene.name} {task.conditions.gravity_row} {task.conditions.duration:g} s")
     in_order = (found[conditions, item.id] for conditions in dict.fromkeys(tried) for item in items)
     texts = (GravityRowText(row, GRAVITY_ROWS[row].formula, GRAVITY_ROWS[row].is_of_56) for row in rows)
     return NumberTrials(tuple(in_order), usual, tuple(texts))

@@ -18,13 +18,14 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution import quantities
-from rotor_mbs.solution.judgement import judge, judged
+from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.quantities import BUILT_IN, Quantity
 from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, recode
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.write import write_run
+from rotor_mbs.studies.run import solve_judged
 
 PLUG_IN = """
 from rotor_mbs.solution.quantities import QuantityMetric, Quantity
@@ -117,7 +118,7 @@ def test_a_trajectory_refuses_names_that_are_not_declared() -> None:
 
 
 def test_a_solution_has_its_quantities_status_and_metrics() -> None:
-    run = judged(solve("lagrange/dop853", SCENE, {}), None)
+    run, _ = solve_judged(SCENE, "lagrange/dop853")
     assert (run.status, run.message) == ("ok", "")
     assert run.metrics["energy_drift_max"] < 1e-9
     np.testing.assert_array_equal(run.energy_error, run["energy_error"])

@@ -145,7 +145,6 @@ def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
         build=_build_tree if in_tree else _build_chain,
         items=items,
         distributions=("exudyn",),
-        hint="pip install exudyn",
         relative_cost=10.0 if in_tree else 100.0,
         load=lambda: import_module("rotor_mbs.models.exudyn.adapter"),
         **facts,

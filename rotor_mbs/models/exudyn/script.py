@@ -17,7 +17,7 @@ from rotor_mbs.models.exudyn.geometry import pitching
 from rotor_mbs.models.exudyn.timetable import Loads, Moment
 from rotor_mbs.scenario.scene import Scene
 
-STEP = 6.7e-4  # s: the default of exudyn_tree/rk67
+_STEP = 6.7e-4  # s, the largest time step: the default of exudyn_tree/rk67
 
 _KINDS = ("node", "object", "marker", "load")
 
@@ -29,13 +29,13 @@ _COMMENTS = {
 }
 
 
-def exudyn_script(scene: Scene, step: float = STEP) -> str:
-    """The text of the script. step: largest time step in s."""
+def exudyn_script(scene: Scene) -> str:
+    """The text of the script."""
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _KINDS]
     moving = [0, *(1 + i for i in pitching(scene))]
     return _SCRIPT.substitute(
         title=(scene.title or scene.name).replace("\\", "/").replace('"', "'"),
-        step=repr(float(step)),
+        step=repr(_STEP),
         types=", ".join(dict.fromkeys(part.type for part in parts)),
         duration=repr(float(scene.duration)),
         samples=scene.samples,

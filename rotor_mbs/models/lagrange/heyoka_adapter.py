@@ -15,7 +15,7 @@ from rotor_mbs.errors import MethodRefusal, ResourceError
 # Of any processor that the engine runs on. A time limit for a chunk counts on no more.
 LEAST_LANES = 2
 
-HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge elsewhere"
+_HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge elsewhere"
 
 
 @functools.cache
@@ -28,7 +28,7 @@ def heyoka() -> ModuleType:
     except ImportError as exc:
         if not isinstance(exc, ModuleNotFoundError):  # it is there, and the system could not load it
             raise ResourceError(f"heyoka cannot be loaded: {exc}") from exc
-        raise MethodRefusal(f"heyoka is not installed: {HINT}; lagrange/dop853 needs SciPy only") from exc
+        raise MethodRefusal(f"heyoka is not installed: {_HINT}; lagrange/dop853 needs SciPy only") from exc
     return engine  # type: ignore[no-any-return]
 
 

@@ -83,7 +83,6 @@ def _scipy_method(solver: str, look: Look, settings: type[Settings], ladder: Lad
         build=_ode_solver(lambda relative, absolute: scipy_integrator(solver, relative, absolute)),
         items=samples.items,
         distributions=("scipy",),
-        hint="pip install scipy",
         ladders=(ladder,),
         cost_scaling={"relative_tolerance": medium, "absolute_tolerance": 0.01 * medium},
         load=lambda: import_module("scipy.integrate"),
@@ -101,7 +100,6 @@ METHODS = (
         solve_many=_taylor_many,
         load=heyoka_adapter.compile_anew,
         distributions=("heyoka",),
-        hint=heyoka_adapter.HINT,
         fallback="lagrange/dop853",
         is_default=True,
         ladders=(

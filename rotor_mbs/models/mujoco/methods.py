@@ -66,7 +66,6 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
         build=_build(integrator),
         items=_items,
         distributions=("mujoco",),
-        hint=_HINT,
         fixed_step=True,
         relative_cost=10.0,
         load=lambda: import_module("rotor_mbs.models.mujoco.adapter"),

@@ -22,7 +22,6 @@ from typing import Any
 
 ROOT3 = math.sqrt(3.0)
 Row = tuple[Any, ...]
-RotorGravity = Callable[..., float]  # (m, c, d, g, q2, c3, c4, c5) -> N m
 
 
 def mass_one(m: Any, c: Any, d: Any, s3: Any, c3: Any) -> tuple[Row, Row]:

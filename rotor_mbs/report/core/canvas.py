@@ -55,14 +55,14 @@ class Panels:
         replace_file(Path(path), encoded(self.figure, kind))
 
 
-def panels(heights: tuple[float, ...], x_label: str, *, share_x: bool = True) -> Panels:
+def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     """Panels one below the other; heights in inches, that of the top one first. x_label: of the last one."""
     with style():
         figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
         grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
         axes: list[Axes] = []
         for row in range(len(heights)):
-            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes and share_x else None))
+            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
             axes[-1].tick_params(labelbottom=row == len(heights) - 1)
         axes[-1].set_xlabel(x_label)
         # Fixed margins: the layout does not depend on the fonts.
@@ -154,9 +154,9 @@ def _decade(value: float) -> str:
     return f"{sign}{power(round(math.log10(abs(value))))}" if value else "0"
 
 
-def svg_text(figure: Figure, name: str = "rotor_mbs") -> str:
-    """The figure as matplotlib writes it, without a date; names inside it depend on `name`."""
-    with style(), matplotlib.rc_context({"svg.hashsalt": name}):
+def svg_text(figure: Figure) -> str:
+    """The figure as matplotlib writes it, without a date, the same each time."""
+    with style(), matplotlib.rc_context({"svg.hashsalt": "rotor_mbs"}):
         stream = io.StringIO()
         FigureCanvasSVG(figure).print_svg(  # type: ignore[no-untyped-call]
             stream, metadata={"Date": None, "Creator": None}

@@ -72,10 +72,6 @@ def key_picture(
     return picture(panels, name, caption, f"{caption} {'; '.join(ranges)}.", legend=legend)
 
 
-def _angle_series(run: StoredRun, coordinate: int) -> Series:
-    return Series(run.array("time"), run.array("angles")[:, coordinate], side_look(run))
-
-
 def _blade_to_show(runs: Sequence[StoredRun]) -> int:
     """The coordinate of the pitch that differs most, or moves most; 0 where no blade pitches."""
     angles = [run.array("angles") for run in runs]

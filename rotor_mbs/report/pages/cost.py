@@ -23,8 +23,6 @@ from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_vis
 from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
 
-_DRAWN_FROM = 1e-15  # rad: errors are of the order of rounding, or the scene was judged without a reference
-
 
 def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
     """The curves measured on the scene, else its own runs, a point each; empty where no run has an error."""
@@ -38,12 +36,12 @@ def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
     return Section([shown], cost_legend(known), [_times_table(known)], notes)
 
 
-def cost_picture(curves: Sequence[Record], caption: str, name: str = "cost") -> Picture | None:
+def cost_picture(curves: Sequence[Record], caption: str) -> Picture | None:
     """The diagram; None where no point stands on it."""
     if not any(succeeded(curve).any() for curve in curves):
         return None
     described = f"{caption}. {cheapest(curves)}"
-    return picture(diagram(curves, height=3.4), name, f"{caption}: the lower right corner is best", described)
+    return picture(diagram(curves, height=3.4), "cost", f"{caption}: the lower right corner is best", described)
 
 
 def cost_legend(curves: Sequence[Record]) -> list[LegendEntry]:

@@ -18,6 +18,7 @@ from rotor_mbs.report.core.numbers import power
 from rotor_mbs.report.plots.time_histories import TIME_AXIS, Array, Series, mark_time, set_range, thin
 
 _DECADES = 6  # of a symmetric logarithmic axis, on each side
+_LOWEST = 1e-16  # relative energy at which a mark below it is drawn
 
 
 class Mark(NamedTuple):
@@ -110,17 +111,17 @@ def tip_difference(time: Array, printed: Array, corrected: Array, horizon: float
     return picture
 
 
-def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]], lowest: float = 1e-16) -> Panels:
+def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels:
     """A row per scene, a mark per model: its energy made from nothing, of the scene's energy scale, logarithmic."""
     picture = canvas.panels((0.19 * len(rows) + 0.25,), "energy made from nothing / energy scale of the scene")
     axes = picture.axes[0]
     for row, marks in enumerate(rows.values()):
         for value, look in marks:
-            axes.plot([min(max(value, lowest), 1e3)], [row], marker=look.marker, color=look.colour, markersize=5.5,
+            axes.plot([min(max(value, _LOWEST), 1e3)], [row], marker=look.marker, color=look.colour, markersize=5.5,
                       markerfacecolor="none", linestyle="none")  # fmt: skip
     axes.set_xscale("log")
-    axes.set_xlim(lowest / 3.0, 3e3)
-    exponents = range(round(math.log10(lowest)), 4, 3)
+    axes.set_xlim(_LOWEST / 3.0, 3e3)
+    exponents = range(round(math.log10(_LOWEST)), 4, 3)
     axes.set_xticks([10.0**e for e in exponents], [power(e) for e in exponents])
     axes.set_xticks([], minor=True)
     axes.set_yticks(range(len(rows)), list(rows))

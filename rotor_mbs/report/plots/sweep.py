@@ -71,7 +71,7 @@ def distribution(values: Array, label: str, *, logarithmic: bool) -> Panels:
     known = np.sort(values[np.isfinite(values) & ((values > 0.0) | (not logarithmic))])
     if len(known) > _MOST_POINTS:
         known = known[np.linspace(0, len(known) - 1, _MOST_POINTS).round().astype(int)]
-    axes.plot(known, np.linspace(0.0, 100.0, len(known)), color=_INK, drawstyle="default")
+    axes.plot(known, np.linspace(0.0, 100.0, len(known)), color=_INK)
     if logarithmic:
         axes.set_xscale("log")
         low, high = np.floor(np.log10(known[0])), np.ceil(np.log10(known[-1]))
