@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.checking import results_file
+from support.checking import add_run, results_file
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
+from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.core.numbers import prefixed
+from rotor_mbs.report.core.numbers import prefixed, with_unit
+from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results
 
 PACKAGE = """
@@ -79,3 +81,15 @@ def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(t
     assert row is not None
     assert prefixed(largest, "N") in row[0]
     assert "Exudyn tree, RK67" in sections["shaft_moment"]
+
+
+def test_the_uncertainty_of_an_extrapolated_run_is_drawn_and_told(tmp_path: Path) -> None:
+    path, (scene,) = results_file(tmp_path / "r.h5", ["check/held"], []), find_scenes(["check/held"])
+    settings = {"extrapolation": "richardson", "step": 5e-3}
+    found = solve("exudyn_chain/newmark_index2", scene, settings)
+    add_run(path, scene, found)
+    page = (write_report(path, tmp_path / "out").parent / "check-held.html").read_text(encoding="utf-8")
+    section = page[page.index('<section id="difference">') :]
+    assert "Exudyn chain, Newmark index 2: its uncertainty" in section
+    uncertainty = found.trajectory.angle_uncertainty.max()
+    assert f"uncertain by {with_unit(float(uncertainty), 'rad')} up to the horizon" in section

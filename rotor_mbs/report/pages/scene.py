@@ -203,9 +203,12 @@ def difference_section(drawn: DrawnRuns) -> Section:
             )
     for method, run in runs.items():
         if "angle_uncertainty" in run:
-            look = Look(look_of(method).colour, ":", "")
-            others.append(Series(run.array("time"), run.array("angle_uncertainty"), look))
-            legend.append(LegendEntry(f"{label_of(method)}: its uncertainty", look))
+            look, label, own = Look(look_of(method).colour, ":", ""), label_of(method), run.array("angle_uncertainty")
+            others.append(Series(run.array("time"), own, look))
+            legend.append(LegendEntry(f"{label}: its uncertainty", look))
+            known = own[run.array("time") <= (drawn.horizon or np.inf)]
+            size = with_unit(float(known.max()), "rad")
+            notes.append(f"{label}: uncertain by {size} up to the horizon, by its own estimate.")
     shown = error_pictures.error_picture(
         curves, "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", drawn.horizon, others,
