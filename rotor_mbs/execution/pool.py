@@ -34,6 +34,8 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
+# What the machine lacks: an error of these is no result of a task.
+OF_THE_MACHINE = (MemoryError, OSError, ImportError, ResourceError)
 _RETRY_START_S = 1.0  # after the system had no room for a process
 _POLL_S = 1.0  # how often a waiting thread looks whether its pool still works
 
@@ -258,7 +260,7 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
         task, error = waiting.pop(future), CancelledError() if future.cancelled() else future.exception()
         if error is None:
             yield Finished(task, future.result())
-        elif isinstance(error, MemoryError | OSError | ImportError | ResourceError):  # of the machine, not of the task
+        elif isinstance(error, OF_THE_MACHINE):
             yield Finished(task, None, "worker_died", f"not enough memory, files or processes: {one_line(error)}")
         elif (failure := pool.failure(error)) == "error":
             yield Finished(task, None, failure, one_line(error), error)

@@ -6,9 +6,10 @@ The curves of a scene are timed together, in rounds over all their points, by on
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
-from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, last_core, one_line
+from rotor_mbs.execution.pool import OF_THE_MACHINE, Finished, TaskLostError, WorkerPool, last_core, one_line
 from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
 from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder
@@ -128,9 +129,7 @@ def _bench_case(scene: Scene, ladder: Ladder, repeats: int, budget_s: float) -> 
 
 def _time_by_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
     for name in dict.fromkeys(job.case.scene.name for job in jobs):
-        own = [job for job in jobs if job.case.scene.name == name]
-        for job, record in zip(own, _measure_scene(own), strict=True):
-            yield Finished(job, store_curve(job, record))
+        yield from _measure_scene([job for job in jobs if job.case.scene.name == name])
 
 
 def store_curve(job: Job, record: Record) -> Result:
@@ -141,7 +140,7 @@ def store_curve(job: Job, record: Record) -> Result:
     return Result("ok", counts)
 
 
-def _measure_scene(jobs: Sequence[Job]) -> list[Record]:
+def _measure_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
     """Times, judges and collects every point of the curves of one scene."""
     load_before = os.getloadavg()[0]
     case, results = jobs[0].case, jobs[0].reference
@@ -158,10 +157,9 @@ def _measure_scene(jobs: Sequence[Job]) -> list[Record]:
         "load_after": os.getloadavg()[0],
         "pinned_core": -1 if last_core() is None else last_core(),
     }
-    return [
-        curve_record(job.case, ladder, measured.rows(chosen), shared | {"repeatable": measured.is_repeatable(chosen)})
-        for job, ladder, chosen in zip(jobs, own, points, strict=True)
-    ]
+    for job, ladder, chosen in zip(jobs, own, points, strict=True):
+        facts = shared | {"repeatable": measured.is_repeatable(chosen)}
+        yield measured.finished(job, chosen, partial(curve_record, job.case, ladder, shared=facts))
 
 
 def facts_of(case: Case, short: Scene, reference: Trajectory) -> dict[str, Any]:
@@ -217,12 +215,22 @@ def arrays_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 @dataclass
 class Measured:
-    """What was measured, by point."""
+    """What was measured, by point. lost: why nothing is known of it, of a point whose process died twice."""
 
     timings: Timings[Point] = field(default_factory=Timings)
     prepared: dict[Point, Prepared] = field(default_factory=dict)
     judged: dict[Point, Judged] = field(default_factory=dict)
     unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
+    lost: dict[Point, str] = field(default_factory=dict)
+
+    def finished(
+        self, job: Job, points: Sequence[Point], record: Callable[[list[dict[str, Any]]], Record]
+    ) -> Finished[Job, Result]:
+        """The end of a curve: the part of its record is written, but where one of its points is lost."""
+        for point in points:
+            if point in self.lost:
+                return Finished(job, None, "worker_died", self.lost[point])
+        return Finished(job, store_curve(job, record(self.rows(points))))
 
     def is_repeatable(self, points: Sequence[Point]) -> bool:
         """Whether the last run of every point was bit for bit its first one."""
@@ -277,23 +285,39 @@ def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], optio
     with WorkerPool(1, partial(start_timer, methods, scenes), last_core()) as pool:
 
         def answer(task: str, point: Point) -> Any:
-            return pool.submit(ask, (task, point), limit).result()
+            """None where there is none. A process that died, or lacked memory, is replaced and asked once more."""
+            if point in found.lost or point in found.unanswered:
+                return None
+            for _ in range(2):
+                try:
+                    return pool.submit(ask, (task, point), limit).result()
+                except TaskLostError as exc:
+                    failure, reason = exc.failure, str(exc)
+                except OF_THE_MACHINE as exc:
+                    failure, reason = "worker_died", one_line(exc)
+                except Exception as exc:
+                    failure, reason = "solver_failed", one_line(exc)
+                if failure != "worker_died":
+                    found.unanswered[point] = (failure, reason)
+                    return None
+            found.lost[point] = f"{point.method} at {point.setting:g}: {reason}, and again when it was tried alone"
+            return None
 
         def warm_up(point: Point) -> Warm:
             start = time.perf_counter()
-            try:
-                found.prepared[point] = answer("prepare", point)
-            except TaskLostError as exc:
-                found.unanswered[point] = ("timed_out" if exc.failure == "timed_out" else "solver_failed", str(exc))
-            except Exception as exc:
-                found.unanswered[point] = ("solver_failed", one_line(exc))
-            else:
-                return Warm(found.prepared[point].run_s, returned=True)
-            return Warm(time.perf_counter() - start, returned=False)
+            prepared = answer("prepare", point)
+            if prepared is None:
+                return Warm(time.perf_counter() - start, returned=False)
+            found.prepared[point] = prepared
+            return Warm(prepared.run_s, returned=True)
 
         def repeat(point: Point) -> float:
-            return float(answer("repeat", point))
+            seconds = answer("repeat", point)
+            return math.nan if seconds is None else float(seconds)
 
         found.timings = conduct(points, warm_up, repeat, options["budget_s"], options["repeats"], time.perf_counter)
-        found.judged = {point: answer("judge", point) for point in found.prepared}
+        for point in found.prepared:
+            judged = answer("judge", point)
+            if judged is not None:
+                found.judged[point] = judged
     return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import COST_SCALING, Record
 from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.studies.bench import BENCH, SOURCES, arrays_of, measure_points, store_curve
+from rotor_mbs.studies.bench import BENCH, SOURCES, arrays_of, measure_points
 from rotor_mbs.studies.bench_worker import Point
 
 _BLADES = (1, 2, 3, 6, 12, 24, 48, 96)
@@ -99,11 +100,11 @@ def run_cost_scaling(
 def _time_by_study(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
     for study in cost_studies():
         own = [job for job in jobs if job.case.options["kind"] == study.kind]
-        for job, record in zip(own, _measure(study, own) if own else (), strict=True):
-            yield Finished(job, store_curve(job, record))
+        if own:
+            yield from _measure(study, own)
 
 
-def _measure(study: CostStudy, jobs: Sequence[Job]) -> list[Record]:
+def _measure(study: CostStudy, jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
     points = [
         [
             Point(job.case.method, job.case.method, i, size, tuple(sorted(job.case.settings.items())))
@@ -114,10 +115,11 @@ def _measure(study: CostStudy, jobs: Sequence[Job]) -> list[Record]:
     scenes = {point: (study.scenes[point.setting], None) for curve in points for point in curve}
     measured = measure_points(scenes, points, jobs[0].case.options)
     started = time.strftime("%Y-%m-%dT%H:%M:%S")
-    return [_curve(study, job.case, measured.rows(own), started) for job, own in zip(jobs, points, strict=True)]
+    for job, own in zip(jobs, points, strict=True):
+        yield measured.finished(job, own, partial(_curve, study, job.case, started))
 
 
-def _curve(study: CostStudy, case: Case, rows: Sequence[Mapping[str, Any]], started: str) -> Record:
+def _curve(study: CostStudy, case: Case, started: str, rows: Sequence[Mapping[str, Any]]) -> Record:
     arrays = arrays_of(rows)
     arrays["simulated_s"] = np.array([study.scenes[size].duration for size in arrays["setting"]])
     attributes: dict[str, Any] = {

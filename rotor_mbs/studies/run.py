@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, RotorError
+from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.execution.output import RESULTS, writing
-from rotor_mbs.execution.pool import one_line
+from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     check_names,
@@ -211,7 +211,7 @@ def perform_run(job: Job) -> Result:
         attributes = {}
         try:
             run = solve(case.method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
-        except (MemoryError, OSError, ImportError, ResourceError):  # what the machine lacks is no result of the run
+        except OF_THE_MACHINE:
             raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return store_failure("timed_out", job, str(exc))

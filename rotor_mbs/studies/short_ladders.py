@@ -12,7 +12,7 @@ from pathlib import Path
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.execution.pool import one_line
+from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
 from rotor_mbs.methods.catalogue import ladders
 from rotor_mbs.methods.ladders import Ladder
 from rotor_mbs.scenario.scene import Scene
@@ -61,6 +61,8 @@ def perform_ladder(job: Job) -> Result:
             found.prepared[point], found.timings.times[point] = prepared, [prepared.run_s]
             found.judged[point] = timer.judge(point)
             longest = prepared.run_s
+        except OF_THE_MACHINE:
+            raise
         except RotorError as exc:
             found.fail(point, str(exc))
         except Exception as exc:
