@@ -28,14 +28,14 @@ _SHORT = Blade(1000.0, (0.1, 0.0, 5.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 SCENE = Scene(
     "rules", "three point masses in uniform rotation", (), _GRAVITY, 1.0, 11, ("angles", "rates", "energy"),
     (_SHORT, _LONG, _LONG), 0.0, (0.0, _SPRUNG, 0.0, 0.0), (0.5, 0.0, 0.0, 0.0),
-    bearing_stiffness=(_STIFFNESS, 0.0, 0.0),
+    bearing_stiffness=(_STIFFNESS, 0.0, 0.0), bearing_rest=(((0.0, -_SPRUNG),), (), ()),
 )  # fmt: skip
-_WORK_J = 300.0
+_WORK_J = 3000.0
 _KINETIC_J = 0.5 * 1000.0 * (3 * 0.1**2 + 2 * 10.0**2 + 5.0**2) * 0.5**2
 _ENERGY_J = (
     _KINETIC_J
     + _WORK_J
-    + 0.5 * _STIFFNESS * _SPRUNG**2
+    + 0.5 * _STIFFNESS * (2.0 * _SPRUNG) ** 2
     + 1000.0 * _GRAVITY * (2.0 * math.hypot(0.1, 10.0) + math.hypot(0.1, 5.0))
 )  # what an energy error is relative to
 _JUST = 1e-2  # how far on either side of a bound, relatively: far above round-off of a state

@@ -168,9 +168,11 @@ def test_work_and_energy_of_a_step_of_the_command(method: str) -> None:
 
 @pytest.mark.parametrize("method", CORRECTED)
 def test_work_of_a_constant_torque_and_of_a_constant_rest_angle(method: str) -> None:
-    scene = replace(FREE, bearing_stiffness=(STIFFNESS,), bearing_rest=(((0.0, 0.7),),))
+    """Of the torque on the pitch, and of one on the rotor beside it."""
+    scene = replace(FREE, rotor_torque=((0.0, 5.0),), bearing_stiffness=(STIFFNESS,), bearing_rest=(((0.0, 0.7),),))
     found = best(scene, method)
-    assert np.abs(found.work - 12.0 * (found.angles[:, 1] - 0.2)).max() < 1e-12 * np.abs(found.work).max()
+    work = 5.0 * (found.angles[:, 0] - 0.1) + 12.0 * (found.angles[:, 1] - 0.2)
+    assert np.abs(found.work - work).max() < 1e-12 * np.abs(found.work).max()
     spring = 0.5 * STIFFNESS * (found.angles[:, 1] - 0.7) ** 2
     # Energies extrapolated are those of the extrapolated angles but for what is left of their errors.
     bound = 1e-12 if method in TO_ROUND_OFF else 1e-9

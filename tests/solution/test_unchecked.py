@@ -9,6 +9,7 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
@@ -35,6 +36,10 @@ def test_a_wrong_motion_without_energy_and_reference_is_unchecked() -> None:
     assert "no energy, and no reference" in verdict.message
     exact = Trajectory(time, angles, np.zeros((11, 4)), error_growth=np.ones(11))
     assert judge(scene, Solution(scene, METHOD, wrong, Integration(True)), exact).status == "inaccurate"
+    past = exact.replace(error_growth=np.array([1.0, *[1e9] * 10]))
+    verdict = judge(scene, Solution(scene, METHOD, wrong, Integration(True)), past)
+    assert verdict.status == "unchecked"
+    assert "the horizon is before the second sample" in verdict.message
 
 
 def test_two_samples_a_minute_apart_without_energy_are_unchecked() -> None:
@@ -59,6 +64,23 @@ def test_a_start_turns_away_excuses_no_error(turns: float) -> None:
         wrong = Solution(scene, METHOD, exact.replace(angles=angles), Integration(True))
         assert judge(scene, wrong, exact).status == "inaccurate"
     assert judge(scene, solve("lagrange/taylor", scene, {}), exact).status == "ok"
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+@pytest.mark.parametrize("channel", ["angle", "energy"])
+def test_a_start_turns_away_leaves_ten_units_in_its_last_place_open(channel: str, share: float) -> None:
+    """Of what is beyond the first turn: the one thing that a method whose own bounds are zero may be off by."""
+    scene = turned(paper("fig05", duration=1.0, samples=11), 2.0)
+    slack = share * 10.0 * np.finfo(float).eps * (scene.initial_angles[0] - 2.0 * np.pi)
+    exact = Trajectory(np.linspace(0.0, 1.0, 11), np.tile(scene.initial_angles, (11, 1)), np.zeros((11, 4)))
+    weights = sum(blade.mass * scene.gravity * np.hypot(*blade.centre_of_mass[::2]) for blade in scene.blades)
+    potential, angles = np.zeros(11), exact.angles.copy()
+    potential[5] = slack * weights * (channel == "energy")
+    angles[5, 2] += slack * (channel == "angle")
+    wrong = exact.replace(angles=angles, kinetic_energy=np.zeros(11), potential_energy=potential, work=np.zeros(11))
+    bounds = tuple(Bound(check, METHOD, 0.0, "none") for check in ("agreement", "energy"))
+    run = Solution(scene, METHOD, wrong, Integration(True), bounds=bounds)
+    assert judge(scene, run, exact).status == ("ok" if share < 1.0 else "inaccurate")
 
 
 def test_angles_without_digits_are_unchecked() -> None:
