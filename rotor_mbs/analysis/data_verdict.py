@@ -4,8 +4,10 @@ what a constant lag, scale and offset would explain. Knows samples; no file, no 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -132,6 +134,17 @@ def rows_to_the_horizon(reference: Trajectory, time: Array) -> tuple[float, int]
     end = horizon(reference)
     whole = horizon_samples(reference) == len(reference.time)
     return end, len(time) if whole else int(np.searchsorted(time, end, side="right"))
+
+
+def from_dictionary(found: Mapping[str, Any]) -> DataVerdict:
+    """Of what `as_dictionary` gave, also where it has been JSON since."""
+    values = {one.name: found[one.name] for one in fields(DataVerdict)}
+    values = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
+    channels = [
+        one | {"agrees_until": tuple(math.nan if time is None else time for time in one["agrees_until"].values())}
+        for one in found["channels"]
+    ]
+    return DataVerdict(**values | {"channels": tuple(ChannelErrors(**one) for one in channels)})
 
 
 def as_dictionary(verdict: DataVerdict) -> dict[str, object]:

@@ -16,8 +16,20 @@ from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.report.core.files import BENCH, ERRATA, INDEX, MODES, WALK, Site, page_names, render, write_pages
+from rotor_mbs.report.core.files import (
+    BENCH,
+    COMPARISON,
+    ERRATA,
+    INDEX,
+    MODES,
+    WALK,
+    Site,
+    page_names,
+    render,
+    write_pages,
+)
 from rotor_mbs.report.pages.bench import bench_pages
+from rotor_mbs.report.pages.data_comparison import comparison_page
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.modes import modes_page
@@ -71,14 +83,15 @@ def write_report(results: Path, output: Path, jobs: int = 1, on_page: OnPage = l
 
 def _pages(opened: OpenResults, jobs: int, on_page: OnPage) -> dict[str, str]:
     """By file name. What comes first is the index."""
-    modes, bench = read_records(opened.path, "modes"), read_records(opened.path, "bench")
-    has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench)
+    modes, bench, compared = (read_records(opened.path, kind) for kind in ("modes", "bench", "comparison"))
+    has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench or compared)
     is_suite = has_runs and is_stability_suite(opened)
     kinds = [
         (has_runs, INDEX, "Stability suite" if is_suite else "Overview"),
         (bool(bench), BENCH, "Error against run time"),
+        (bool(modes), MODES, "Modes"),
+        (bool(compared), COMPARISON, "Data of another program"),
     ]
-    kinds.append((bool(modes), MODES, "Modes"))
     there = [(file, label) for has, file, label in kinds if has]
     names = {file: INDEX if not place else file for place, (file, _) in enumerate(there)}
     main = [(names[file], label) for file, label in there]
@@ -94,6 +107,8 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage) -> dict[str, str]:
         pages |= bench_pages(opened, names[BENCH], site)
     if modes:
         pages[names[MODES]] = modes_page(list(read_modes(opened.path).values()), site, names[MODES])
+    if compared:
+        pages[names[COMPARISON]] = render("data_comparison", comparison_page(compared[0]), site, names[COMPARISON])
     return pages
 
 

@@ -14,10 +14,12 @@ import numpy as np
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict
 from rotor_mbs.foreign.trajectory import load_data
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.pages.data_comparison import error_panels, write_comparison_page
+from rotor_mbs.report.core.files import INDEX, render, write_pages
+from rotor_mbs.report.pages.data_comparison import comparison_page, error_panels
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
+from rotor_mbs.store.records import write_records
 from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
 
 
@@ -100,33 +102,31 @@ class DataComparison:
 
     def plot(self) -> Panels:
         """The error of each channel per unit of error growth over time, and the tolerance."""
-        return error_panels(self.study, per_growth=True)
+        return error_panels(self.study.record(), per_growth=True)
 
     def to_xarray(self) -> Any:
-        """Data, reference, and what an error of 1 rad at the start may have become, as an xarray.Dataset over time.
+        """What `save` stores as an xarray.Dataset over time.
 
-        Variables by channel, with units: `pitch_1`, `pitch_1_reference`, `pitch_1_growth`. Raises InputError where
-        xarray is not installed.
+        Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`, and
+        `pitch_1_growth`, what an error of 1 at the start may have become. Raises InputError where xarray is missing.
         """
-        study, verdict = self.study, self.verdict
-        states = np.hstack([study.reference.angles, study.reference.rates])[:, study.data.columns]
-        found: dict[str, Any] = {}
-        for j, channel in enumerate(study.data.channels):
-            arrays = {
-                "": study.data.values[: verdict.rows, j],
-                "_reference": states[:, j],
-                "_growth": study.carried[:, j],
-            }
-            found |= {
-                f"{channel.key}{end}": ("time", values, {"units": channel.unit}) for end, values in arrays.items()
-            }
-        facts = {"scene": verdict.scene, "source": verdict.source, "status": verdict.status, "message": verdict.message}
-        time = ("time", study.reference.time, {"units": "s"})
-        return need_xarray().Dataset(found, {"time": time}, facts | {"tolerance": verdict.tolerance})
+        record = self.study.record()
+        found = {
+            name: ("time", record.arrays[name], {"units": column.units, "long_name": column.long_name})
+            for name, column in record.columns.items()
+        }
+        facts = {name: record.attributes[name] for name in ("source", "status", "message", "tolerance")}
+        return need_xarray().Dataset(found, attrs={"scene": record.scene} | facts)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""
-        return write_comparison_page(self.study, Path(folder))
+        page = render("data_comparison", comparison_page(self.study.record()))
+        write_pages(Path(folder), {INDEX: page})
+        return Path(folder) / INDEX
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Data, reference, errors and verdict as a results file. Raises StoreError where it cannot be written."""
+        write_records(Path(path), [self.study.record()])
 
     def __repr__(self) -> str:
         """Says how columns were read, numbers by channel, and the verdict."""

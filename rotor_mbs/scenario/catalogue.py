@@ -13,7 +13,7 @@ from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
 
 # Groups at the top of a results file that are not scenes: no scene may take such a name.
-RESERVED_GROUPS = ("bench", "claims", "errata", "modes", "stability", "summary", "sweep")
+RESERVED_GROUPS = ("bench", "claims", "comparison", "errata", "modes", "stability", "summary", "sweep")
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"

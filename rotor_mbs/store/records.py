@@ -5,6 +5,7 @@
     /errata                                  the check of the printed entries over `row`
     /modes/<scene>/<model>/<kind>            modes over speed; its arrays have dimensions of their own
     /claims/shares, /claims/numbers          the paper's claims from many starts, its numbers under other conditions
+    /comparison/<scene>/data/trajectory      data of another program and the reference at their times
 Writes and reads them; judges nothing.
 """
 
@@ -36,6 +37,7 @@ _FOLDERS = {
     "errata": "errata",
     "modes": "modes",
     "claims": "claims",
+    "comparison": "comparison",
 }
 _DIMENSIONS = {"bench": "setting"}  # of the others: row
 _SETTING_UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
@@ -82,7 +84,7 @@ class Record:
 
     Attributes
     ----------
-    kind : "bench", "steps", "limits", "conservation", "errata", "modes" or "claims".
+    kind : "bench", "steps", "limits", "conservation", "errata", "modes", "claims" or "comparison".
     scene : "paper/fig05"; "" where the record belongs to no scene.
     name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
     attributes : plain values; the key of what decides the numbers among them.

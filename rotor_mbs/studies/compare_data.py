@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,28 +14,34 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis.data_verdict import (
     DEFAULT_TOLERANCE,
     DataVerdict,
+    as_dictionary,
     carried_errors,
     channel_errors,
     rows_to_the_horizon,
 )
 from rotor_mbs.errors import InputError
+from rotor_mbs.execution.provenance import versions
 from rotor_mbs.foreign.trajectory import ForeignData
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.studies.data_causes import CauseSearch, causes_in_the_data
-from rotor_mbs.studies.scene_causes import causes_in_the_scene
+from rotor_mbs.store.layout import Column
+from rotor_mbs.store.records import Record
+from rotor_mbs.studies.data_causes import CauseSearch
+from rotor_mbs.studies.scene_causes import likely_causes
 
 METHOD = "data"  # what takes the place of a method's name
 # An error of the state changes the energy by its gradient: some ten times the error, of the energy scale; tenfold that.
 _ENERGY_PER_ANGLE = 100.0
 _ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
 _FEWEST = 3
+_MOST_NAMES = 100  # of columns that were not used
+_SEARCH_S = 60.0  # of the search for causes: scenes that are stiff or have many blades would take many minutes
 
 
 @dataclass(frozen=True)
@@ -43,16 +51,47 @@ class DataStudy:
     Attributes
     ----------
     scene, data : what was compared; the data cut to the scene's duration.
-    reference : at the times of the data, as far as the motion goes: time, angles, rates, error_growth.
+    expected : (n, channels) the reference at the times of the data, as far as the motion goes.
     carried : (n, channels) what an error of the initial state of 1 rad may be in each channel, at most.
     verdict : the numbers.
     """
 
     scene: Scene
     data: ForeignData
-    reference: Trajectory
+    expected: Array
     carried: Array
     verdict: DataVerdict
+
+    def record(self) -> Record:
+        """As a record of a results file: of each channel data, reference, error, and error amplification."""
+        rows = self.verdict.rows
+        columns = {"time": Column(("time",), "s", "time")}
+        arrays: dict[str, Array] = {"time": self.data.time[:rows]}
+        for j, one in enumerate(self.data.channels):
+            values, expected = self.data.values[:rows, j], self.expected[:, j]
+            for ending, unit, long_name, array in (
+                ("", one.unit, one.name, values),
+                ("_reference", one.unit, f"{one.name}, reference", expected),
+                ("_error", one.unit, f"{one.name}, data less reference", values - expected),
+                (
+                    "_growth",
+                    one.unit,
+                    f"{one.name}, an error of 1 at the start by then",
+                    self.carried[:, j],
+                ),
+            ):
+                arrays[one.key + ending] = array
+                columns[one.key + ending] = Column(("time",), unit, long_name)
+        verdict = replace(self.verdict, unused=self.verdict.unused[:_MOST_NAMES])  # an attribute has 64 kB
+        facts = {
+            "title": self.scene.title,
+            "scene_hash": scene_hash(self.scene),
+            "scene_toml": self.scene.text,
+            **{name: getattr(verdict, name) for name in ("source", "status", "message", "tolerance", "horizon_s")},
+            "verdict": json.dumps(as_dictionary(verdict)),
+            **versions(),
+        }
+        return Record("comparison", self.scene.name, "data/trajectory", facts, arrays, columns)
 
 
 def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = DEFAULT_TOLERANCE) -> DataStudy:
@@ -76,13 +115,10 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     verdict = _verdict(scene, data, cut, at_rows, exact, carried, tolerance)
     worst = max(one.error_per_growth for one in verdict.channels)
     if not verdict.agrees:
-        verdict = replace(verdict, likely=_likely(CauseSearch(scene, _aligned(data, cut), exact, tolerance, worst)))
-    return DataStudy(scene, cut, at_rows, carried, verdict)
-
-
-def _likely(search: CauseSearch) -> tuple[str, ...]:
-    found = causes_in_the_data(search)
-    return tuple(found if found or search.worst <= search.tolerance else causes_in_the_scene(search))
+        ends = monotonic() + _SEARCH_S
+        likely, note = likely_causes(CauseSearch(scene, _aligned(data, cut), exact, tolerance, worst, ends))
+        verdict = replace(verdict, likely=tuple(likely), notes=(*verdict.notes, *[note] * bool(note)))
+    return DataStudy(scene, cut, _states(at_rows)[:, cut.columns], carried, verdict)
 
 
 def _aligned(data: ForeignData, cut: ForeignData) -> ForeignData:

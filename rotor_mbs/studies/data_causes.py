@@ -6,16 +6,20 @@ Each is tried by comparing the data so corrected with the reference, or with a r
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.analysis.data_verdict import carried_errors
+from rotor_mbs.errors import RotorError
 from rotor_mbs.foreign.trajectory import ForeignData
-from rotor_mbs.models.lagrange.at_times import motion_at
+from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.models.lagrange.at_times import Equations, motion_at
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, running_growth
@@ -25,6 +29,7 @@ from rotor_mbs.solution.record import Array, Trajectory
 _LEFT = 1e-3
 _MOST_LEFT = 1e-4
 FEWEST = 5  # rows: with fewer, something always fits
+_LONGEST_S = 5.0  # of one run: a scene of the catalogue may be so stiff that it would take minutes
 _DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
 _FACTORS = {
     "angle": (
@@ -36,6 +41,8 @@ _FACTORS = {
 }
 _TIMES = ((1e-3, "time in ms taken as s"), (1e-6, "time in us taken as s"), (60.0, "time in minutes taken as s"))
 
+Motion = Callable[[Array], Array | None]  # (n,) s -> (n, 2 (1 + blades)), None where it ends before
+
 
 @dataclass(frozen=True)
 class CauseSearch:
@@ -46,6 +53,7 @@ class CauseSearch:
     scene, data : all rows of the data, also those after the scene's end.
     exact : the reference at the times of the data and at the scene's samples.
     tolerance, worst : what is allowed per unit of error growth; what the data have.
+    ends : of `time.monotonic`; no run is begun later.
     """
 
     scene: Scene
@@ -53,6 +61,23 @@ class CauseSearch:
     exact: TimedReference
     tolerance: float
     worst: float
+    ends: float
+
+    def states(self, motion: Motion, time: Array) -> Array | None:
+        """(n, 2 (1 + blades)) Of a motion at increasing times; None where it ends early, fails or takes too long.
+
+        Raises OutOfTimeError where the time of the whole search is over.
+        """
+        left = self.ends - monotonic()
+        if left <= 0.0:
+            raise OutOfTimeError
+        if len(time) < FEWEST:
+            return None
+        try:
+            with time_limit(min(_LONGEST_S, left)):
+                return motion(time)
+        except (RotorError, OutOfTimeError):
+            return None
 
     @property
     def fitting(self) -> float:
@@ -70,9 +95,11 @@ class CauseSearch:
 
     def carried(self, time: Array) -> Array:
         """(n, 2 (1 + blades)) as `carried_errors`, at any times up to the horizon."""
-        reference = self.exact.trajectory
-        table = carried_errors(reference, self.exact.growth, self.exact.units)
-        return np.stack([np.interp(time, reference.time, column) for column in table.T], axis=1)
+        return np.stack([np.interp(time, self.exact.trajectory.time, column) for column in self._carried.T], axis=1)
+
+    @cached_property
+    def _carried(self) -> Array:
+        return carried_errors(self.exact.trajectory, self.exact.growth, self.exact.units)
 
     def misfit(self, time: Array, values: Array, expected: Array | None, columns: Sequence[int] | None = None) -> float:
         """The largest error per unit of growth; infinite with too few rows, or without a motion to compare with."""
@@ -86,13 +113,14 @@ class CauseSearch:
         return _states(reference)[np.searchsorted(reference.time, time)][:, self.data.columns]
 
 
-def states_at(scene: Scene, time: Array) -> Array | None:
-    """(n, 2 (1 + blades)) Angles, then rates, of another scene, at increasing times from 0 on; None where it ends."""
-    if not len(time):
-        return None
+def states_at(scene: Scene, time: Array, equations: Equations | None = None) -> Array | None:
+    """(n, 2 (1 + blades)) Angles, then rates, of another scene, at increasing times from 0 on; None where it ends.
+
+    equations   as of `motion_at`
+    """
     times = np.union1d([0.0], time)
     whole = replace(scene, duration=float(times[-1]), samples=len(times), outputs=("angles", "rates"))
-    run = motion_at(whole, times)
+    run = motion_at(whole, times, equations)
     return _states(run)[len(times) - len(time) :] if len(run.time) == len(times) else None
 
 
@@ -118,19 +146,19 @@ def causes_in_the_data(search: CauseSearch) -> list[str]:
 
 
 def _units_and_zeros(search: CauseSearch, time: Array, values: Array) -> list[str]:
-    """Each channel by itself: unit, sign, zero, turns."""
+    """Each channel by itself: unit, sign, zero, turns; the simplest of those that leave least."""
     expected = search.expected(time)
     names: dict[str, list[str]] = {}
     for j, channel in enumerate(search.data.channels):
         one = [channel.column]
-        fitting = (
-            text
+        left = {
+            text: search.misfit(time, corrected[:, None], expected[:, [j]], one)
             for text, corrected in _corrections(channel.kind, values[:, j], expected[:, j])
-            if search.misfit(time, corrected[:, None], expected[:, [j]], one) <= search.fitting
-        )
-        text = next(fitting, None)
-        if text is None:
+        }
+        least = max(min(left.values()), 1e-3 * search.tolerance)
+        if not least <= search.fitting:
             return []
+        text = next(text for text, size in left.items() if size <= 10.0 * least)
         names.setdefault(text, []).append(channel.name)
     return [f"{', '.join(which)}: {text}" for text, which in names.items() if text]
 
@@ -194,7 +222,7 @@ def _other_time(search: CauseSearch) -> list[str]:
     for factor, text in factors:
         time = data.time * factor
         inside = search.rows(time)
-        found = states_at(scene, time[inside]) if inside.sum() >= FEWEST else None
+        found = search.states(partial(states_at, scene), time[inside])
         expected = None if found is None else found[:, data.columns]
         if search.misfit(time[inside], data.values[inside], expected) <= search.fitting:
             return [text]
@@ -211,7 +239,7 @@ def _lag(search: CauseSearch, time: Array, values: Array) -> list[str]:
         for _ in range(6):
             moved = time - lag
             inside = search.rows(moved)
-            found = states_at(search.scene, moved[inside]) if inside.sum() >= FEWEST else None
+            found = search.states(partial(states_at, search.scene), moved[inside])
             if found is None:
                 break
             left = search.misfit(moved[inside], values[inside], found[:, search.data.columns])

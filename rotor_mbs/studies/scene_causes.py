@@ -1,4 +1,4 @@
-"""What data that do not agree look like, of other scenes and equations: each is run and compared with the data."""
+"""What data that do not agree look like: mistakes in the data, then other scenes and equations, each of them run."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from rotor_mbs.errors import RotorError
-from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.models.lagrange.at_times import LEFT_OUT, motion_without
+from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.models.lagrange.at_times import LEFT_OUT, at_azimuths
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.methods import PrintedModel
@@ -23,12 +22,11 @@ from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.solution.metrics import HORIZON_GROWTH
 from rotor_mbs.solution.record import Array
-from rotor_mbs.studies.data_causes import FEWEST, CauseSearch, factors, states_at
+from rotor_mbs.studies.data_causes import FEWEST, CauseSearch, Motion, causes_in_the_data, factors, states_at
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 _EARLY = 10.0  # growth up to which a cause is tried first: most are refuted there
 _STEP = 1.25e-3  # s, of what is interpolated: of the printed equations' own run, its error is some 1e-9
-_LONGEST_S = 5.0  # of one run: a scene of the catalogue may be so stiff that it would take minutes
 _EARLY_ROWS = 40  # so many rows are tried first at most
 # Growth, and rows, up to which a parameter is fitted, one after another: a start too far off is useless once errors
 # have grown, and most parameters are refuted by the first rows.
@@ -36,14 +34,43 @@ _LEVELS = ((3.0, _EARLY_ROWS), (1e1, 200), (1e2, 1000), (1e3, 10**4), (1e4, 10**
 _LARGEST_CHANGE = 0.3
 _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
 _MOST = 6  # parameters that are named
+_QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}  # zeros that people choose, by degrees
 
-Motion = Callable[[Array], Array | None]  # (n,) s -> (n, 2 (1 + blades)), None where it ends before
+Parameter = tuple[str, str, Callable[[float], Motion]]  # key, unit or "" for a share, motion by its change
 
 
-def causes_in_the_scene(search: CauseSearch) -> list[str]:
-    """What fits, in words: other scenes and equations; where none does, one parameter that is off."""
-    found = [text for text, motion in _motions(search) if _fits(search, motion)]
-    return found or [*_one_parameter(search), *factors(search)]
+def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
+    """What fits, in words: mistakes in the data, else other scenes and equations, else one parameter that is off.
+
+    Beside it what a reader must know where the time of the search was over before all had been tried, else "".
+    """
+    motions, parameters = list(_motions(search)), list(_parameters(search.scene))
+    found: list[str] = []
+    fitted: list[tuple[float, str]] = []
+    tried = 0
+    try:
+        found = causes_in_the_data(search)
+        if found or search.worst <= search.tolerance:
+            return found, ""
+        for text, motion in motions:
+            found += [text] * _fits(search, motion)
+            tried += 1
+        for key, unit, changed in [] if found else parameters:
+            change, left = _fitted(search, changed)
+            if left <= search.fitting:
+                size = f"{change:+.4g} {unit}" if unit else f"{100.0 * change:+.4g} %"
+                fitted.append((left, f"{key} off by {size}"))
+            tried += 1
+    except OutOfTimeError:
+        count = len(motions) + len(parameters)
+        return found, f"the search for causes was ended by its time limit: {tried} of {count} scenes tried"
+    return found or [*_best(fitted, search.tolerance), *factors(search)], ""
+
+
+def _best(fitted: Sequence[tuple[float, str]], tolerance: float) -> list[str]:
+    """Parameters that leave least; several may be one to the motion."""
+    least = max(min(fitted)[0], 1e-3 * tolerance) if fitted else 0.0
+    return [text for left, text in fitted if left <= 10.0 * least][:_MOST]
 
 
 def _fits(search: CauseSearch, motion: Motion) -> bool:
@@ -53,11 +80,7 @@ def _fits(search: CauseSearch, motion: Motion) -> bool:
         inside = np.flatnonzero(search.rows(data.time, growth))[:most]
         if growth == _EARLY and len(inside) < FEWEST:
             continue
-        try:
-            with time_limit(_LONGEST_S):
-                states = motion(data.time[inside])
-        except (RotorError, OutOfTimeError):
-            return False
+        states = search.states(motion, data.time[inside])
         expected = None if states is None else states[:, data.columns]
         if not search.misfit(data.time[inside], data.values[inside], expected) <= search.fitting:
             return False
@@ -68,10 +91,10 @@ def _motions(search: CauseSearch) -> Iterator[tuple[str, Motion]]:
     scene = search.scene
     for text, other in _scenes(search):
         yield text, partial(states_at, other)
-    if len(scene.blades) > 2:
-        yield "blades numbered the other way round", partial(_renumbered, scene)
-    for terms in LEFT_OUT:
-        yield f"without the {terms}", partial(_without, scene, terms)
+    for text, azimuths in _azimuths(scene):
+        yield text, partial(states_at, scene, equations=at_azimuths(scene, azimuths))
+    for terms, equations in LEFT_OUT.items():
+        yield f"without the {terms}", partial(states_at, scene, equations=equations)
     for size in (1, 2, 3):
         for chosen in combinations(("e1", "e2", "e3"), size):
             if chosen in (("e3",), ("e1", "e3")):  # E3 is the power of a term that is zero without E2
@@ -91,6 +114,9 @@ def _scenes(search: CauseSearch) -> Iterator[tuple[str, Scene]]:
         blade.has_pitch_inertia or not rate for blade, rate in zip(on_axis, scene.initial_rates[1:], strict=True)
     ):
         yield "blade mass on the pitch axis", replace(scene, blades=on_axis)
+    for degrees, angle in _QUARTERS.items():
+        turned = _pitch_turned(scene, range(len(scene.blades)), angle)
+        yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
     first = search.data.values[0]
     for other in _catalogue():
         states = np.array([*other.initial_angles, *other.initial_rates])
@@ -104,26 +130,22 @@ def _catalogue() -> tuple[Scene, ...]:
     return tuple(find_scenes(sorted({name.partition("/")[0] for name, _ in list_scenes()})))
 
 
-def _renumbered(scene: Scene, time: Array) -> Array | None:
-    """Blade 2 in the place of the last one, and so on."""
-    order = [0, *range(len(scene.blades) - 1, 0, -1)]
-    coordinates = [0, *(1 + i for i in order)]
-    changed: dict[str, Any] = {}
-    for one in scene_fields("rotor", "start"):
-        value = getattr(scene, one.name)
-        places = coordinates if one.metadata["part"] == "start" else order
-        if value and (one.name == "blades" or one.metadata["per_blade"] or places is coordinates):
-            changed[one.name] = tuple(value[i] for i in places)
-    states = states_at(replace(scene, **changed), time)
-    return None if states is None else states[:, [*coordinates, *(len(coordinates) + i for i in coordinates)]]
-
-
-def _without(scene: Scene, terms: str, time: Array) -> Array | None:
-    times = np.union1d([0.0], time)
-    whole = replace(scene, duration=float(times[-1]), samples=len(times), outputs=("angles", "rates"))
-    run = motion_without(whole, times, terms)
-    complete = len(run.time) == len(times)
-    return np.hstack([run.angles, run.rates])[len(times) - len(time) :] if complete else None
+def _azimuths(scene: Scene) -> Iterator[tuple[str, Sequence[float]]]:
+    """Blades at other angles about the shaft than they should be."""
+    right, n = scene.phases, len(scene.blades)
+    if n > 1:
+        yield "all blades at the azimuth of blade 1", (0.0,) * n
+        yield "azimuths of the blades in degrees taken as rad", [math.degrees(phase) for phase in right]
+    if n > 2:
+        yield "blades numbered the other way round", (right[0], *right[:0:-1])
+        for i in range(n):
+            for other in ((i + 1) % n, (i - 1) % n):
+                text = f"blade {i + 1} at an azimuth of {360 * other / n:g} degrees in place of {360 * i / n:g}"
+                yield text, (*right[:i], right[other], *right[i + 1 :])
+    others = {360.0 * i / n: phase for i, phase in enumerate(right) if i}
+    for degrees, angle in (others | _QUARTERS).items():
+        text = f"rotor angle from another zero: blade 1 at an azimuth of {degrees:g} degrees where it is 0"
+        yield text, [phase + angle for phase in right]
 
 
 def _printed(scene: Scene, errata: Errata, time: Array) -> Array | None:
@@ -144,19 +166,7 @@ def _printed(scene: Scene, errata: Errata, time: Array) -> Array | None:
     return np.hstack([spline(time), spline(time, 1)])
 
 
-def _one_parameter(search: CauseSearch) -> list[str]:
-    """Parameters of the scene that are off alone, fitted: those that leave least; several may be one to the motion."""
-    found = []
-    for key, unit, changed in _parameters(search.scene):
-        change, left = _fitted(search, changed)
-        if left <= search.fitting:
-            size = f"{change:+.4g} {unit}" if unit else f"{100.0 * change:+.4g} %"
-            found.append((left, f"{key} off by {size}"))
-    best = max(min(found)[0], 1e-3 * search.tolerance) if found else 0.0
-    return [text for left, text in found if left <= 10.0 * best][:_MOST]
-
-
-def _fitted(search: CauseSearch, changed: Callable[[float], Scene]) -> tuple[float, float]:
+def _fitted(search: CauseSearch, changed: Callable[[float], Motion]) -> tuple[float, float]:
     """(change, error per unit of growth that is left) by Gauss and Newton's iteration over ever longer times."""
     change, left, before, rows = 0.0, math.inf, math.inf, 0
     for level, most in _LEVELS:
@@ -168,7 +178,7 @@ def _fitted(search: CauseSearch, changed: Callable[[float], Scene]) -> tuple[flo
         weights = 1.0 / search.carried(time)[:, search.data.columns]
 
         def errors(size: float, time: Array = time, values: Array = values, weights: Array = weights) -> Array | None:
-            states = states_at(changed(size), time)
+            states = search.states(changed(size), time)
             return None if states is None else (values - states[:, search.data.columns]) * weights
 
         step = 1e-3 / level
@@ -192,8 +202,44 @@ def _fitted(search: CauseSearch, changed: Callable[[float], Scene]) -> tuple[flo
     return change, left
 
 
-def _parameters(scene: Scene) -> Iterator[tuple[str, str, Callable[[float], Scene]]]:
-    """(key, unit or "" for a share, change -> scene) of every number, or list of numbers, that is not zero."""
+def _parameters(scene: Scene) -> Iterator[Parameter]:
+    """Every number, or list of numbers, that is not zero, and the zeros of the angles."""
+    for key, unit, changed in _scene_parameters(scene):
+        yield key, unit, lambda size, changed=changed: partial(states_at, changed(size))  # type: ignore[misc]
+    blades = range(len(scene.blades))
+    for chosen in [list(blades), *([i] for i in blades if len(blades) > 1)]:
+        label = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
+        yield f"azimuth of {label}", "rad", partial(_azimuth_moved, scene, chosen)
+        yield f"zero of the pitch of {label}", "rad", partial(_pitch_moved, scene, chosen)
+
+
+def _azimuth_moved(scene: Scene, chosen: Sequence[int], change: float) -> Motion:
+    azimuths = [phase + change * (i in chosen) for i, phase in enumerate(scene.phases)]
+    return partial(states_at, scene, equations=at_azimuths(scene, azimuths))
+
+
+def _pitch_moved(scene: Scene, chosen: Sequence[int], change: float) -> Motion:
+    return partial(states_at, _pitch_turned(scene, chosen, change))
+
+
+def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
+    """Chosen blades that are turned about the pitch axis where their pitch is 0."""
+    s, c = math.sin(angle), math.cos(angle)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    blades = list(scene.blades)
+    for i in chosen:
+        xx, yy, zz, xy, xz, yz = blades[i].inertia
+        inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+        blades[i] = replace(
+            blades[i],
+            centre_of_mass=tuple((turn @ blades[i].centre_of_mass).tolist()),
+            inertia=tuple(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()),
+        )
+    return replace(scene, blades=tuple(blades))
+
+
+def _scene_parameters(scene: Scene) -> Iterator[tuple[str, str, Callable[[float], Scene]]]:
+    """(key, unit or "" for a share, change -> scene) of the numbers in the scene."""
     for one in scene_fields("rotor", "start"):
         key, value = one.metadata["key"], getattr(scene, one.name)
         if one.name == "blades":

@@ -124,9 +124,10 @@ def test_third_erratum_alone_changes_nothing():
     )
     for _ in range(10):
         angles, rates = random_motion(rng, 3)
+        torques = rng.normal(0.0, 10.0, 4).tolist()
         np.testing.assert_allclose(
-            alone.accelerations([0.0] * 4, angles, rates),
-            none.accelerations([0.0] * 4, angles, rates),
+            alone.accelerations(torques, angles, rates),
+            none.accelerations(torques, angles, rates),
             rtol=1e-10,
             atol=1e-10,
         )

@@ -14,9 +14,12 @@ from support import other_code
 from support.data_files import FORMATS
 
 import rotor_mbs as rm
+from rotor_mbs.analysis.data_verdict import as_dictionary
 from rotor_mbs.cli import main
 from rotor_mbs.models.lagrange import reference
+from rotor_mbs.report.pages.data_comparison import verdict_of
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.records import read_records
 from rotor_mbs.testing import assert_agrees
 
 # (scene, format, duration of the short form, s)
@@ -144,11 +147,38 @@ def test_the_command_prints_a_table_and_writes_a_page(tmp_path: Path, capsys: py
         page = (tmp_path / "page" / "index.html").read_text()
         assert page.count("<svg role") + page.count('role="img"') >= 2
         assert ("inaccurate" in page) == (status == 1)
+        assert main(["report", str(tmp_path / "page" / "comparison.h5"), "-o", str(tmp_path / "again")]) == 0
+        assert (tmp_path / "again" / "index.html").read_text() == page
+        capsys.readouterr()
         assert main([*call, "--json"]) == status
         found = json.loads(capsys.readouterr().out)
         assert found["agrees"] == (status == 0)
         assert (found["channels"][0]["agrees_until"]["0.001"] == 10.0) == (status == 0)
     assert main([*call, "--tolerance", "0.1"]) == 0
+
+
+def test_the_stored_comparison_has_data_reference_and_errors_in_si(tmp_path: Path) -> None:
+    """Of a file in degrees with a channel left out; both readers of netCDF-4 take it, with scales and units."""
+    xarray = pytest.importorskip("xarray")
+    run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
+    late = run.time <= 9.0
+    pitch = np.degrees(run.angles[late, 1]) + 1e-3
+    found = rm.compare_data({"t_ms": 1e3 * run.time[late], "pitch_1_deg": pitch}, run.scene)
+    assert found.likely == ("pitch 1: zero off by 1.74533e-05",)
+    found.save(tmp_path / "c.h5")
+    for engine in ("h5netcdf", "netcdf4"):
+        with xarray.open_datatree(tmp_path / "c.h5", engine=engine) as tree:
+            data = tree["comparison/paper/fig03/data/trajectory"].to_dataset()
+        np.testing.assert_array_equal(data.time, found.study.data.time)
+        np.testing.assert_allclose(data.pitch_1, run.angles[late, 1] + np.radians(1e-3), atol=1e-15)
+        np.testing.assert_allclose(data.pitch_1_reference, run.reference.angles[late, 1], atol=1e-12)
+        np.testing.assert_array_equal(data.pitch_1_error, data.pitch_1 - data.pitch_1_reference)
+        np.testing.assert_array_equal(data.pitch_1_growth, found.study.carried[:, 0])
+        assert {one.attrs["units"] for one in data.data_vars.values()} == {"rad"}
+        assert (data.time.attrs["units"], data.attrs["status"], data.attrs["tolerance"]) == ("s", "inaccurate", 1e-6)
+        xarray.testing.assert_equal(data, found.to_xarray())
+    (record,) = read_records(tmp_path / "c.h5", "comparison")
+    assert as_dictionary(verdict_of(record)) == as_dictionary(found.verdict)
 
 
 def test_a_test_of_another_project() -> None:

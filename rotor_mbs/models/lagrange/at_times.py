@@ -1,8 +1,10 @@
-"""The closed form in double precision at chosen times, as it is or with some of its terms left out."""
+"""The closed form in double precision at chosen times: as it is, with terms left out, or with blades elsewhere."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,34 +13,46 @@ from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.closed_form import accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
-from rotor_mbs.models.lagrange.parameters import Number
+from rotor_mbs.models.lagrange.parameters import Number, rotor_form
 from rotor_mbs.models.lagrange.system import Propagation, build_system
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.record import Array, Trajectory
 
+Equations = Callable[..., list[Number]]  # as `closed_form.accelerations`
 _TAYLOR = 2.0**-52
 _DOP853 = (1e-12, 1e-14)
 
 
-def motion_at(scene: Scene, times: Array) -> Trajectory:
-    """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early."""
-    if not is_available():
-        return _by_scipy(scene, times, accelerations)
-    # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
-    run = Propagation(scene, build_system(scene), times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)
-    run.run()
-    return samples.trajectory(scene, times, run.states)
+def motion_at(scene: Scene, times: Array, equations: Equations | None = None) -> Trajectory:
+    """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early.
 
-
-def motion_without(scene: Scene, times: Array, terms: str) -> Trajectory:
-    """As `motion_at`, by equations without the terms of that name in `LEFT_OUT`."""
-    return _by_scipy(scene, times, LEFT_OUT[terms])
-
-
-def _by_scipy(scene: Scene, times: Array, equations: Callable[..., list[Number]]) -> Trajectory:
+    equations: in place of the closed form, with its signature; one of `LEFT_OUT`, or of `at_azimuths`
+    """
+    if equations is None and is_available():
+        # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
+        run = Propagation(scene, build_system(scene), times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)
+        run.run()
+        return samples.trajectory(scene, times, run.states)
     solver = OdeSolver(scene, scipy_integrator("DOP853", *_DOP853), times, equations)
     solver.integrate()
     return solver.observe()
+
+
+def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Equations:
+    """The closed form with each blade at another angle about the shaft than `Scene.phases`: (blades,) rad."""
+    form = rotor_form(scene)
+    places = [(math.cos(azimuth), math.sin(azimuth)) for azimuth in azimuths]
+    moving = [column - 1 for column in scene.moving_coordinates[1:]]
+    fixed = [i for i in range(len(places)) if i not in moving]
+    turned = replace(
+        form,
+        blades=tuple(
+            replace(blade, cos_phase=places[i][0], sin_phase=places[i][1])
+            for blade, i in zip(form.blades, moving, strict=True)
+        ),
+        fixed=tuple((weight, *places[i]) for (weight, _, _), i in zip(form.fixed, fixed, strict=True)),
+    )
+    return lambda angles, rates, _form, *rest: accelerations(angles, rates, turned, *rest)
 
 
 # The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with one kind of rate at a
@@ -79,7 +93,7 @@ def _without_products(angles: Sequence[Number], rates: Sequence[Number], *rest: 
     return (0.5 * (forth - back) + still).tolist()  # type: ignore[no-any-return]
 
 
-LEFT_OUT: Mapping[str, Callable[..., list[Number]]] = {
+LEFT_OUT: Mapping[str, Equations] = {
     "Coriolis terms (products of rotor rate and pitch rate)": _without_coriolis,
     "centrifugal terms (square of the rotor rate)": _without_centrifugal,
     "terms with products of rates": _without_products,

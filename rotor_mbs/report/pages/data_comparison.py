@@ -2,47 +2,47 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.data_verdict import LEVELS, DataVerdict
+from rotor_mbs.analysis.data_verdict import LEVELS, ChannelErrors, DataVerdict, from_dictionary
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
-from rotor_mbs.report.core.files import INDEX, render, write_pages
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.time_histories import Series
-from rotor_mbs.studies.compare_data import DataStudy
+from rotor_mbs.store.records import Record
 
 _ALLOWED = Look(GREY, ":", "")
 
 
-def write_comparison_page(study: DataStudy, output: Path) -> Path:
-    """The page into a folder; its path. Raises StoreError where it cannot be written."""
-    write_pages(output, {INDEX: render("data_comparison", comparison_page(study))})
-    return output / INDEX
-
-
-def comparison_page(study: DataStudy) -> dict[str, object]:
+def comparison_page(record: Record) -> dict[str, object]:
     """What the template has: verdict, pictures, tables."""
-    verdict = study.verdict
+    verdict = verdict_of(record)
     return {
         "scene": verdict.scene,
-        "title": study.scene.title,
+        "title": record.attributes["title"],
         "source": Path(verdict.source).name,
         "agrees": verdict.agrees,
         "status": verdict.status,
         "lead": _lead(verdict),
-        "errors": Section([*_motion(study), *_errors(study)], _legend(study)),
+        "errors": Section([*_motion(record, verdict), *_errors(record, verdict)], _legend(verdict)),
         "channels": Section(tables=[_table(verdict)]),
         "read": verdict.read,
         "unused": verdict.unused,
         "notes": verdict.notes,
     }
+
+
+def verdict_of(record: Record) -> DataVerdict:
+    return from_dictionary(json.loads(record.attributes["verdict"]))
 
 
 def _lead(verdict: DataVerdict) -> list[str]:
@@ -58,41 +58,44 @@ def _lead(verdict: DataVerdict) -> list[str]:
     return sentences + [f"The difference looks like: {cause}." for cause in verdict.likely]
 
 
-def error_panels(study: DataStudy, *, per_growth: bool = False) -> Panels:
+def error_panels(record: Record, *, per_growth: bool = False) -> Panels:
     """The error of each channel over time, on a logarithmic axis: in rad, or per unit of growth with the tolerance.
 
     Angles, or rates where the data have no angles.
     """
-    time, chosen = study.reference.time, _drawn(study)
-    expected = np.hstack([study.reference.angles, study.reference.rates])[:, study.data.columns]
-    errors = np.abs(study.data.values[: len(time)] - expected)
-    if per_growth:
-        errors = errors / study.carried
-    series = [Series(time, errors[:, j], _look(study, j)) for j in chosen]
+    verdict, time = verdict_of(record), record.arrays["time"]
+    drawn = _drawn(verdict)
+    series = []
+    for one in drawn:
+        errors = np.abs(_array(record, one, "_error"))
+        scale = _array(record, one, "_growth") if per_growth else 1.0
+        series.append(Series(time, errors / scale, _look(one)))
     if not per_growth:
-        return time_histories.errors(series, f"error ({study.data.channels[chosen[0]].unit})", study.verdict.horizon_s)
-    series.append(Series(time, np.full(len(time), study.verdict.tolerance), _ALLOWED))
-    return time_histories.errors(series, "error per unit of growth", study.verdict.horizon_s)
+        return time_histories.errors(series, f"error ({drawn[0].unit})", verdict.horizon_s)
+    series.append(Series(time, np.full(len(time), verdict.tolerance), _ALLOWED))
+    return time_histories.errors(series, "error per unit of growth", verdict.horizon_s)
 
 
-def _drawn(study: DataStudy) -> list[int]:
-    """Places of the channels that are drawn: the angles, else the rates."""
-    angles = [j for j, channel in enumerate(study.data.channels) if channel.kind == "angle"]
-    return angles or list(range(len(study.data.channels)))
+def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
+    return record.arrays[channel.name.replace(" ", "_") + ending]
 
 
-def _look(study: DataStudy, j: int) -> Look:
-    """Of a channel: that of its coordinate."""
-    return coordinate_look(study.data.columns[j] % (1 + len(study.scene.blades)))
+def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
+    """The channels that are drawn: the angles, else the rates."""
+    return [one for one in verdict.channels if one.unit == "rad"] or verdict.channels
 
 
-def _legend(study: DataStudy) -> list[LegendEntry]:
-    entries = [LegendEntry(study.data.channels[j].name, _look(study, j)) for j in _drawn(study)]
-    return [*entries, line_entry("tolerance", GREY, ":")]
+def _look(channel: ChannelErrors) -> Look:
+    """Of a channel: that of its coordinate, 0 the rotor, 1 the pitch of blade 1, ..."""
+    return coordinate_look(int("".join(filter(str.isdigit, channel.name)) or 0))
 
 
-def _errors(study: DataStudy) -> list[Picture]:
-    worst = max(study.verdict.channels, key=lambda one: one.error_per_growth)
+def _legend(verdict: DataVerdict) -> list[LegendEntry]:
+    return [*(LegendEntry(one.name, _look(one)) for one in _drawn(verdict)), line_entry("tolerance", GREY, ":")]
+
+
+def _errors(record: Record, verdict: DataVerdict) -> list[Picture]:
+    worst = max(verdict.channels, key=lambda one: one.error_per_growth)
     captions = (
         "Error against the reference at the times of the data; vertical line: horizon",
         "Error per unit of error growth, up to the horizon to be below the tolerance",
@@ -102,32 +105,32 @@ def _errors(study: DataStudy) -> list[Picture]:
         f"The largest is {number(worst.error_per_growth)}, {worst.name}.",
     )
     return [
-        picture(error_panels(study, per_growth=bool(i)), f"errors-{i}", caption, texts[i])
+        picture(error_panels(record, per_growth=bool(i)), f"errors-{i}", caption, texts[i])
         for i, caption in enumerate(captions)
     ]
 
 
-def _motion(study: DataStudy) -> list[Picture]:
+def _motion(record: Record, verdict: DataVerdict) -> list[Picture]:
     """Angles of the reference as lines, those of the data as marks."""
-    count, data, time = 1 + len(study.scene.blades), study.data, study.reference.time
-    chosen = [j for j, column in enumerate(data.columns) if column < count]
+    chosen, time = [one for one in verdict.channels if one.unit == "rad"], record.arrays["time"]
     if not chosen:
         return []
     panels = canvas.panels((2.9,), time_histories.TIME_AXIS)
     axes = panels.axes[0]
     every = max(1, len(time) // 40)
-    for j in chosen:
-        column = data.columns[j]
-        look = coordinate_look(column)
-        axes.plot(*time_histories.thin(time, study.reference.angles[:, column]), color=look.colour, linestyle=look.line)
+    for one in chosen:
+        look = _look(one)
+        reference = time_histories.thin(time, _array(record, one, "_reference"))
+        axes.plot(*reference, color=look.colour, linestyle=look.line)
         axes.plot(
-            time[::every], data.values[: len(time) : every, j], linestyle="none", marker="o", markersize=3.6,
+            time[::every], _array(record, one)[::every], linestyle="none", marker="o", markersize=3.6,
             markerfacecolor="none", markeredgecolor=look.colour,
         )  # fmt: skip
-    time_histories.set_range(axes, np.hstack([study.reference.angles, data.values[: len(time), chosen]]))
+    drawn = [_array(record, one, ending) for one in chosen for ending in ("", "_reference")]
+    time_histories.set_range(axes, np.stack(drawn, axis=1))
     axes.set_ylabel(time_histories.ANGLE_AXIS)
     caption = "Angles: reference as lines, data as circles"
-    return [picture(panels, "motion", caption, f"{caption}; {study.scene.title}.")]
+    return [picture(panels, "motion", caption, f"{caption}; {record.attributes['title']}.")]
 
 
 def _table(verdict: DataVerdict) -> PageTable:
