@@ -27,9 +27,9 @@ from rotor_mbs.scenario.plausibility import doubts
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.solution.metrics import metrics_of
-from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.text_table import TextTable
+from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 

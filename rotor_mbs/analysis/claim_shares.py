@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.claims import all_hold, readings_of
 from rotor_mbs.analysis.published import Published, TrajectoryNumber
-from rotor_mbs.analysis.statistics import measure
+from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.solution.status import COMPLETE, code_of
 
 Array = NDArray[np.float64]

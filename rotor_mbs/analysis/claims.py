@@ -8,7 +8,7 @@ from typing import Protocol
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
-from rotor_mbs.analysis.statistics import measure
+from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 

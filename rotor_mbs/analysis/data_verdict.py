@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.solution.metrics import horizon, horizon_samples
-from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s: until when data agree to each
 DEFAULT_TOLERANCE = 1e-6  # rad per unit of error growth

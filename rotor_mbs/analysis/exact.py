@@ -14,7 +14,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import Table
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 
 def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 
 def tip_paths(scene: Scene, angles: Array) -> Array:

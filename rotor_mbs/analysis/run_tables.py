@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from rotor_mbs.analysis.claim_shares import ClaimShares
+from rotor_mbs.analysis.finding import Finding
 from rotor_mbs.analysis.run_selection import in_catalogue_order
-from rotor_mbs.analysis.summary import Finding
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.solution.text_table import TextTable

@@ -14,9 +14,9 @@ import numpy as np
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.data_origin import copies, settings_faults, steps_off
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.rehydrate import Rehydrated, reference_of, rehydrate
+from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
 from rotor_mbs.scenario.accuracy_bounds import Bounds
@@ -25,9 +25,9 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import energy_slack, judge, quantity_bound, quantity_errors, start_slack
 from rotor_mbs.solution.metrics import Metrics, energy_scale, metrics_of
 from rotor_mbs.solution.quantities import energy_error
-from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
+from rotor_mbs.solution.trajectory import Array, Trajectory
 from rotor_mbs.store.digests import DIGESTS
 from rotor_mbs.store.hdf5 import reading
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene, all_damages

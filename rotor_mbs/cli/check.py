@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from rotor_mbs.analysis.regressions import regressions
+from rotor_mbs.analysis.verdict_changes import regressions
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import StoreError

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.analysis.claims import claims
+from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.run_tables import finding_lines, method_table, run_table
-from rotor_mbs.analysis.summary import finding
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
 from rotor_mbs.methods.catalogue import check_names

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from rotor_mbs.cli.streams import show
 from rotor_mbs.cli.terminal import SweepProgress, span
 from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.pool import TaskPool
-from rotor_mbs.execution.task_pools import open_task_pool
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.sweep import Sweep
@@ -64,7 +64,7 @@ def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
         line = draw(study, result.path, output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)
     if arguments.metadata:
-        from rotor_mbs.studies.describe import describe
+        from rotor_mbs.studies.sweep_metadata import describe
 
         names = ", ".join(place.name for place in describe(result.path))
         print(f"{result.path}: described in {names}", file=sys.stderr if arguments.json else sys.stdout)

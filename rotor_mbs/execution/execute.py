@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeAlias
 
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.output import RESULTS, writing
+from rotor_mbs.execution.output_lock import RESULTS, writing
 from rotor_mbs.execution.pool import Finished, run_tasks
 
 # Statuses of a case of which there is no record: the same call tries it again.

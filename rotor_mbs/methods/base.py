@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # reading the catalogue needs none of them
     from rotor_mbs.scenario.accuracy_bounds import Bound
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.linearization import Linearization
-    from rotor_mbs.solution.record import Array, Integration, Trajectory
+    from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 __all__ = ["BuiltItem", "Look", "Method", "RunBlock", "Settings", "Solver", "stability_polynomial"]
 

@@ -19,8 +19,8 @@ from rotor_mbs.report.plots.paths import paths
 from rotor_mbs.report.plots.time_histories import Motion, Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import LOADS
-from rotor_mbs.solution.record import Array, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 
 class RunPlots:

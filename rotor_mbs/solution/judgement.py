@@ -22,8 +22,8 @@ from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, Metrics, metrics_of
 from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities
-from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 
 HORIZON_GROWTH = 1e5  # a scene's horizon: when an error of the initial state may have grown this many times
 

@@ -13,7 +13,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import SCALES, Array, Quantity, arrays, quantities, scale_values
-from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 
 @dataclass

@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.execution.output import RESULTS, writing
+from rotor_mbs.execution.output_lock import RESULTS, writing
 from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5

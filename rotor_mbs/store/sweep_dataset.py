@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.output import SWEEP, writing
+from rotor_mbs.execution.output_lock import SWEEP, writing
 from rotor_mbs.scenario.sweep_design import split_rows
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store import digests, hdf5, sweep_layout

@@ -27,8 +27,8 @@ from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
-from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.status import COMPLETE, code_of
+from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import Record, write_records
 from rotor_mbs.store.results_file import ResultsStore

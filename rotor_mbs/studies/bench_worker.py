@@ -20,9 +20,9 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import Metrics
-from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 from rotor_mbs.studies.stored_references import load_reference
 
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and

@@ -9,7 +9,7 @@ from string import Template
 
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.metrics import HORIZON_GROWTH, horizon
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 
 # rad per unit of error amplification: the largest error that is accepted.
 ACCEPTED = 1e-6

@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rotor_mbs.analysis.data_origin import defaults_faults
+from rotor_mbs.analysis.run_integrity import defaults_faults
 from rotor_mbs.analysis.verdicts import Verdict, verdicts
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.case import Case

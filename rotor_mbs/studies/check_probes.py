@@ -20,7 +20,7 @@ from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, running_growth
-from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array, Trajectory
 from rotor_mbs.studies.check_printed import differences
 from rotor_mbs.studies.check_status_rules import SCENE, known_runs, metrics_off, shares_off
 from rotor_mbs.studies.ensembles import compare_ensembles

@@ -16,8 +16,8 @@ from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.judgement import judge, rotor_inertia_shares
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of
-from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # The engine's report, as arguments of `Integration`: success, message, time reached, steps, evaluations, out of time.
 _DONE, _FAILED = (True,), (False, "gave up")

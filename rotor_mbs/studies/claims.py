@@ -15,9 +15,9 @@ from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, MeasuredRun
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import StoreError
+from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.pool import SerialPool, TaskPool
 from rotor_mbs.execution.provenance import versions
-from rotor_mbs.execution.task_pools import open_task_pool
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import Sweep, sweep_of

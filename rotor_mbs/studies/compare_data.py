@@ -28,8 +28,8 @@ from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 from rotor_mbs.store.layout import Column
 from rotor_mbs.store.records import Record
 from rotor_mbs.studies.data_causes import CauseSearch

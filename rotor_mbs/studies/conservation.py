@@ -17,7 +17,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.impulse import angular_momentum
 from rotor_mbs.solution.metrics import energy_scale
 from rotor_mbs.solution.quantities import energy_error
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.records import Record
 
 SYMMETRY, DRIFT = "symmetry", "drift"

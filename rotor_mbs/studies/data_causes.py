@@ -23,7 +23,7 @@ from rotor_mbs.models.lagrange.at_times import Equations, motion_at
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, running_growth
-from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # A cause fits where what is left is within the tolerance, or a thousandth of what there was and at most this.
 _LEFT = 1e-3

@@ -20,7 +20,7 @@ from rotor_mbs.analysis.distributions import (
 )
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 
 # rad: half the width of the uniform distribution of every angle at the start.
 SPREAD = 1e-3

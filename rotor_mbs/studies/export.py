@@ -18,7 +18,7 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import scene_toml
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import Array, Quantity
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.benchmark_text import description, evaluation_program
 from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
 

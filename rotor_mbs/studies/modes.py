@@ -37,7 +37,7 @@ from rotor_mbs.store.records import write_records
 from rotor_mbs.store.results_file import ResultsStore
 
 if TYPE_CHECKING:
-    from rotor_mbs.models.lagrange.turn import Turn
+    from rotor_mbs.models.lagrange.floquet import Turn
 
 # Whose text decides a record, besides what decides a run.
 _SOURCES = ("analysis/modes.py", "analysis/campbell.py", "analysis/mode_records.py", "studies/modes.py")
@@ -217,7 +217,7 @@ def floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
 
     Raises MethodRefusal where heyoka is not installed.
     """
-    from rotor_mbs.models.lagrange.turn import periodic_turn
+    from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     turns: list[Turn] = []
     for speed in map(float, speeds[::-1]):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials, trial
 from rotor_mbs.analysis.published import Published, published
 from rotor_mbs.analysis.run_selection import PRINTED
-from rotor_mbs.analysis.statistics import measure
+from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import find_method
@@ -17,8 +17,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Array
 
 DURATIONS = (8.0, 9.0, 10.0, 11.0, 12.0, 13.0)  # s
 TOLERANCES = ((1e-5, 1e-9), (1e-6, 1e-8), (1e-6, 1e-9), (1e-6, 1e-10), (1e-7, 1e-9), (1e-8, 1e-9))

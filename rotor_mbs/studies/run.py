@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.execution.output import RESULTS, writing
+from rotor_mbs.execution.output_lock import RESULTS, writing
 from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
@@ -29,8 +29,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.store.layout import KEY_ATTRIBUTE, LIMIT
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import ResultsStore

@@ -21,7 +21,7 @@ from rotor_mbs.models.printed.methods import PrintedModel
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.solution.metrics import HORIZON_GROWTH
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.studies.data_causes import FEWEST, CauseSearch, Motion, causes_in_the_data, factors, states_at
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)

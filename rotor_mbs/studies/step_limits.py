@@ -20,8 +20,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import Judgement, judge
-from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.status import COMPLETE, code_of
+from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.records import Record
 from rotor_mbs.studies.stored_references import load_reference
 

@@ -15,8 +15,8 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import LOADS
-from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.store.read import StoredRun, open_results
 
 

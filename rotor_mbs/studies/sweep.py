@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.pool import Finished, TaskPool, run_in
 from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
-from rotor_mbs.execution.task_pools import open_task_pool
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.scene import scene_hash

@@ -22,9 +22,9 @@ from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
-from rotor_mbs.solution.record import Array, Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 from rotor_mbs.store.sweep_columns import Rows, RunColumns
 from rotor_mbs.store.sweep_layout import AMPLIFICATION, MESSAGE_BYTES, METRICS, empty_rows, lost_rows
 

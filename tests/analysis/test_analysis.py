@@ -14,9 +14,9 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import claims, rounds_to
 from rotor_mbs.analysis.errata import CheckedEntry, effects, entries, write_errata
 from rotor_mbs.analysis.exact import escape_rate
+from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, errata, published
-from rotor_mbs.analysis.statistics import STATISTICS, measure
-from rotor_mbs.analysis.summary import finding
+from rotor_mbs.analysis.trajectory_numbers import STATISTICS, measure
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import open_results
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from support.stored import Made, rotor, store
 
+from rotor_mbs.analysis.finding import Finding, Tally
 from rotor_mbs.analysis.run_tables import bench_table, finding_lines, method_table, run_table
-from rotor_mbs.analysis.summary import Finding, Tally
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import Record

@@ -9,7 +9,7 @@ from rotor_mbs.methods.base import BuiltItem, Look, Method, Settings, stability_
 from rotor_mbs.methods.ladders import step_ladder
 from rotor_mbs.methods.settings import number
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from rotor_mbs.methods.base import Look, Method, Settings
 from rotor_mbs.methods.settings import number
-from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.methods.base import BuiltItem
 
 @dataclass(frozen=True)

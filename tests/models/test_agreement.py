@@ -15,8 +15,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of, running_growth
-from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Trajectory
 
 BEST = ("lagrange/taylor", "exudyn_tree/rk67")
 BOUND = {"lagrange/taylor": 1e-10, "exudyn_tree/rk67": 1e-9}  # rad, up to the horizon, on every scene

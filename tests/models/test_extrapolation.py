@@ -11,8 +11,8 @@ from support.references import reference, run, scene
 from rotor_mbs.models.exudyn.extrapolation import extrapolated
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon_samples
-from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Trajectory
 
 ALPHA, NEWMARK = "exudyn_chain/generalized_alpha", "exudyn_chain/newmark_index2"
 RICHARDSON = {"extrapolation": "richardson"}

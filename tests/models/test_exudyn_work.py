@@ -11,7 +11,7 @@ from support.rotors import PAPER, make_scene
 
 from rotor_mbs.models.exudyn import energy, timetable
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # A torque of 0 to 4 N m, then a jump to 10: ∫ over a rate of one is t² / 2, then 8 + 10 (t - 4).
 TORQUE = ((0.0, 0.0), (4.0, 4.0), (4.0, 10.0), (8.0, 10.0))

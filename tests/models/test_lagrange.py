@@ -20,7 +20,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import energy_scale
 from rotor_mbs.solution.quantities import energy_error
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 
 heyoka = pytest.importorskip("heyoka")
 

@@ -21,7 +21,7 @@ from rotor_mbs.models.printed.methods import METHODS as PRINTED
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import sweep_of
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 
 # Settings at which a method has the exact solutions below to 1e-10 rad.
 TO_ROUND_OFF: dict[str, dict[str, object]] = {

@@ -12,7 +12,7 @@ from support.references import scene as shipped_scene
 from support.scenes import PAPER, paper
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange.system import Propagation, build_system
+from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.store.read import open_results

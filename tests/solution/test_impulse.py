@@ -13,7 +13,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.metrics import metrics_of
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 
 WITH_LOADS = ("angles", "rates", "energy", "loads")
 JUMPS = ((0.0, 0.0), (0.5, 20000.0), (0.7525, 30000.0), (0.7525, -15000.0), (1.2, 10000.0))

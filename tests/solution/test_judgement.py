@@ -25,8 +25,8 @@ from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution import judgement
 from rotor_mbs.solution.judgement import Judgement, energy_conditioning, judge
-from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 BOUNDS = {
     "lagrange/taylor": (1e-12, 1e-11),

@@ -13,8 +13,8 @@ from rotor_mbs.models.exudyn import tree
 from rotor_mbs.models.exudyn.timetable import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 AT_REST = paper("fig05", duration=1.0, samples=11)
 

@@ -13,8 +13,8 @@ from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
-from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies.run import solve_judged
 
 METHOD = "lagrange/dop853"

@@ -14,7 +14,7 @@ from rotor_mbs.execution.timing import Timings, Warm, allot, conduct, statistics
 from rotor_mbs.methods.base import BuiltItem, Settings
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench_worker
 from rotor_mbs.studies.bench_worker import Point, PointTimer, Prepared
 

@@ -21,7 +21,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of
-from rotor_mbs.solution.record import Trajectory
+from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.export import FORMATS, export
 
 # Springs, dampers, full inertia, torque with a jump between samples; blades that cannot pitch; point masses, chaotic.

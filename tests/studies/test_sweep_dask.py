@@ -16,7 +16,7 @@ from support.sweeps import stored_runs
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution import task_pools
+from rotor_mbs.execution import dask_cluster
 from rotor_mbs.execution.pool import SerialPool
 
 pytest.importorskip("distributed")
@@ -86,7 +86,7 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(
 
 
 def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
-    here = task_pools.identity()
+    here = dask_cluster.identity()
     assert {"rotor_mbs", "numpy", "heyoka", "python", "code of rotor_mbs"} <= set(here)
     for name in here:
         other = SerialPool().submit(partial(_run_as_worker, here | {name: "other"}), 3, 1.0)
@@ -96,7 +96,7 @@ def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
 
 
 def _run_as_worker(expected: dict[str, str], task: int) -> int:
-    return task_pools.run_as_worker(abs, task, 10.0, expected)
+    return dask_cluster.run_as_worker(abs, task, 10.0, expected)
 
 
 def test_a_scheduler_that_dies_ends_in_one_line(

@@ -28,11 +28,11 @@ from support.comparison_dop853 import straightforward
 from support.scenes import paper
 
 from rotor_mbs.cli import main
-from rotor_mbs.execution.task_pools import open_task_pool
+from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import ensemble
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
-from rotor_mbs.models.lagrange.system import build_system
+from rotor_mbs.models.lagrange.taylor import build_system
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import plan_sweep

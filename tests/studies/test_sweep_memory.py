@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from rotor_mbs.execution.task_pools import open_task_pool
+from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import perform

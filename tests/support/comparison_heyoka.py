@@ -17,7 +17,7 @@ import heyoka as hy
 import numpy as np
 
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
-from rotor_mbs.models.lagrange.system import build_system
+from rotor_mbs.models.lagrange.taylor import build_system
 from rotor_mbs.scenario.scene import Scene
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotor_mbs.models.lagrange.heyoka_adapter import heyoka
 from rotor_mbs.models.lagrange.parameters import load_segments
-from rotor_mbs.models.lagrange.system import build_system, set_parameters
+from rotor_mbs.models.lagrange.taylor import build_system, set_parameters
 from rotor_mbs.scenario.scene import Scene
 
 _BITS = 180

@@ -9,8 +9,8 @@ import pytest
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.stored_references import rebuilt_reference
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import metrics_of
-from rotor_mbs.solution.record import Integration, Trajectory
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.store.results_file import merge
 from rotor_mbs.store.write import write_run
 

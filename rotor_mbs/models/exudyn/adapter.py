@@ -19,7 +19,7 @@ from rotor_mbs.methods.time_limit import message as out_of_time
 from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.timetable import IntegrationInterval, steps_and_rows
-from rotor_mbs.solution.record import Array, Integration
+from rotor_mbs.solution.trajectory import Array, Integration
 
 os.environ.setdefault("EXUDYN_SUPPRESS_UI_WINDOW_OPEN", "1")
 os.environ.setdefault("EXUDYN_MODULE", "fast")

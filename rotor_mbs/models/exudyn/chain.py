@@ -31,7 +31,7 @@ from rotor_mbs.models.exudyn.loads import chain_sensors
 from rotor_mbs.models.exudyn.timetable import ROTOR, Loads, Moment, constant_rest, is_driven, pitch_terms
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import is_constant
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 NODES = ("euler_parameters", "rotation_vector")
 

@@ -13,7 +13,7 @@ from rotor_mbs.models.exudyn.geometry import pitching
 from rotor_mbs.models.exudyn.timetable import ROTOR, LoadSegment, pitch_terms, rest_of, sample_times
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import is_constant, value_at
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # Points of the local polynomial that stands in for the power between rows.
 _POINTS = 6

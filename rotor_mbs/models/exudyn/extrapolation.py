@@ -16,7 +16,7 @@ import numpy as np
 
 from rotor_mbs.methods.base import Solver
 from rotor_mbs.solution.quantities import BUILT_IN
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 NONE, RICHARDSON = "none", "richardson"
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # (3, 3) frame whose z axis is the shaft: columns are its x, y, z.
 ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])

@@ -21,7 +21,7 @@ from rotor_mbs.models.exudyn.geometry import pitching, quaternion
 from rotor_mbs.models.exudyn.timetable import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # rad, m: the smallest step and how often it is doubled. Each doubling takes one order of the step out of the error.
 _STEP, _DOUBLINGS = 1e-3, 5

@@ -15,7 +15,7 @@ from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
 from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, blade_body, fixed_blade_rotation, mounting, pitching
 from rotor_mbs.models.exudyn.timetable import ROTOR, LoadSegment, is_driven
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # (name of a sensor) -> (samples, k) values
 Sampled = Callable[[str], Array]

@@ -23,7 +23,7 @@ from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, Extrapolated
 from rotor_mbs.models.exudyn.timetable import Loads, LoadSegment, integration_intervals
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8

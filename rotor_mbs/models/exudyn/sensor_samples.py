@@ -13,7 +13,7 @@ from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
 from rotor_mbs.models.exudyn.loads import chain_loads, tree_loads
 from rotor_mbs.models.exudyn.timetable import LoadSegment, sample_times
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 Indices = NDArray[np.intp]
 

@@ -20,7 +20,7 @@ from rotor_mbs.models.exudyn.loads import tree_sensors
 from rotor_mbs.models.exudyn.timetable import ROTOR, Loads, Moment, constant_rest, pitch_terms
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import is_constant
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 _TREE = Ref("object", "rotor")
 _NODE = Ref("node", "joint angles")

@@ -14,9 +14,9 @@ from rotor_mbs.models.lagrange.closed_form import accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import Number, rotor_form
-from rotor_mbs.models.lagrange.system import Propagation, build_system
+from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 Equations = Callable[..., list[Number]]  # as `closed_form.accelerations`
 _TAYLOR = 2.0**-52

@@ -22,7 +22,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failu
 from rotor_mbs.models.lagrange.loads import sampled_loads
 from rotor_mbs.models.lagrange.parameters import changing_loads, work_is_integrated
 from rotor_mbs.models.lagrange.samples import at_constant_rests, constant_work
-from rotor_mbs.models.lagrange.system import (
+from rotor_mbs.models.lagrange.taylor import (
     compiled,
     equation_numbers,
     is_compact,
@@ -30,7 +30,7 @@ from rotor_mbs.models.lagrange.system import (
     state_symbols,
 )
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
 _HUGE = 1e13

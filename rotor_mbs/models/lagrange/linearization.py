@@ -20,7 +20,7 @@ from rotor_mbs.models.lagrange.parameters import RotorForm, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # rad: a step of Newton's method below this is followed by three more, and the state is found.
 _CLOSE = 1e-6

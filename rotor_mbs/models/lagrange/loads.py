@@ -21,7 +21,7 @@ from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, heyoka
 from rotor_mbs.models.lagrange.parameters import Convert, Number, load_tables, loads_before, phase_of, rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 Function = Callable[[Any], Any]
 Vector = tuple[Number, Number, Number]

@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.methods.base import Look, Method, RunBlock
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
-from rotor_mbs.models.lagrange import heyoka_adapter, reference, samples, system
+from rotor_mbs.models.lagrange import heyoka_adapter, reference, samples, taylor
 from rotor_mbs.models.lagrange.ode_solvers import Integrator, OdeSolver, ode45_integrator, scipy_integrator
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.scenario.scene import Scene
@@ -95,8 +95,8 @@ METHODS = (
         label="closed form, Taylor",
         look=Look(_BLUE, "-", "o"),
         settings=TaylorSettings,
-        build=lambda scene, settings: system.TaylorSolver(scene, settings.tolerance),
-        items=system.items,
+        build=lambda scene, settings: taylor.TaylorSolver(scene, settings.tolerance),
+        items=taylor.items,
         solve_many=_taylor_many,
         load=heyoka_adapter.compile_anew,
         distributions=("heyoka",),

@@ -24,7 +24,7 @@ from rotor_mbs.models.lagrange.parameters import (
 )
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 # As closed_form.accelerations
@@ -38,7 +38,7 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 class OdeSolver:
     """Any integrator over the scene, one call per segment of the loads.
 
-    times           as of `system.Propagation`
+    times           as of `taylor.Propagation`
     accelerations   the equations, where they are not the closed form as it is
     """
 

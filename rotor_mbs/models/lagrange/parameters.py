@@ -19,7 +19,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import Table, is_constant, knots
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic parameter.
 Number = Any

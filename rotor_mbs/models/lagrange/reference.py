@@ -13,9 +13,9 @@ from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.loads import quad_loads
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import rate_units
-from rotor_mbs.models.lagrange.system import Propagation, build_system
+from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # The uncertainty is this many times what two runs show. They differ in their truncation errors and in the rounding of
 # each step, but not in what they share: the rounded coefficients, and the rounding of a motion that both step through

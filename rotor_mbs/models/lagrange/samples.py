@@ -15,7 +15,7 @@ from rotor_mbs.models.lagrange.loads import sampled_loads
 from rotor_mbs.models.lagrange.parameters import LoadSegment, RotorForm, changing_loads, load_tables, rotor_form
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 
 class Advance(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods import time_limit
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # The engine's types are compiled. Without this, it writes its warnings to a file in the working folder.
 _engine: Any = mujoco

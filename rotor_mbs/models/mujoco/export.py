@@ -6,7 +6,7 @@ import math
 from xml.etree import ElementTree as ET
 
 from rotor_mbs.models.mujoco import mjcf
-from rotor_mbs.models.mujoco.loads import loads_of, segments, steps_and_rows
+from rotor_mbs.models.mujoco.timetable import loads_of, segments, steps_and_rows
 from rotor_mbs.scenario.scene import Scene
 
 STEP = 2.5e-4  # s, of the file where none is given: the default of mujoco/rk4

@@ -9,10 +9,10 @@ import numpy as np
 
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.models.mujoco.adapter import Engine
-from rotor_mbs.models.mujoco.loads import segments
+from rotor_mbs.models.mujoco.timetable import segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # rad, rad/s: the steps. The error is a power series of the step's square: each takes two orders of it away.
 _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)

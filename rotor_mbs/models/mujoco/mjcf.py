@@ -27,7 +27,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.models.mujoco.loads import constant_rest, loads_of
+from rotor_mbs.models.mujoco.timetable import constant_rest, loads_of
 from rotor_mbs.scenario.scene import Scene
 
 LEAST = 2e-15  # kg, kg m²

@@ -13,7 +13,7 @@ import numpy as np
 from rotor_mbs.methods import time_limit
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.models.mujoco.adapter import Engine, Poses
-from rotor_mbs.models.mujoco.loads import (
+from rotor_mbs.models.mujoco.timetable import (
     Interval,
     Segment,
     intervals,
@@ -24,7 +24,7 @@ from rotor_mbs.models.mujoco.loads import (
 )
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import is_constant, value_at
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # Evaluations of the equations of motion in a step.
 _STAGES = {"rk4": 4, "implicitfast": 1}

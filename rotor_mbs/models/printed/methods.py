@@ -20,7 +20,7 @@ from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.observables import PointMassRotor, torque_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, is_constant, value_at
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.summary import ENERGY_RISE, Finding
+from rotor_mbs.analysis.finding import ENERGY_RISE, Finding
 from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit

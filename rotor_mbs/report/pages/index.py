@@ -8,8 +8,8 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claim_records import ClaimStudy
 from rotor_mbs.analysis.claim_shares import ClaimShares
 from rotor_mbs.analysis.claims import Claim
+from rotor_mbs.analysis.finding import Agreement, Finding, PrintedEnergy, Reproduced, Tally, finding
 from rotor_mbs.analysis.published import Erratum
-from rotor_mbs.analysis.summary import Agreement, Finding, PrintedEnergy, Reproduced, Tally, finding
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit

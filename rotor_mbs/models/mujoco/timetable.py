@@ -15,7 +15,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, is_constant, knots, value_at
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # A kink closer to a sample than this share of the sample interval is moved onto it.
 _SAME = 1e-9

@@ -14,8 +14,8 @@ from support.rotors import acceleration, make_scene
 from support.scenes import general
 
 from rotor_mbs.analysis.modes import floquet
+from rotor_mbs.models.lagrange.floquet import Turn, periodic_turn
 from rotor_mbs.models.lagrange.linearization import linearize
-from rotor_mbs.models.lagrange.turn import Turn, periodic_turn
 from rotor_mbs.scenario.scene import Blade, Scene
 
 pytest.importorskip("heyoka")

@@ -12,7 +12,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.scenario.accuracy_bounds import expected_settings
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 _COMPARED = ("angles", "rates")

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rotor_mbs.cli import main
-from rotor_mbs.studies.describe import describe
+from rotor_mbs.studies.sweep_metadata import describe
 
 ROOT = Path(__file__).parents[2]
 SWEEP = """

@@ -28,10 +28,10 @@ from rotor_mbs.models.lagrange.linearization import (
 )
 from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
-from rotor_mbs.models.lagrange.system import compiled
+from rotor_mbs.models.lagrange.taylor import compiled
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.record import Array
+from rotor_mbs.solution.trajectory import Array
 
 # What is left of a turn's mismatch, in rad and in shares of the speed: Newton's method ends at the first, and its best
 # state counts as periodic below the second. (A multiplier of 1e9 amplifies the rounding of 1e-16 to 1e-7.)

@@ -25,7 +25,7 @@ from rotor_mbs.models.lagrange.parameters import (
 )
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.record import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # Unrolled code is twice as fast as compact code, but its compile time grows with the number of blades.
 _UNROLLED_BLADES = 4
