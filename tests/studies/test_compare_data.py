@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +97,34 @@ def test_an_exported_script_for_exudyn_agrees(tmp_path: Path) -> None:
     found = rm.compare_data(tmp_path / "out.csv", rm.scene("check/pitch-loads"))
     assert (found.status, found.message) == ("ok", "")
     assert len(found.verdict.channels) == 8
+
+
+@pytest.mark.parametrize("name", ["paper/fig08", "paper/fig09", "paper/fig11", "check/general", "check/pitch-loads"])
+def test_a_script_for_pinocchio_agrees(tmp_path: Path, name: str) -> None:
+    """By the interpreter that PINOCCHIO_PYTHON names, which need not have this package; see `support`'s script."""
+    python = os.environ.get("PINOCCHIO_PYTHON", sys.executable)
+    if subprocess.run([python, "-c", "import pinocchio"], capture_output=True, check=False).returncode:
+        pytest.skip("no pinocchio: pip install pin, or PINOCCHIO_PYTHON")
+    scene = rm.scene(name)
+    duration = scene.duration
+    blades = range(len(scene.blades))
+    bearings, loads = zip(*map(scene.bearing, blades), strict=True), zip(*map(scene.pitch_load, blades), strict=True)
+    (stiffness, damping), (torques, rests) = bearings, loads
+    knots = [t for table in (scene.rotor_torque, *torques, *rests) for t, _ in table if 0.0 < t < duration]
+    rotor = {
+        "blades": [asdict(blade) for blade in scene.blades], "hub_inertia": scene.hub_inertia, "gravity": scene.gravity,
+        "stiffness": stiffness, "damping": damping, "shaft_damping": scene.shaft_damping,
+        "angles": scene.initial_angles, "rates": scene.initial_rates, "loads": [scene.rotor_torque, *torques, *rests],
+        "times": np.union1d(uneven(duration), knots).tolist(),
+    }  # fmt: skip
+    (tmp_path / "rotor.json").write_text(json.dumps(rotor))
+    script = Path(__file__).parents[1] / "support" / "pinocchio_script.py"
+    subprocess.run([python, "-P", script, "rotor.json", "pinocchio.csv"], check=True, cwd=tmp_path)
+    found = rm.compare_data(tmp_path / "pinocchio.csv", scene)
+    assert (found.status, found.message) == ("ok", "")
+    # As of the other code: SciPy at 1e-11; a wrong number in the model makes 1e-4 at least.
+    assert max(one.error_per_growth for one in found.verdict.channels) < 1e-8
+    assert len(found.verdict.channels) == 2 * len(scene.initial_angles)
 
 
 def test_the_reference_at_the_times_of_the_data_is_the_frozen_one() -> None:
