@@ -152,7 +152,7 @@ def solve_judged(
     try:
         run = solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
     except OutOfTimeError as exc:
-        run = _without_samples(scene, method, str(exc), settings or {})
+        run = _without_samples(scene, method, str(exc), own)
         return replace(run, status="timed_out", message=str(exc)), reference
     judgement = judge(scene, run, reference)
     message = judgement.message + next_to_try(scene, method, run.settings, judgement.status)
@@ -252,7 +252,8 @@ def store_failure(status: str, job: Job, message: str) -> Result:
 def _without_samples(scene: Scene, method: str, message: str, settings: Mapping[str, object]) -> Solution:
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
-    return Solution(scene, method, trajectory, Integration(False, message), dict(settings))
+    chosen = find_method(method).settings.of(method, settings).as_dict()
+    return Solution(scene, method, trajectory, Integration(False, message), chosen)
 
 
 def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
