@@ -12,12 +12,15 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.execution.case import Case
+from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import merge
 from rotor_mbs.store.write import write_run
+from rotor_mbs.studies.run import store_failure
 
 SCENE = paper("fig08", duration=1.0, samples=51)
 
@@ -45,6 +48,15 @@ def test_round_trip_is_bit_exact(tmp_path: Path) -> None:
         assert found.labels == list(SCENE.coordinate_labels)
         assert scene.attributes["scene_toml"] == SCENE.text
         assert results.attributes["numpy"] == np.__version__
+
+
+def test_a_run_without_samples_has_all_its_settings(tmp_path: Path) -> None:
+    case = Case(SCENE, "lagrange/dop853", {"relative_tolerance": 1e-3})
+    store_failure("timed_out", Job(case, tmp_path / "a.h5"), "over its time limit")
+    with open_results(tmp_path / "a.h5") as results:
+        settings = results.scenes["paper/fig08"].runs["lagrange/dop853"].settings
+    assert settings["relative_tolerance"] == 1e-3
+    assert settings.keys() == made().settings.keys()
 
 
 @pytest.mark.parametrize("outputs", [("angles",), ("tip",), ("energy",), ("rates", "energy")])
