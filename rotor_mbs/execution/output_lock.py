@@ -33,8 +33,8 @@ def writing(output: Path, kind: str) -> Iterator[Path]:
 
     Raises InputError where another process is writing it or the folder has something else, StoreError.
     """
-    place = _resolved(output)
-    parts, own = place.with_name(f"{place.name}.parts"), (place, threading.get_ident())
+    place, parts = _resolved(output), _parts_of(output)
+    own = place, threading.get_ident()
     if own in _held:
         yield parts
         return
@@ -60,6 +60,16 @@ def writing(output: Path, kind: str) -> Iterator[Path]:
         del _held[own]
         _leave(parts)
         lock.release()
+
+
+def has_unfinished(output: Path) -> bool:
+    """Whether another process writes it now, or finished work waits to be taken into it."""
+    return _parts_of(output).exists()
+
+
+def _parts_of(output: Path) -> Path:
+    place = _resolved(output)
+    return place.with_name(f"{place.name}.parts")
 
 
 def _resolved(output: Path) -> Path:

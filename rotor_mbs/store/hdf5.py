@@ -206,7 +206,7 @@ def copy_group(source: Any, target: Any) -> None:
     datasets = {name: item for name, item in members(source) if not is_group(item)}
     for name, item in datasets.items():
         copied = target.create_dataset(name, data=values_of(item), compression=item.compression, shuffle=item.shuffle)
-        copied.attrs.update({key: value for key, value in item.attrs.items() if key not in _SCALE_ATTRIBUTES})
+        copied.attrs.update({key: item.attrs[key] for key in item.attrs if key not in _SCALE_ATTRIBUTES})
         if item.is_scale:
             copied.make_scale(name)
     for name, item in datasets.items():

@@ -16,6 +16,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import digests, hdf5
+from rotor_mbs.store.layout import key_of
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,12 @@ class StoredRun:
     @property
     def status(self) -> str:
         return str(self.attributes.get("status", ""))
+
+    @property
+    def key(self) -> str:
+        """The content hash of what decides it, read alone and not verified; "" where it has none."""
+        with self._reading("key"):
+            return key_of(self._group.attrs)
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -35,19 +36,9 @@ class ResultsStore:
         refuse_other_kinds(self.path)
         if not self.path.exists():
             return set()
-        with open_results(self.path, verify=False) as results, hdf5.reading(self.path):
-            state = self.path.stat()
-            damaged = _damaged_places(self.path, (state.st_ino, state.st_mtime_ns, state.st_size))
-            runs = {
-                f"{scene.name}/{run.method}": run for scene in results.scenes.values() for run in scene.runs.values()
-            }
-            again = damaged | {name for name, run in runs.items() if self._is_over(run)}
-            return {key for above, _, name, key in _members(results) if key and not again & {above, name}}
-
-    def _is_over(self, run: StoredRun) -> bool:
-        """Whether it was ended by a shorter time limit than that of now."""
-        facts = run.attributes
-        return run.status == "timed_out" and "frozen_with" not in facts and facts.get(LIMIT, 0.0) < self.time_limit_s
+        state = self.path.stat()
+        limits = _verified_keys(self.path, (state.st_ino, state.st_mtime_ns, state.st_size))
+        return {key for key, limit in limits.items() if limit >= self.time_limit_s}
 
     def merge(self, parts: Sequence[Path], without: Collection[str] = frozenset()) -> None:
         """The records of `parts` into the file, atomically, and those of these keys out of it. Raises StoreError."""
@@ -57,10 +48,24 @@ class ResultsStore:
 
 
 @lru_cache(maxsize=8)
-def _damaged_places(path: Path, _state: tuple[int, int, int]) -> frozenset[str]:
-    """Of the file in this state (inode, time of change, size): read and verified once, and not again for each job."""
-    with open_results(path, verify=False) as results:
-        return frozenset(place for place, part in all_damages(results.root) if part != DIGESTS)
+def _verified_keys(path: Path, _state: tuple[int, int, int]) -> dict[str, float]:
+    """The time limit (s) that ended it, or infinity, by the key of every run and record that is what was written.
+
+    Of the file in this state (inode, time of change, size): read and verified once, and not again for each job.
+    """
+    with open_results(path, verify=False) as results, hdf5.reading(path):
+        damaged = {place for place, part in all_damages(results.root) if part != DIGESTS}
+        runs = {f"{scene.name}/{run.method}": run for scene in results.scenes.values() for run in scene.runs.values()}
+        return {
+            key: _ended_by(runs[name]) if name in runs else math.inf
+            for above, _, name, key in _members(results)
+            if key and not damaged & {above, name}
+        }
+
+
+def _ended_by(run: StoredRun) -> float:
+    is_over = run.status == "timed_out" and "frozen_with" not in run.attributes
+    return float(run.attributes.get(LIMIT, 0.0)) if is_over else math.inf
 
 
 def merge(
@@ -102,8 +107,8 @@ def refuse_other_kinds(path: Path) -> None:
     the root, where a results file has groups alone."""
     if not path.exists():
         return
-    with open_results(path, verify=False) as results, hdf5.reading(path):
-        if not all(hdf5.is_group(item) for _, item in hdf5.members(results.root)):
+    with hdf5.open_file(path) as file, hdf5.reading(path):
+        if not all(hdf5.is_group(item) for _, item in hdf5.members(file)):
             raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
 
 
@@ -112,7 +117,7 @@ def _members(results: OpenResults) -> Iterator[tuple[str, str, str, str]]:
     for scene in results.scenes.values():
         for method, run in scene.runs.items():
             owner = str(scene.attributes["scene_hash"])
-            yield scene.name, owner, f"{scene.name}/{method}", key_of(run.attributes)
+            yield scene.name, owner, f"{scene.name}/{method}", run.key
     for name, group in records_in(results.root):
         above = "/".join(name.split("/")[:-2]) or name
         owner = group.attrs.get(TOGETHER, group.attrs.get("scene_hash", ""))

@@ -10,14 +10,15 @@ from pathlib import Path
 
 from rotor_mbs.analysis.claim_records import shipped_claims
 from rotor_mbs.analysis.errata import CheckedEntry, errata_fingerprint, write_errata
-from rotor_mbs.execution.execute import OnProgress, ignore_progress
+from rotor_mbs.execution.case import RUN
+from rotor_mbs.execution.execute import Job, OnProgress, Result, ignore_progress
 from rotor_mbs.execution.provenance import numerics_fingerprint
 from rotor_mbs.methods.catalogue import default_methods, errata_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.studies.run import RunReport, able_methods, run_scenes
-from rotor_mbs.studies.short_ladders import run_short_ladders
+from rotor_mbs.studies.run import RunReport, able_methods, perform_run, run_scenes
+from rotor_mbs.studies.short_ladders import ladder_cases, perform_ladder
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
@@ -28,20 +29,28 @@ def reproduce(output: Path, *, workers: int, timeout_s: float, on_progress: OnPr
     scenes = find_scenes(["paper"])
     names = (*default_methods(), *errata_methods().values())
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
-    report = run_scenes(scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress)
+    # Before the runs: the whole file is written anew with each merge, and now it is small.
     _complete_errata(output)
     _complete_claims(output)
-    run_short_ladders(find_scenes([BENCHED])[0], output, workers=workers, timeout_s=timeout_s, on_progress=on_progress)
-    return report
+    return run_scenes(
+        scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress,
+        beside=ladder_cases(find_scenes([BENCHED])[0]), perform=perform,
+    )  # fmt: skip
+
+
+def perform(job: Job) -> Result:
+    """A run, or a curve of error against run time, in a worker process. Raises StoreError."""
+    return perform_run(job) if job.case.study == RUN else perform_ladder(job)
 
 
 def _complete_errata(output: Path) -> None:
     """The check of every printed entry, unless the file has that of the same code already."""
     from rotor_mbs.models.printed.errata import check_errata
 
-    with open_results(output) as results:
-        if errata_fingerprint(results) == numerics_fingerprint():
-            return
+    if output.exists():
+        with open_results(output) as results:
+            if errata_fingerprint(results) == numerics_fingerprint():
+                return
     checks = [
         CheckedEntry(**{**asdict(check), "explained_by": ", ".join(check.explained_by)}) for check in check_errata()
     ]

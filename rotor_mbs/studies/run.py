@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +81,8 @@ def run_scenes(
     settings: Mapping[str, object] | None = None,
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
+    beside: Sequence[Case] = (),
+    perform: Callable[[Job], Result] | None = None,
 ) -> RunReport:
     """Every scene's reference and runs into the results file `output`; what it has already is kept.
 
@@ -90,6 +91,8 @@ def run_scenes(
     timeout_s    a run over this ends itself, and is stored with the status timed_out
     settings     of the methods that have them, in place of defaults and of the scene's own
     use_frozen   whether a shipped reference may stand for a computed one
+    beside       cases of other studies, computed with the runs and not told of in the report
+    perform      what computes runs and those cases
 
     Raises InputError, StoreError, KeyboardInterrupt; the same call then goes on where it stopped.
     """
@@ -98,21 +101,27 @@ def run_scenes(
     for scene in scenes:
         reference = reference_case(scene, use_frozen=use_frozen)
         cases += [reference, *run_cases(scene, methods[scene.name], reference, settings or {})]
+    runs = {case.key for case in cases}
+    cases += beside
     # Slowest first, so that no long run starts last and keeps one process busy while the others wait.
     cases.sort(key=lambda case: -find_method(case.method).relative_cost)
-    run = in_pool(perform_run, workers, timeout_s)
+    run = in_pool(perform or perform_run, workers, timeout_s)
     with writing(output, RESULTS):
         refuse_losses(output, cases)
-        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress, partial(store_failure, "timed_out"))
-        return RunReport(made, len(cases) - len(made), _stored_failures(output, cases, made))
+        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress, _store_time_out)
+        made = [one for one in made if one.case.key in runs]
+        asked = [case for case in cases if case.key in runs]
+        return RunReport(made, len(asked) - len(made), _stored_failures(output, asked, made))
 
 
 def _stored_failures(output: Path, cases: Sequence[Case], made: Sequence[Outcome]) -> list[str]:
     """Runs that this call found in the file, and that are no success."""
     new = {one.case.key for one in made}
     kept = {(case.scene.name, case.method): case for case in cases if case.key not in new}
-    found = []
-    with open_results(output) as results:
+    found: list[str] = []
+    if not kept:
+        return found
+    with open_results(output, verify=False) as results:  # verified when the keys of what is kept were read
         for (scene, method), case in kept.items():
             run = results.scenes[scene].runs.get(method) if scene in results.scenes else None
             if run is not None and run.status != "ok" and is_corrected(method):
@@ -236,6 +245,11 @@ def perform_run(job: Job) -> Result:
     write_run(job.part, case.scene_hash, run, attributes)
     message, seconds = str(attributes["message"]), 0.0 if is_read else float(np.median(run.run_times_s))
     return Result(verdict.status, message, seconds, is_read=is_read)
+
+
+def _store_time_out(job: Job, message: str) -> Result:
+    """Of a run; what another study has of a case that was ended is nothing."""
+    return store_failure("timed_out", job, message) if job.case.study == RUN else Result("timed_out", message)
 
 
 def store_failure(status: str, job: Job, message: str) -> Result:

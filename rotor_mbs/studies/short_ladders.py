@@ -7,16 +7,13 @@ run once. Its errors are those of a bench, its times are good to a factor.
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
+from rotor_mbs.execution.execute import Job, Result
 from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
 from rotor_mbs.methods.catalogue import ladders
-from rotor_mbs.methods.ladders import Ladder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench import BENCH, SOURCES, Measured, curve_record, facts_of, points_of, store_curve
 from rotor_mbs.studies.bench_worker import PointTimer, prepared_scene
 from rotor_mbs.studies.run import able_methods, reference_case
@@ -25,22 +22,16 @@ _SOURCES = (*SOURCES, "studies/short_ladders.py")
 _LONGEST_S = 0.4  # a run longer than this is the last of its curve
 
 
-def run_short_ladders(
-    scene: Scene, output: Path, *, workers: int, timeout_s: float, on_progress: OnProgress = ignore_progress
-) -> list[Outcome]:
-    """A short curve of each method on `scene` into the results file `output`, which has its reference.
-
-    What it has already is kept. Raises StoreError.
-    """
+def ladder_cases(scene: Scene) -> list[Case]:
+    """A short curve of each method on `scene`, judged by its reference."""
     chosen = [ladder.short for ladder in ladders() if not ladder.variant]
     able, _ = able_methods(scene, [ladder.method for ladder in chosen])
-    cases = [_case(scene, ladder) for ladder in chosen if ladder.method in able]
-    return execute(cases, in_pool(perform_ladder, workers, timeout_s), ResultsStore(output), on_progress)
-
-
-def _case(scene: Scene, ladder: Ladder) -> Case:
-    options = {"curve": ladder.curve, "values": list(ladder.values)}
-    return Case(scene, ladder.method, {}, BENCH, options, reference_case(scene).key, _SOURCES)
+    reference = reference_case(scene).key
+    return [
+        Case(scene, one.method, {}, BENCH, {"curve": one.curve, "values": list(one.values)}, reference, _SOURCES)
+        for one in chosen
+        if one.method in able
+    ]
 
 
 def perform_ladder(job: Job) -> Result:
