@@ -14,7 +14,8 @@ def report(arguments: argparse.Namespace) -> int:
     """Pages from `arguments.file` into `arguments.output`, or beside the file."""
     from rotor_mbs.report.build import write_report
 
-    index = write_report(arguments.file, arguments.output or pages_beside(arguments.file), jobs=os.cpu_count() or 1)
+    output = arguments.output or pages_beside(arguments.file)
+    index = write_report(arguments.file, output, jobs=os.cpu_count() or 1, checked=True)
     print(index)
     if arguments.open:
         webbrowser.open(index.resolve().as_uri())

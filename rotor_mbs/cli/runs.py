@@ -15,7 +15,7 @@ from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.run_tables import finding_lines, method_table, run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
-from rotor_mbs.execution.output import has_unfinished
+from rotor_mbs.execution.output_lock import has_unfinished
 from rotor_mbs.execution.provenance import fingerprint, versions
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder

@@ -18,6 +18,7 @@ from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core.files import (
     BENCH,
+    CHECK,
     COMPARISON,
     ERRATA,
     INDEX,
@@ -29,6 +30,7 @@ from rotor_mbs.report.core.files import (
     write_pages,
 )
 from rotor_mbs.report.pages.bench import bench_pages
+from rotor_mbs.report.pages.check import check_page
 from rotor_mbs.report.pages.data_comparison import comparison_page
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.index import index_page
@@ -65,23 +67,26 @@ class Context:
 OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
-def write_report(results: Path, output: Path, jobs: int = 1, on_page: OnPage = lambda *_: None) -> Path:
+def write_report(
+    results: Path, output: Path, jobs: int = 1, on_page: OnPage = lambda *_: None, *, checked: bool = False
+) -> Path:
     """Write the pages about any file that this program writes into the folder `output`, with `jobs` processes.
 
-    Runs, the stability suite, a bench, modes, a sweep: what the file has is one site with one navigation. Returns the
-    path of the index. Nothing is written before every page is made. Raises StoreError where the file cannot be read or
-    has nothing to report, or where the folder cannot be written.
+    Runs, the stability suite, a bench, modes, a sweep: what the file has is one site with one navigation. checked:
+    also a page with the verdicts of `check` on its runs, which takes seconds of its own. Returns the path of the index.
+    Nothing is written before every page is made. Raises StoreError where the file cannot be read or has nothing to
+    report, or where the folder cannot be written.
     """
     if is_sweep(results):
         pages = {INDEX: render("sweep", sweep_page(StoredSweep(results)))}
     else:
         with open_results(results) as opened:
-            pages = _pages(opened, jobs, on_page)
+            pages = _pages(opened, jobs, on_page, checked)
     write_pages(output, pages)
     return output / INDEX
 
 
-def _pages(opened: OpenResults, jobs: int, on_page: OnPage) -> dict[str, str]:
+def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> dict[str, str]:
     """By file name. What comes first is the index."""
     modes, bench, compared = (read_records(opened.path, kind) for kind in ("modes", "bench", "comparison"))
     has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench or compared)
@@ -91,6 +96,7 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage) -> dict[str, str]:
         (bool(bench), BENCH, "Error against run time"),
         (bool(modes), MODES, "Modes"),
         (bool(compared), COMPARISON, "Data of another program"),
+        (has_runs and checked, CHECK, "Accuracy check"),
     ]
     there = [(file, label) for has, file, label in kinds if has]
     names = {file: INDEX if not place else file for place, (file, _) in enumerate(there)}
@@ -109,6 +115,8 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage) -> dict[str, str]:
         pages[names[MODES]] = modes_page(list(read_modes(opened.path).values()), site, names[MODES])
     if compared:
         pages[names[COMPARISON]] = render("data_comparison", comparison_page(compared[0]), site, names[COMPARISON])
+    if has_runs and checked:
+        pages[CHECK] = render("check", check_page(opened.path), site, CHECK)
     return pages
 
 

@@ -139,15 +139,20 @@ def printable(text: str) -> str:
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
 
 
-def margins(verdicts: Sequence[Verdict]) -> TextTable:
-    """For every check, method and bound: the largest value that was seen, the bound, their ratio, and where."""
+def largest_seen(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """For every check, method and bound the verdict with the largest value; not a number before all others."""
     worst: dict[tuple[str, str, float], Verdict] = {}
     for one in verdicts:
         key = (one.check, one.method, one.bound)
         if key not in worst or not one.value <= worst[key].value:
             worst[key] = one
+    return list(worst.values())
+
+
+def margins(verdicts: Sequence[Verdict]) -> TextTable:
+    """For every check, method and bound: the largest value that was seen, the bound, their ratio, and where."""
     rows = []
-    for one in worst.values():
+    for one in largest_seen(verdicts):
         ratio = f"{one.margin:.3g}" if math.isfinite(one.margin) else "-"
         texts = (one.check, one.method, f"{one.value:.2e}", f"{one.bound:.2e}", ratio, f"{one.scene} {one.channel}")
         rows.append(tuple(map(printable, texts)))

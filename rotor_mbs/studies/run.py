@@ -108,7 +108,7 @@ def run_scenes(
     run = in_pool(perform or perform_run, workers, timeout_s)
     with writing(output, RESULTS):
         refuse_losses(output, cases)
-        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress, _store_time_out)
+        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress, store_time_out)
         made = [one for one in made if one.case.key in runs]
         asked = [case for case in cases if case.key in runs]
         return RunReport(made, len(asked) - len(made), _stored_failures(output, asked, made))
@@ -247,7 +247,7 @@ def perform_run(job: Job) -> Result:
     return Result(verdict.status, message, seconds, is_read=is_read)
 
 
-def _store_time_out(job: Job, message: str) -> Result:
+def store_time_out(job: Job, message: str) -> Result:
     """Of a run; what another study has of a case that was ended is nothing."""
     return store_failure("timed_out", job, message) if job.case.study == RUN else Result("timed_out", message)
 

@@ -34,7 +34,7 @@ def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
     (axes,) = picture.axes
     heights = [line.get_ydata()[0] for line in axes.get_lines() if line.get_linestyle() == ":"]
     assert heights == [2.7315]
-    assert [text.get_text().strip() for text in axes.texts] == ["published 2.7315 rad", "they part"]
+    assert [text.get_text().strip() for text in axes.texts] == ["published 2.7315 rad", "they part at 1.5 s"]
     assert axes.get_ylabel() == "rotor angle (rad)"
     assert [line.get_xdata()[0] for line in axes.get_lines()[-2:]] == [6.0, 1.5]
 
@@ -120,6 +120,8 @@ def test_the_opening_states_where_the_models_part_and_by_how_much(report: Path) 
     assert re.search(r"The models part visibly at 0\.\d+ s; their angles differ by up to [\d.]+ rad", opening)
     assert "Largest rotor angle, rad: published 2.7315, as printed 2.731" in opening
     assert ">published 2.7315 rad<" in opening
+    lead = text[text.index('<div class="finding">') : text.index('<div class="opening">')]
+    assert re.search(r"departs from the reference visibly at 0\.\d+ s, and by up to [\d.]+ rad; its energy rises", lead)
 
 
 def test_the_models_part_where_their_angles_first_differ_visibly(tmp_path: Path) -> None:
@@ -137,11 +139,13 @@ def test_the_index_opens_with_pictures_then_three_sentences_then_folded_tables(r
     lead = re.search(r'<div class="finding">(.*?)</div>', text, re.S)
     assert lead is not None
     assert lead[1].count("<p>") == 3
+    assert re.search(r"as printed give all 1 published numbers; with their three errors corrected, \w+\.", lead[1])
     assert "make energy from nothing in 1 of 1 scenes, up to 1.00 MJ" in lead[1]
+    assert re.search(r"reference to [^ ]+ rad \([^)]+\), .*up to each", lead[1])
     first_table = text.index("<table")
     for needed in ('class="viewer"', 'class="card still"', ">published 2.7315 rad<", "energy made from nothing"):
         assert 0 < text.index(needed) < first_table, needed
-    rest = text[text.index('<section id="finding">') :]
+    rest = text[text.index('<section id="finding"') :]
     assert "<table" in rest
     assert "<table" not in re.sub(r"<details>.*?</details>", "", rest, flags=re.S)
     assert len(text.encode()) < 600_000

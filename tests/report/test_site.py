@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
@@ -17,6 +18,8 @@ from rotor_mbs.report.core.files import Site
 from rotor_mbs.report.pages.formulas import formula, matrices
 from rotor_mbs.report.pages.sweep import field_name
 from rotor_mbs.report.plots.sweep import distribution
+from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.studies.check import judge_file
 
 FIG11 = paper("fig11", samples=101)
 SWING = rotor(lambda t: 0.5 + 0.2 * t, lambda t: np.sin(t), np.cos, np.sin)
@@ -32,6 +35,21 @@ def test_every_page_has_the_same_navigation(tmp_path: Path) -> None:
         assert re.findall(r'href="([^"]*)"', nav[1]) == wanted
         here = re.findall(r'href="([^"]*)" aria-current="page"', nav[1])
         assert here == ([path.name] if path.name in wanted else [])
+
+
+def test_the_page_of_the_check_has_every_verdict_that_fails_and_is_made_where_it_is_asked_for(tmp_path: Path) -> None:
+    runs = [Made(FIG11, name, SWING) for name in ("reference", "lagrange/taylor")]
+    results = store(tmp_path / "r.h5", runs)
+    assert not (write_report(results, tmp_path / "out").parent / "check.html").exists()
+    folder = write_report(results, tmp_path / "out", checked=True).parent
+    text = (folder / "check.html").read_text(encoding="utf-8")
+    failed = [one for one in judge_file(results, load_bounds()) if not one.passed]
+    assert failed  # the motion is no solution: it does not start where the scene does
+    assert f"{len(failed)} of " in text
+    section = text[text.index('<section id="failures">') : text.index('<section id="all"')]
+    assert section.count('class="bad"') == len(failed)
+    assert {str(escape(one.look_at)) for one in failed} == set(re.findall(r"fail</span><small>(.*?)</small>", section))
+    assert 'href="check.html"' in (folder / "paper-fig11.html").read_text(encoding="utf-8")
 
 
 def test_a_single_page_needs_no_navigation() -> None:

@@ -23,7 +23,7 @@ from rotor_mbs.store.hdf5 import replace_file
 
 GENERATOR = "rotor_mbs report"
 INDEX, ERRATA, WALK = "index.html", "errata.html", "figures.html"
-BENCH, MODES, COMPARISON = "bench.html", "modes.html", "comparison.html"
+BENCH, MODES, COMPARISON, CHECK = "bench.html", "modes.html", "comparison.html", "check.html"
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 
@@ -34,7 +34,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
-    taken = {INDEX, ERRATA, WALK, BENCH, MODES, COMPARISON}
+    taken = {INDEX, ERRATA, WALK, BENCH, MODES, COMPARISON, CHECK}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")

@@ -22,7 +22,7 @@ from rotor_mbs.analysis.work_precision import (
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
-from rotor_mbs.report.pages.scene_tables import status_text
+from rotor_mbs.report.pages.scene_tables import method_cell, status_text
 from rotor_mbs.store.records import Record
 
 _POINT_COLUMNS = (
@@ -58,7 +58,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
     found = reaches(curves)
     head = ["method", *map(target_text, TARGETS_RAD)]
     rows: list[Row] = [
-        [label_of(curve.name), *(_reach_cell(curve, found[curve.name][target]) for target in TARGETS_RAD)]
+        [method_cell(curve.name), *(_reach_cell(curve, found[curve.name][target]) for target in TARGETS_RAD)]
         for curve in curves
     ]
     caption = (
@@ -102,13 +102,13 @@ def _fastest_cell(curves: Sequence[Record], target: float) -> TableCell:
         next_one = f"then {label_of(others[0][0].name)}, {number(others[0][1].ratio)} times as long"
     else:
         next_one = "no other was measured to there" if is_cut else "no other gets there"
-    return TableCell(f"{label_of(first.name)}: {prefixed(reach.seconds, 's', 2)}", note=next_one)
+    return TableCell(f"{label_of(first.name)} ({first.name}): {prefixed(reach.seconds, 's', 2)}", note=next_one)
 
 
 def order_table(curves: Sequence[Record]) -> PageTable:
     """A row per fixed-step curve."""
     rows = [
-        [label_of(curve.name), number(facts.get("order"), 3), f"{facts['order_expected']:g}"]
+        [method_cell(curve.name), number(facts.get("order"), 3), f"{facts['order_expected']:g}"]
         for curve in curves
         if "order_expected" in (facts := curve.attributes)
     ]
@@ -120,7 +120,7 @@ def order_table(curves: Sequence[Record]) -> PageTable:
 def point_table(curves: Sequence[Record]) -> PageTable:
     """A row per point that was run."""
     rows = list(chain.from_iterable(map(_point_rows, curves)))
-    return PageTable("Every setting measured.", _POINT_COLUMNS, rows, numeric=range(1, 14))
+    return PageTable("Every setting measured.", _POINT_COLUMNS, rows, numeric=range(1, 14)).without_empty_columns()
 
 
 def _point_rows(curve: Record) -> Iterator[Row]:
@@ -128,15 +128,16 @@ def _point_rows(curve: Record) -> Iterator[Row]:
     for i, status in enumerate(curve.statuses):
         if status == "left_out":
             continue
-        low, high = (prefixed(_known(a[f"run_time_{q}_s"][i]), "s", 3) for q in ("q1", "q3"))
+        low, high, shortest = (prefixed(_known(a[f"run_time_{q}_s"][i]), "s", 3) for q in ("q1", "q3", "min"))
+        spread = (f"{low} to {high}", shortest) if a["repeats"][i] > 1 else ("", "")
         errors = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
-        seconds = ("run_time_min_s", "setup_time_s", "setup_again_time_s", "output_time_s")
+        seconds = ("setup_time_s", "setup_again_time_s", "output_time_s")
         yield [
-            label_of(curve.name),
+            method_cell(curve.name),
             _setting(curve, i),
             *(number(_known(a[error][i])) for error in errors),
             prefixed(_known(a["run_time_s"][i]), "s", 3),
-            f"{low} to {high}",
+            *spread,
             *(prefixed(_known(a[second][i]), "s", 3) for second in seconds),
             str(a["repeats"][i]),
             str(a["steps"][i]),
@@ -148,7 +149,7 @@ def failure_table(curves: Sequence[Record]) -> PageTable:
     """Every point that is not on a curve, with the reason."""
     rows = [
         [
-            label_of(curve.name),
+            method_cell(curve.name),
             _setting(curve, i),
             prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3),
             "left out" if status == "left_out" else status_text(status),
@@ -176,7 +177,7 @@ def scaling_table(curves: Sequence[Record]) -> PageTable:
         rate = curve.arrays["run_time_s"] / np.array(curve.arrays["simulated_s"])
         at = dict(zip(curve.arrays["setting"][ok].tolist(), rate[ok].tolist(), strict=True))
         exponent = cost_exponent(curve.arrays["setting"][ok], rate[ok])
-        rows.append([label_of(curve.name), *(prefixed(at.get(size), "s", 3) for size in sizes), number(exponent)])
+        rows.append([method_cell(curve.name), *(prefixed(at.get(size), "s", 3) for size in sizes), number(exponent)])
     caption = "Run time of one simulated second, and the exponent fitted on the larger half of the sizes."
     return PageTable(caption, head, rows, numeric=range(1, len(head)))
 

@@ -32,6 +32,11 @@ def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, flo
     return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))
 
 
+def at_time(seconds: float) -> str:
+    """ "at the start", "at 0.29 s"."""
+    return f"at {with_unit(seconds, 's', 2)}" if seconds else "at the start"
+
+
 def side_look(run: StoredRun) -> Look:
     """Of a line among few: the printed model dashed upon the corrected one."""
     look = look_of(run.method)
@@ -89,8 +94,7 @@ def _parting_text(runs: Sequence[StoredRun], parted: float | None, largest: floa
         return f"{with_capital(label_of(runs[0].method))}: angles over time."
     if parted is None:
         return f"Printed and corrected model never differ visibly: by {with_unit(largest, 'rad')} at most."
-    when = "at the start" if parted == 0.0 else f"at {with_unit(parted, 's', 2)}"
-    return f"The models part visibly {when}; their angles differ by up to {with_unit(largest, 'rad')}."
+    return f"The models part visibly {at_time(parted)}; their angles differ by up to {with_unit(largest, 'rad')}."
 
 
 def _published_texts(claims: Sequence[Claim], shown: Sequence[int]) -> list[str]:

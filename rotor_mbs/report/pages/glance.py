@@ -26,6 +26,7 @@ Scenes = Mapping[str, StoredScene]
 _SHADES = (-12, -10, -8, -6, -4, -2)
 _MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
 _FAILED = "✗"
+_NAMED = 4  # methods at most in the sentence on agreement; of more, the best and the worst
 
 
 @dataclass(frozen=True)
@@ -103,21 +104,21 @@ def short_sentences(facts: Finding) -> list[str]:
     found = []
     numbers, corrected = facts.numbers, facts.numbers_corrected
     if numbers is not None:
-        other = "" if corrected is None else f"; corrected, they give {corrected.count or 'none'} of them"
-        found.append(
-            f"The equations as printed give {numbers.count} of the paper's {numbers.of} published numbers{other}."
-        )
+        share = f"all {numbers.of}" if numbers.count == numbers.of else f"{numbers.count} of {numbers.of}"
+        other = "" if corrected is None else f"; with their three errors corrected, {corrected.count or 'none'}"
+        found.append(f"The paper's equations as printed give {share} published numbers{other}.")
     if facts.energy is not None and facts.energy.rises.count:
         most = f", up to {prefixed(facts.energy.gain, 'J')}" if facts.energy.scene else ""
         rises = facts.energy.rises
         found.append(f"As printed they make energy from nothing in {rises.count} of {rises.of} scenes{most}.")
-    known = [one.angle_error for one in facts.agreement if one.angle_error is not None]
+    known = {label_of(one.method): one.angle_error for one in facts.agreement if one.angle_error is not None}
     if known:
-        best = with_unit(min(known), "rad")
         count = len({one.method.partition("/")[0] for one in facts.agreement})
         models = "The corrected model agrees" if count == 1 else f"{count} independent corrected models agree"
-        worst = "" if len(known) == 1 else f", the least accurate of them to {with_unit(max(known), 'rad')}"
-        found.append(f"{models} with a quad-precision reference to {best}{worst}, up to each scene's horizon.")
+        ranked = sorted(known.items(), key=lambda item: item[1])
+        shown = ranked if len(ranked) <= _NAMED else [ranked[0], ranked[-1]]
+        each = ", ".join(f"{with_unit(error, 'rad')} ({label})" for label, error in shown)
+        found.append(f"{models} with a quad-precision reference to {each}, up to each scene's horizon.")
     return found
 
 

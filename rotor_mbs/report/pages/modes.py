@@ -51,7 +51,7 @@ def _lead(modes: SceneModes) -> list[str]:
     sentences = []
     sources = max((list(kind.values()) for kind in (modes.rest, modes.rotation)), key=len)
     if len(sources) > 1:
-        labels = ", ".join(one.label for one in sources)
+        labels = ", ".join(f"{one.label} ({one.source})" for one in sources)
         verdict = "agree on every frequency" if modes.agrees else "do not agree on the frequencies"
         sentences.append(
             f"{with_capital(labels)} {verdict}: the largest relative difference is {number(modes.disagreement)}."
@@ -83,7 +83,10 @@ def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Sect
 
 def _tables(one: LinearModes, i: int, state: str) -> list[PageTable]:
     """Of the i-th speed; state: the beginning of their captions, which differ on the whole page."""
-    return [_mode_table(f"{state}: modes", one, i), _shape_table(f"{state}: shapes, the largest amplitude 1", one, i)]
+    return [
+        _mode_table(f"{state}: modes by the {one.label} ({one.source})", one, i),
+        _shape_table(f"{state}: shapes, the largest amplitude 1", one, i),
+    ]
 
 
 def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:

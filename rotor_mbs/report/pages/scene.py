@@ -135,7 +135,11 @@ def _lead(drawn: DrawnRuns) -> list[str]:
     elif printed is not None and departure is not None:
         gain = metric(printed, "energy_gain_J")
         energy = "" if gain is None else f"; its energy rises by up to {prefixed(gain, 'J')}"
-        found.append(f"The printed model departs from the reference by up to {with_unit(departure, 'rad')}{energy}.")
+        parted = _parted(drawn)
+        when = "" if parted is None else f"visibly {comparison_pictures.at_time(parted)}, and "
+        found.append(
+            f"The printed model departs from the reference {when}by up to {with_unit(departure, 'rad')}{energy}."
+        )
     runs = [run for run in run_selection.corrected_runs(drawn.scene).values() if run.status == "ok"]
     errors = [error for run in runs if (error := metric(run, "angle_error_max")) is not None]
     if errors and drawn.horizon is not None:
@@ -144,6 +148,12 @@ def _lead(drawn: DrawnRuns) -> list[str]:
             f"within {with_unit(max(errors), 'rad')}."
         )
     return found
+
+
+def _parted(drawn: DrawnRuns) -> float | None:
+    """s, when printed and corrected angles first differ visibly; None: never, or one of them is not there."""
+    runs = list(drawn.sides_with("angles").values())
+    return comparison_pictures.parting(*runs)[0] if len(runs) == 2 else None
 
 
 def motion_section(drawn: DrawnRuns) -> Section:

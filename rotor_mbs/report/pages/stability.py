@@ -24,7 +24,7 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import error_pictures
 from rotor_mbs.report.pages.quantities import plotted_quantities, sizes
 from rotor_mbs.report.pages.scene import motion_of, opening_comment
-from rotor_mbs.report.pages.scene_tables import horizon
+from rotor_mbs.report.pages.scene_tables import horizon, method_cell
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.store.records import Record, read_records
@@ -82,7 +82,7 @@ def _map(
         families.setdefault(_family(next(iter(own.values())).family), []).append(row)
     used = {cell.outcome for cell in found}
     return {
-        "methods": [label_of(name) for name in names],
+        "methods": [(label_of(name), name) for name in names],
         "families": list(families.items()),
         "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
         "summary": advice_lines(found, label_of, lambda family: f"“{_family(family)}”"),
@@ -103,13 +103,13 @@ def _mark(cell: SuiteRun) -> tuple[str, str, str]:
     return cell.outcome, symbol + claimed, f"{label_of(cell.method)}: {text}. {cell.message}".strip()
 
 
-def _fastest(own: Sequence[SuiteRun]) -> str:
+def _fastest(own: Sequence[SuiteRun]) -> TableCell | str:
     if not own[0].has_reference:
         return "no reference"
     if all(cell.angle_error is None for cell in own):
         return NOT_COMPARED
     method = reached_by(own, own[0].scene)
-    return "no method" if method is None else label_of(method)
+    return "no method" if method is None else method_cell(method)
 
 
 def _limits(records: Sequence[Record]) -> Section:
@@ -120,7 +120,7 @@ def _limits(records: Sequence[Record]) -> Section:
             step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
             numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
             numbers.append(f"{facts['mode_damping_ratio']:.3g}")
-            rows.append([record.scene, label_of(record.method), *numbers])
+            rows.append([record.scene, method_cell(record.method), *numbers])
     head = (
         "Scene", "Method", "found by bisection (s)", "theory (s)", "found / theory", "step × |λ|", "damping ratio of λ",
     )  # fmt: skip
@@ -129,7 +129,7 @@ def _limits(records: Sequence[Record]) -> Section:
 
 def _conservation(records: Sequence[Record]) -> Section:
     rows = [
-        [r.scene, label_of(r.method), *(_shown(r.attributes.get(name)) for name in _CONSERVED)]
+        [r.scene, method_cell(r.method), *(_shown(r.attributes.get(name)) for name in _CONSERVED)]
         for r in records
         if r.kind == "conservation"
     ]
@@ -187,7 +187,7 @@ def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
         else:  # the tone brings its own symbol
             outcome = TableCell(text, "bad", note=cell.message)
         numbers = [_shown(x) for x in (cell.angle_error, cell.energy_drift, cell.run_time_s or None, cell.step)]
-        rows.append([label_of(cell.method), outcome, *numbers, f"{cell.time_reached:.4g}"])
+        rows.append([method_cell(cell.method), outcome, *numbers, f"{cell.time_reached:.4g}"])
     head = (
         "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 1e-6 rad (s)",
         "reached (s)",

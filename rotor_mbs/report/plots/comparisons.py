@@ -48,12 +48,14 @@ def departure(
                 low, high = axes.get_ylim()
                 axes.set_ylim(min(low, mark.value), max(high, mark.value + 0.12 * (high - low)))
                 axes.axhline(mark.value, color=GREY, linewidth=1.0, linestyle=":")
-                axes.text(0.01 * end, mark.value, mark.text, color=GREY, ha="left", va="bottom", fontsize=8.5)
+                beside = parted if parted is not None and parted < 0.1 * end else 0.0  # not across its line
+                axes.text(beside + 0.01 * end, mark.value, mark.text, color=GREY, ha="left", va="bottom", fontsize=8.5)
         mark_time(axes, end, horizon)
         if parted is not None and 0.0 < parted < end:
             axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
             if not place:
-                axes.text(parted, axes.get_ylim()[1], " they part", color=GREY, ha="left", va="top", fontsize=8.5)
+                text = f" they part at {parted:.2g} s"
+                axes.text(parted, axes.get_ylim()[1], text, color=GREY, ha="left", va="top", fontsize=8.5)
     return picture
 
 
