@@ -18,6 +18,7 @@ LARGEST = 1 << 29  # bytes; a trajectory of a million rows of ten columns is 80 
 FORMATS = "text with a header, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
 _HDF5, _NETCDF3, _ZIP = b"\x89HDF\r\n\x1a\n", b"CDF", b"PK\x03\x04"
 _MATLAB_5 = b"MATLAB 5.0 MAT-file"
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # spreadsheets' "Unicode text"
 
 
 def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -> DataTable:
@@ -40,7 +41,7 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
             return _netcdf3(path)
         if path.suffix.lower() == ".outb":
             return _openfast(path)
-        if b"\x00" in head:
+        if b"\x00" in head and not head.startswith(_UTF_16):
             raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
         return read_text(source, _decoded(path.read_bytes()))
     except (OSError, ValueError, zipfile.BadZipFile, MemoryError, KeyError) as exc:
@@ -65,7 +66,7 @@ def _head(path: Path) -> bytes:
 
 def _decoded(content: bytes) -> str:
     try:
-        return content.decode("utf-8-sig")
+        return content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
     except UnicodeDecodeError:
         return content.decode("latin-1")
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 
 _SHOWN = 12  # names that a message lists
-_UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
+_UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$|\s+/\s*(\S+)\s*$")
 
 
 @dataclass(frozen=True)
@@ -63,15 +63,16 @@ def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | 
 
 
 def named_unit(name: str) -> tuple[str, str]:
-    """("rotor", "deg") of "rotor [deg]" or "rotor (deg)"; ("rotor", "") of "rotor".
+    """("rotor", "deg") of "rotor [deg]", "rotor (deg)" or "rotor / deg"; ("rotor", "") of "rotor".
 
     >>> named_unit("pitch 1 [rad]"), named_unit("rates[2]")
     (('pitch 1', 'rad'), ('rates[2]', ''))
     """
     match = _UNIT.search(name)
-    if match is None or match[1].strip().isdigit() or not name[: match.start()].strip():
+    unit = (match[1] or match[2] or "").strip() if match else ""
+    if match is None or unit.isdigit() or not name[: match.start()].strip():
         return name.strip(), ""
-    return name[: match.start()].strip(), match[1].strip()
+    return name[: match.start()].strip(), unit
 
 
 def shown_names(names: list[str]) -> str:

@@ -7,98 +7,116 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.foreign.channels import UNITS
 from rotor_mbs.foreign.table import DataColumn, DataTable, named_unit, table_of
 
 _COMMENT = ("#", "%", "//", "!")
+_DIVIDERS = (";", "\t", ",", None)  # None: blanks
 _NAME_AND_UNIT = re.compile(r"\S+(?: \d+)?(?: \w+)?\s*[\[(][^\])]*[\])]")
 _EXUDYN = re.compile(r"OutputVariableType = (\w+)")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
+
+Lines = Sequence[tuple[int, str]]  # number of the line in the file, its text
 
 
 def read_text(source: str, text: str) -> DataTable:
     """The columns of a text file. Raises InputError with the line where something else than a number stands."""
-    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    head, rows = _split(source, lines)
-    divider = _divider(rows[0][1])
-    width = len(_fields(rows[0][1], divider))
-    values = _numbers(source, rows, divider, width)
-    comments = [line.lstrip("#%/! ") for _, line in head if line.startswith(_COMMENT)]
+    # Lines of nothing but dividers are what spreadsheets write for empty rows.
+    lines = [(i, line.strip(" ")) for i, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
+    first, divider = _first_row(source, lines)
+    head = [line for _, line in lines[:first]]
+    rows = [(i, _FORTRAN.sub("E", row)) for i, row in lines[first:] if not row.startswith(_COMMENT)]
+    if divider != "," and not any("." in row for _, row in rows):  # else a comma may stand between thousands
+        rows = [(i, row.replace(",", ".")) for i, row in rows]
+    values = _numbers(source, rows, divider)
+    comments = [line.lstrip("#%/! ") for line in head if line.startswith(_COMMENT)]
     variable = _EXUDYN.search("\n".join(comments))
     if variable is not None and "sensor output file" in comments[0]:
         return table_of(source, {"time": values[:, 0], variable[1]: values[:, 1:]})
-    plain = [line for _, line in head if not line.startswith(_COMMENT)] or comments
-    names, units = _names(source, plain, width, divider)
-    columns = (DataColumn(values[:, i].copy(), units[i]) for i in range(width))
-    return DataTable(source, dict(zip(names, columns, strict=True)))
+    plain = [line for line in head if not line.startswith(_COMMENT)] or comments
+    columns = {}
+    for (name, unit), column in zip(_names(source, plain, values.shape[1], divider), values.T, strict=True):
+        if name or not np.isnan(column).all():  # a divider at the end of every line makes a column of nothing
+            while name in columns:
+                name = f"_{name}"
+            columns[name] = DataColumn(column.copy(), unit)
+    return DataTable(source, columns)
 
 
-def _split(source: str, lines: Sequence[tuple[int, str]]) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
-    """Lines before the first row of numbers, and the rows without comments."""
-    for place, (_, line) in enumerate(lines):
-        if not line.startswith(_COMMENT) and all(map(_is_number, _fields(line, _divider(line)))):
-            rows = [(number, row) for number, row in lines[place:] if not row.startswith(_COMMENT)]
-            return list(lines[:place]), rows
-    raise InputError(f"{source}: no row of numbers in it; allowed: columns of numbers under a line of names")
-
-
-def _divider(line: str) -> str | None:
-    """What divides the fields of a line; None: blanks."""
-    return next((mark for mark in (";", ",", "\t") if mark in line), None)
+def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
+    """Place of the first row of numbers, and what divides its fields."""
+    nearest = 0, ""
+    for place, (number, line) in enumerate(lines):
+        for divider in () if line.startswith(_COMMENT) else _DIVIDERS:
+            fields = _fields(_FORTRAN.sub("E", line), divider)
+            others = [field for field in fields if field and not _is_number(field, decimal_comma=divider != ",")]
+            if len(fields) > 1 and any(fields) and not others:
+                return place, divider
+            if others and len(fields) - len(others) > nearest[0]:
+                nearest = len(fields) - len(others), f"; line {number} has {others[0][:40]!a}"
+    raise InputError(
+        f"{source}: no row of numbers in it{nearest[1]}; allowed: columns of numbers under a line of names"
+    )
 
 
 def _fields(line: str, divider: str | None) -> list[str]:
     if divider is None:
         return line.split()
-    found = [field.strip() for field in next(csv.reader([line], delimiter=divider))]
-    return found[:-1] if len(found) > 1 and not found[-1] else found  # a divider at the end of a line
+    return [field.strip() for field in next(csv.reader([line], delimiter=divider))]
 
 
-def _is_number(field: str) -> bool:
+def _is_number(field: str, *, decimal_comma: bool) -> bool:
     try:
         float(field)
     except ValueError:
-        return False
+        return decimal_comma and _DECIMAL_COMMA.fullmatch(field) is not None
     return True
 
 
-def _numbers(
-    source: str, rows: Sequence[tuple[int, str]], divider: str | None, width: int
-) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """(n, width)"""
+def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float64]:
+    """(n, columns), NaN where a field is empty."""
+    width = len(_fields(rows[0][1], divider))
     values = np.empty((len(rows), width))
     for i, (number, line) in enumerate(rows):
         fields = _fields(line, divider)
         if len(fields) != width:
             raise InputError(f"{source}:{number}: {len(fields)} fields, where the rows above have {width}")
-        for j, field in enumerate(fields):
-            try:
-                values[i, j] = float(field)
-            except ValueError:
-                raise InputError(f"{source}:{number}: {field[:40]!a} in column {j + 1}; allowed: a number") from None
+        try:
+            values[i] = [float(field or "nan") for field in fields]
+        except ValueError:
+            bad = next(j for j, one in enumerate(fields) if one and not _is_number(one, decimal_comma=False))
+            raise InputError(
+                f"{source}:{number}: {fields[bad][:40]!a} in column {bad + 1}; allowed: a number"
+            ) from None
     return values
 
 
-def _names(source: str, head: Sequence[str], width: int, divider: str | None) -> tuple[list[str], list[str]]:
-    """Names and units from the last line of the head, or from the last two, where the last one has units alone."""
+def _names(source: str, head: Sequence[str], width: int, divider: str | None) -> list[tuple[str, str]]:
+    """Name and unit of each column from the last line of the head, or from the last two, where one has the units."""
     if not head:
         raise InputError(f"{source}: no line of names above the numbers; allowed: one such as: time [s],rotor [rad]")
     last = _words(head[-1], divider, width)
-    if len(head) > 1 and all(re.fullmatch(r"[\[(].*[\])]", word) for word in last):
-        names, units = _words(head[-2], divider, width), [word[1:-1].strip() for word in last]
+    units = [word.strip("[]() ") for word in last]
+    above = _words(head[-2], divider, width) if len(head) > 1 else []
+    if len(above) == len(last) and not UNITS["time"].keys().isdisjoint(unit.lower() for unit in units):
+        found = list(zip(above, units, strict=True))
     else:
-        pairs = [named_unit(word) for word in last]
-        names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
-    if len(names) != width or len(units) != width:
-        raise InputError(f"{source}: {len(names)} names in the header, {width} columns of numbers; allowed: as many")
-    repeated = [name for i, name in enumerate(names) if name in names[:i]]
-    if repeated:
-        raise InputError(f"{source}: two columns are named {repeated[0]!r}; allowed: different names")
-    return names, units
+        found = [named_unit(word) for word in last]
+    if len(found) == width - 1 and divider is not None:
+        found.append(("", ""))
+    if len(found) != width:
+        raise InputError(f"{source}: {len(found)} names in the header, {width} columns of numbers; allowed: as many")
+    return found
 
 
 def _words(line: str, divider: str | None, width: int) -> list[str]:
     """The names in a line of the head, which may be divided otherwise than the numbers are."""
-    ways = [_fields(line, divider), _fields(line, _divider(line)), re.split(r"\s{2,}|\t", line)]
-    ways += [_NAME_AND_UNIT.findall(line), line.split()]
-    return next((words for words in ways if len(words) == width), ways[0])
+    words = _fields(line, divider)
+    if len(words) in (width, width - 1) and divider is not None:
+        return words
+    ways = (re.split(r"\s{2,}|\t", line), _NAME_AND_UNIT.findall(line), line.split(), _fields(line, ","))
+    return next((other for other in ways if len(other) == width), words)

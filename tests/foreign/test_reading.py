@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,48 @@ def test_every_format_gives_the_same_numbers(tmp_path: Path, name: str) -> None:
         data.values - data.values[0], STATES[:, data.columns] - STATES[0, data.columns], atol=2e-14
     )
     assert turns or len(data.columns) >= 4
+
+
+_ROWS = [(0.0, 165.0, -2.0), (0.05, 164.5, 1e-3), (0.1, 1000.25, -1.5e-7)]
+_NAMES = ("time", "rotor [deg]", "pitch 1 [deg]")
+
+
+def _table(divider: str, names: Sequence[str] = _NAMES, decimal: str = ".", end: str = "\n", form: str = "{!r}") -> str:
+    rows = [[form.format(value).replace(".", decimal) for value in row] for row in _ROWS]
+    return "".join(divider.join(words) + end for words in (names, *rows))
+
+
+# As spreadsheets, LabVIEW, Fortran and control systems write them.
+REAL_LIFE = {
+    "decimal commas": _table(";", decimal=","),
+    "decimal commas, blanks": _table(" ", ("time", "rotor_deg", "pitch_1_deg"), decimal=","),
+    "decimal commas, tabs": _table("\t", decimal=","),
+    "a divider at the ends": _table(";", decimal=",", end=";\n"),
+    "a divider at the ends of rows": _table(",", end=",\n").replace(",\n", "\n", 1),
+    "Unicode text of a spreadsheet": _table("\t"),
+    "a byte-order mark, lines of Windows": "\ufeff" + _table(",", end="\r\n"),
+    "what says the divider": "sep=;\n" + _table(";", decimal=","),
+    "units in a line": _table(",", ("time", "rotor", "pitch 1")).replace("\n", "\ns,deg,deg\n", 1),
+    "units behind strokes": _table(";", ("t / s", "rotor / deg", "pitch 1 / deg"), decimal=","),
+    "comments between": _table(",").replace("\n", "\n# begins\n", 2) + "# ends\n",
+    "a line about it": "Simulator 3, run 7\nof a rotor, again\n\n" + _table(","),
+    "quotes": _table(",", [f'"{name}"' for name in _NAMES]),
+    "Fortran's exponents": _table(" ", ("time", "rotor_deg", "pitch_1_deg"), form="{:.9E}").replace("E", "D"),
+    "empty rows at the end": _table(",") + ",,\n,,\n",
+    "a column without a name": "\n".join(f"{i},{row}" for i, row in enumerate(_table(",").split("\n"), -1) if row)[2:],
+    "columns of one name that are not used": "\n".join(f"{row},0,0" for row in _table(",").splitlines()),
+    "an empty column": _table(",", end=",\n").replace(",\n", ",empty\n", 1),
+}
+
+
+@pytest.mark.parametrize("name", REAL_LIFE)
+def test_text_as_other_programs_write_it(tmp_path: Path, name: str) -> None:
+    encoding = "utf-16" if name.startswith("Unicode") else "utf-8"
+    (tmp_path / "data.csv").write_bytes(REAL_LIFE[name].encode(encoding))
+    data = load_data(tmp_path / "data.csv", SCENE)
+    assert data.columns == [0, 1]
+    np.testing.assert_allclose(data.time, [row[0] for row in _ROWS], rtol=1e-15)
+    np.testing.assert_allclose(np.degrees(data.values), [row[1:] for row in _ROWS], rtol=1e-14)
 
 
 def test_guesses_say_what_they_took_for_what(tmp_path: Path) -> None:
@@ -115,7 +157,14 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "decreasing time": (_write(HEAD + "0,1\n2,2\n1,3\n"), "comes before"),
     "before the start": (_write(HEAD + "-1,1\n0,2\n1,3\n"), "begins at t = -1 s"),
     "too few rows": (_write(HEAD + "0,1\n1,2\n"), "2 rows; allowed: 3 or more"),
-    "two columns of one name": (_write("time,rotor,rotor\n0,1,1\n1,2,2\n2,3,3\n"), "two columns are named"),
+    "two columns of one name": (
+        _write("time,rotor,rotor\n0,1,1\n1,2,2\n2,3,3\n"),
+        "both 'rotor' and '_rotor' could be rotor",
+    ),
+    "empty fields": (_write(HEAD + "0,1\n1,\n2,3\n"), "column 'rotor' is nan in row 2 of 3"),
+    "a comma between thousands": (_write('time [ms],rotor\n0,1\n"1,000",2\n"2,000",3\n'), "'1,000' in column 1"),
+    "thousands in blanks": (_write("time rotor\n0 1.5\n1,000 2.5\n2,000 3.5\n"), "'1,000' in column 1"),
+    "dates": (_write(HEAD + "12:00:01,1\n12:00:02,2\n12:00:03,3\n"), "line 2 has '12:00:01'"),
     "two columns for one channel": (_write("time,rotor,azimuth\n0,1,1\n1,2,2\n2,3,3\n"), "could be rotor"),
     "a damaged archive": (lambda path: path.write_bytes(b"PK\x03\x04damaged"), "cannot be read"),
     "a damaged HDF5 file": (lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100)), "not a readable HDF5"),
