@@ -45,7 +45,7 @@ class LinearModes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the modes: "collective pitch" where symmetry tells them apart, else "mode 2"."""
+        """Names of the modes: "collective pitch" where symmetry tells them apart, else "mode 2"."""
         if names := self.sets[0].names:
             return tuple(name if name == "rotor" else f"{name} pitch" for name in names)
         return tuple(f"mode {k + 1}" for k in range(len(self.coordinates)))
@@ -149,7 +149,7 @@ class SceneModes:
 
 
 def _difference(sources: Sequence[LinearModes]) -> float:
-    """Of all other sources from the first one, modes in the order of their size."""
+    """Largest difference of all other sources from the first one, modes in the order of their size."""
     expected, *others = (np.sort(np.abs(one.eigenvalues).max(axis=2), axis=1) for one in sources)
     fast = expected > _SLOW * np.nanmax(expected, initial=0.0)
     shares = (np.abs(other - expected)[fast] / expected[fast] for other in others)

@@ -56,7 +56,7 @@ class ClaimShare:
 
     @property
     def share(self) -> float:
-        """Of the deciding runs from moved starts, those in which the claim holds; NaN where none decides."""
+        """Share of the deciding runs from moved starts in which the claim holds; NaN where none decides."""
         return self.moved.count("y") / self.deciding if self.deciding else float("nan")
 
     @property
@@ -174,7 +174,7 @@ class MeasuredRuns:
     decides: Mapping[str, NDArray[np.bool_]]
 
     def marks(self, item: Published) -> str:
-        """Of the claim, one for each run; run k of one scene is compared with run k of another."""
+        """A mark of the claim for each run; run k of one scene is compared with run k of another."""
         runs = len(next(iter(self.decides.values())))
         return "".join(_MARKS[all_hold(readings_of(item, _OneRun(self, run)))] for run in range(runs))
 

@@ -94,7 +94,7 @@ def channel_errors(
     names: Sequence[tuple[str, str]], time: Array, values: Array, expected: Array, slopes: Array, carried: Array,
     until: int,
 ) -> tuple[ChannelErrors, ...]:  # fmt: skip
-    """Of every channel.
+    """The errors of every channel.
 
     names       (name, unit) of each channel
     values, expected, slopes, carried   (n, channels) data, reference, its time derivative, and `carried_errors`
@@ -137,7 +137,7 @@ def rows_to_the_horizon(reference: Trajectory, time: Array) -> tuple[float, int]
 
 
 def from_dictionary(found: Mapping[str, Any]) -> DataVerdict:
-    """Of what `as_dictionary` gave, also where it has been JSON since."""
+    """The verdict of which `as_dictionary` made this, also where it has been JSON since."""
     values = {one.name: found[one.name] for one in fields(DataVerdict)}
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
     channels = [

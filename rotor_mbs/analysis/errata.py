@@ -54,7 +54,7 @@ def write_errata(path: Path, checks: Sequence[CheckedEntry], fingerprint: str) -
 
 
 def errata_fingerprint(results: OpenResults) -> str:
-    """Of the code that made the checks in an open file; "" where it has none."""
+    """Fingerprint of the code that made the checks in an open file; "" where it has none."""
     return str(results.root[_GROUP].attrs["fingerprint"]) if _GROUP in results.root else ""
 
 

@@ -108,7 +108,7 @@ def mirror_error(one: Array, other: Array) -> float:
 
 
 def relabelled(scene: Scene) -> Scene:
-    """The same rotor with every blade's number raised by one; the rotor's zero goes back by a blade's phase."""
+    """The rotor with every blade's number raised by one; the rotor's zero goes back by a blade's phase."""
     turn = 2.0 * math.pi / len(scene.blades)
     return replace(
         scene,

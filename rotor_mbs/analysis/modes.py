@@ -136,7 +136,7 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
 
 
 def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
-    """The same modes in the same places at every speed: each set is put in the order of the one before, by shape.
+    """Puts the same modes in the same places at every speed: each set is put in the order of the one before, by shape.
 
     Likeness of two modes: the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²), less their relative distance.
     """

@@ -118,7 +118,7 @@ def _readable_reference(scene: StoredScene) -> Trajectory | None:
 def _of_stored_run(
     scene: StoredScene, run: StoredRun, reference: Trajectory | None, bounds: Bounds, damages: Sequence[str]
 ) -> list[Verdict]:
-    """Of a run that is known to be damaged, what can still be judged."""
+    """Verdicts on what can still be judged of a run that is known to be damaged."""
     found = [_integrity(scene.name, run.method, damages, bounds)]
     try:
         with reading(str(scene.name), run.method) if damages else nullcontext():

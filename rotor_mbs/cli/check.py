@@ -29,7 +29,7 @@ _STANDARD_OUTPUT = Path("-")
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Of the file given, or of a default set that is computed."""
+    """Judges the file given, or a default set that is computed."""
     bounds = load_bounds(arguments.bounds)
     required = check_names(arguments.require or ())
     earlier = None if arguments.against is None else judge_file(arguments.against, bounds)

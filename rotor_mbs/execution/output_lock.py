@@ -73,7 +73,7 @@ def _parts_of(output: Path) -> Path:
 
 
 def _resolved(output: Path) -> Path:
-    """Of a symbolic link the file that it points to: both names are one output."""
+    """The file itself where the output is a symbolic link: both names are one output."""
     try:
         return output.resolve() if output.is_symlink() else Path(os.path.abspath(output))  # noqa: PTH100  (links stay)
     except (OSError, RuntimeError) as exc:  # links in a circle, a working folder that is gone

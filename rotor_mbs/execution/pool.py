@@ -161,7 +161,7 @@ class WorkerPool:
 
 
 class SerialPool:
-    """The same in this process, one task after the other, without time limits: where scripts must not start processes.
+    """A pool in this process, one task after the other, without time limits: where scripts must not start processes.
 
     Examples
     --------
@@ -215,7 +215,7 @@ def run_in(
     timeout_s: float | Callable[[T], float],
     split: Callable[[T], Sequence[T]] | None = None,
 ) -> Iterator[Finished[T, R]]:
-    """The same in a pool that is open; `tasks` are taken as workers become free.
+    """`work(task)` for all tasks in a pool that is open; `tasks` are taken as workers become free.
 
     A task whose worker died is tried once more at the end, alone. One that can be split is split first, also where it
     was over its time limit.

@@ -17,13 +17,13 @@ _NUMERICS = ("scenario", "solution", "methods", "models")
 
 
 def versions() -> dict[str, str]:
-    """Of this package, of the engines and libraries ("not installed" where one is missing), and of Python."""
+    """Versions of this package, of the engines and libraries ("not installed" where one is missing), and of Python."""
     return versions_with(*(name for method in methods() for name in method.distributions))
 
 
 @functools.cache
 def versions_with(*distributions: str) -> dict[str, str]:
-    """Of this package, of Python, of the libraries that every method uses, and of `distributions`."""
+    """Versions of this package, of Python, of the libraries that every method uses, and of `distributions`."""
     found = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
     for name in dict.fromkeys((*distributions, *_OWN)):
         try:
@@ -49,7 +49,7 @@ def _processor() -> str:
 
 
 def numerics_fingerprint() -> str:
-    """Of the sources that decide a run's numbers: a changed model makes stored runs stale."""
+    """Fingerprint of the sources that decide a run's numbers: a changed model makes stored runs stale."""
     return fingerprint(*_NUMERICS)
 
 

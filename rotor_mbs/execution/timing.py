@@ -40,7 +40,7 @@ class Timings(Generic[T]):
 
 
 def statistics(times: Sequence[float]) -> dict[str, float]:
-    """Of run times in s, by the names under which they are stored; quartiles between the order statistics."""
+    """Statistics of run times in s, by the names they are stored under; quartiles between the order statistics."""
     low, middle, high = map(float, np.quantile(times, (0.25, 0.5, 0.75)))
     return {
         "run_time_s": middle,
@@ -107,7 +107,7 @@ def _warm_all(
 
 
 def _expected(earlier: Sequence[Warm]) -> float:
-    """Of the next rung, in s: the last one's time, grown as from the one before it, at least doubled."""
+    """Expected time of the next rung in s: the last one's time, grown as from the one before it, at least doubled."""
     growth = earlier[-1].seconds / earlier[-2].seconds if len(earlier) > 1 and earlier[-2].seconds > 0.0 else 2.0
     return earlier[-1].seconds * min(max(growth, 2.0), 10.0)
 

@@ -50,7 +50,7 @@ class ForeignData:
 
     @property
     def columns(self) -> list[int]:
-        """Of the channels, in a matrix of all angles, then all rates."""
+        """Places of the channels in a matrix of all angles, then all rates."""
         return [one.column for one in self.channels]
 
 

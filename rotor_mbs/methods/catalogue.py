@@ -146,7 +146,7 @@ def _load(place: str) -> tuple[Method, ...]:
 
 
 def _as_methods(found: object) -> tuple[Method, ...]:
-    """Of a Method or several. Raises TypeError for anything else."""
+    """A Method or several of them as a tuple. Raises TypeError for anything else."""
     several = tuple(found) if isinstance(found, Iterable) else (found,)
     if not several or not all(isinstance(one, Method) for one in several):
         raise TypeError(f"{found!r:.60} is no Method and no sequence of them")

@@ -58,7 +58,7 @@ class Ladder:
 
     @property
     def short(self) -> Ladder:
-        """The same curve with every second value, without the coarsest third."""
+        """This ladder with every second value, without the coarsest third."""
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def rungs(self, interval: float) -> tuple[Rung, ...]:

@@ -83,7 +83,7 @@ class ComparisonPlots:
         self._runs, self._reference = runs, reference
 
     def __call__(self) -> Panels:
-        """The same as `error`."""
+        """Draws `error`."""
         return self.error()
 
     def error(self) -> Panels:

@@ -73,7 +73,7 @@ def list_scenes() -> list[tuple[str, str]]:
 
 
 def list_sweeps() -> list[tuple[str, str]]:
-    """The same of every shipped sweep."""
+    """Name and title of every shipped sweep."""
     paths = sorted(sweeps_folder().glob("*.toml"), key=lambda path: natural_key(path.name))
     return [(f"{sweeps_folder().name}/{path.stem}", _title(path)) for path in paths]
 

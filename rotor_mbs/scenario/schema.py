@@ -97,7 +97,7 @@ def _context(info: ValidationInfo) -> dict[str, Any]:
 
 
 def _one_per_blade(value: object, info: ValidationInfo, others: int, link: str) -> object:
-    """Of a list with a number for each blade and for `others` besides."""
+    """Checks the length of a list with a number for each blade and for `others` besides."""
     blades = _context(info).get("blades")
     if isinstance(value, list) and value and others == 0 and is_one_table(value):
         return value

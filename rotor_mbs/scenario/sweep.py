@@ -170,7 +170,7 @@ class Sweep:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Of every axis' key."""
+        """The unit of every axis' key."""
         return tuple(unit_of(parse_key(key)) for key in self.keys)
 
     @property

@@ -32,7 +32,7 @@ class Balance(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """Of the scale; plain where that is zero."""
+        """The largest error relative to the scale, or the error itself where the scale is zero."""
         return float(self.error.max()) / (self.scale or 1.0)
 
 

@@ -216,7 +216,7 @@ def start_slack(scene: Scene) -> float:
 
 
 def energy_slack(scene: Scene, run: Trajectory) -> float:
-    """Of the energy scale: what magnified round-off may add to a method's own energy error."""
+    """Share of the energy scale that magnified round-off may add to a method's own energy error."""
     return _ROUND_OFF * (energy_conditioning(scene, run) - 1.0) + start_slack(scene)
 
 

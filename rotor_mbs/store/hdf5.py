@@ -124,7 +124,7 @@ def members(group: Any) -> Iterator[tuple[str, Any]]:
 
 
 def member(group: Any, name: str) -> Any:
-    """One of them. Raises KeyError where there is none, StoreError at a link."""
+    """A member of a group. Raises KeyError where there is none, StoreError at a link."""
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         raise StoreError(
             f"{group.file.filename}: {group.name}/{name} is a link; allowed: groups and arrays of this file"

@@ -278,7 +278,7 @@ class StoredSweep:
             )
 
     def pieces(self, name: str, runs: int) -> Iterator[NDArray[Any]]:
-        """The same in pieces of at most `runs` runs: for trajectories."""
+        """An array in pieces of at most `runs` runs: for trajectories."""
         with hdf5.open_file(self._path) as file:
             dataset = self._dataset(file, name)
             for first in range(0, len(dataset), runs):

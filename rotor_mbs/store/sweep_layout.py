@@ -129,7 +129,7 @@ def empty_rows(count: int, row: np.dtype[np.void], names: Iterable[str] | None =
 
 
 def lost_rows(count: int, row: np.dtype[np.void], status: str, message: str) -> Rows:
-    """The same with a status and its message: of runs whose process died, or was ended."""
+    """Rows with a status and its message alone, for runs whose process died, or was ended."""
     rows = empty_rows(count, row)
     rows["status"][:], rows["message"][:] = code_of(status), message.encode()[:MESSAGE_BYTES]
     rows["time_reached"][:] = 0.0

@@ -32,7 +32,7 @@ SIGNIFICANCE = 1e-5
 
 @dataclass(frozen=True)
 class ChannelDistance:
-    """Of one channel at the end of the runs; distance and mean are 1 where they are as large as chance allows.
+    """How far two ensembles are apart in one channel at the end; distance and mean are 1 where they are as large as chance allows.
 
     distance   Kolmogorov and Smirnov's, over the critical one
     mean       difference of the means, over the critical one
@@ -57,7 +57,7 @@ def compare_ensembles(
 
 
 def compare_samples(one: Mapping[str, Array], other: Mapping[str, Array]) -> Iterator[ChannelDistance]:
-    """Of channels (runs,) by name."""
+    """The distances of all channels; one, other: arrays (runs,) by the channel's name."""
     significance = SIGNIFICANCE / (2 * len(one))
     for channel, values in one.items():
         others = other[channel]

@@ -105,7 +105,7 @@ def _columns(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[str, Array]
 
 
 def _names(quantity: Quantity, scene: Scene) -> list[str]:
-    """Of a quantity's components, last dimension fastest: coordinates by their labels, then the quantity."""
+    """Names of a quantity's components, last dimension fastest: the coordinate's label, then the quantity."""
     labels = {
         "coordinate": scene.coordinate_labels,
         "blade": [f"{blade}" for blade in range(1, 1 + len(scene.blades))],

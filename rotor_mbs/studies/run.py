@@ -248,7 +248,7 @@ def perform_run(job: Job) -> Result:
 
 
 def store_time_out(job: Job, message: str) -> Result:
-    """Of a run; what another study has of a case that was ended is nothing."""
+    """Stores a run that was ended at its time limit; other studies store nothing of such a case."""
     return store_failure("timed_out", job, message) if job.case.study == RUN else Result("timed_out", message)
 
 

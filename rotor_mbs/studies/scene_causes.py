@@ -262,7 +262,7 @@ def _field_scaled(scene: Scene, name: str, change: float) -> Scene:
 
 
 def _blade_parameters(scene: Scene) -> Iterator[tuple[str, str, Callable[[float], Scene]]]:
-    """Of all blades alike, then of each."""
+    """The parameters of all blades alike, then those of each blade."""
     each = [(f"[{i}]", (i,)) for i in range(len(scene.blades))] if len(scene.blades) > 1 else []
     for label, chosen in [("", tuple(range(len(scene.blades)))), *each]:
         for one in fields(Blade):

@@ -124,7 +124,7 @@ def limit_record(job: Job) -> Record:
 
 
 def _modes(scene: Scene, blade: int) -> tuple[complex, complex]:
-    """Of one pitch about zero, with the rotor fixed: gravity and rotation are negligible beside such a spring."""
+    """Eigenvalues of a pitch about zero, the rotor fixed: gravity and rotation are negligible beside such a spring."""
     return oscillator_modes(scene.blades[blade].pitch_inertia, *scene.bearing(blade))
 
 

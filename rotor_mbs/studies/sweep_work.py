@@ -102,7 +102,7 @@ def rows_of(chunk: Chunk) -> Rows:
 
 
 def _put_amplification(rows: Rows, i: int, scene: Scene) -> None:
-    """Of the motion itself, whatever the method: from the variational equations of the closed form."""
+    """Adds the motion's error amplification, from the variational equations of the closed form, whatever the method."""
     angles = np.empty((scene.samples, 0))
     time = np.linspace(0.0, scene.duration, scene.samples)
     motion = Trajectory(time, angles, angles, error_growth=error_growth(scene))

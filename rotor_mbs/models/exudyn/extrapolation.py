@@ -101,5 +101,5 @@ def _to_zero(coarse: Array, middle: Array, fine: Array) -> Array:
 
 
 def _eliminated(coarse: Array, fine: Array, ratio: float) -> Array:
-    """Of two results whose errors have that ratio: the result without this error."""
+    """The result without the error that two results have in this ratio."""
     return fine + (fine - coarse) / (ratio - 1.0)

@@ -34,7 +34,7 @@ class BladeOnBody:
     rotation: Array
 
     def name(self, what: str) -> str:
-        """Of the sensor that keeps `what` of it."""
+        """Name of the sensor that keeps `what` of it."""
         return f"blade {self.index + 1} {what}"
 
 
@@ -69,7 +69,7 @@ def newton_euler(scene: Scene, blade: BladeOnBody, sampled: Sampled) -> tuple[Ar
 
 
 def tree_loads(scene: Scene, segments: Sequence[LoadSegment], time: Array, sampled: Sampled) -> dict[str, Array]:
-    """Of the kinematic tree: every blade by Newton and Euler, and their sum with the hub's share at the shaft.
+    """Loads of the kinematic tree: every blade by Newton and Euler, and their sum with the hub's share at the shaft.
 
     The moment of a pitch actuator is what they leave about the pitch axis.
     """
@@ -130,7 +130,7 @@ def _joint_sensors(joint: str, connector: str) -> list[Part]:
 
 
 def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
-    """Of the chain: what its joints and its connectors transmit."""
+    """Loads of the chain: what its joints and its connectors transmit."""
     hub = _matrices(sampled("hub rotation"))
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
     for i in range(len(scene.blades)):

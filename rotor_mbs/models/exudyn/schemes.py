@@ -31,7 +31,7 @@ class Scheme:
     refinement: int = 1
 
     def with_accelerations(self) -> Scheme:
-        """The same, with accelerations at the end of every step; an implicit scheme has them anyway."""
+        """This scheme with accelerations at the end of every step; an implicit one has them anyway."""
         return replace(self, options={**self.options, _END_ACCELERATIONS: True}) if self.stages else self
 
     @property

@@ -142,7 +142,7 @@ def _fields(
 
 
 def _add_energies(scene: Scene, fields: dict[str, Array], read: _Reader, name: str, body: Body) -> None:
-    """Of a body: ½ m v² and m g z of its centre of mass, ½ ω·J ω in its own frame."""
+    """Adds a body's energies: ½ m v² and m g z of its centre of mass, ½ ω·J ω in its own frame."""
     if body.mass:
         velocity, position = read.sampled(f"{name} velocity"), read.sampled(f"{name} position")
         fields["kinetic_energy"] += 0.5 * body.mass * np.sum(velocity * velocity, axis=1)

@@ -44,12 +44,12 @@ ROTOR = 0
 
 
 def torque_of(blade: int) -> int:
-    """Of the pitch torque of a blade, counted from 0."""
+    """Number of the pitch torque of a blade; blades are counted from 0."""
     return 1 + 2 * blade
 
 
 def rest_of(blade: int) -> int:
-    """Of the rest angle of a blade's spring."""
+    """Number of the rest angle of a blade's spring."""
     return 2 + 2 * blade
 
 
@@ -100,7 +100,7 @@ class Moment:
 
 
 def pitch_terms(scene: Scene, blade: int) -> tuple[tuple[int, float], ...]:
-    """Of what drives a pitch: its torque, and the moment k r of a spring whose rest angle r changes over time.
+    """The terms that drive a pitch: its torque, and the moment k r of a spring whose rest angle r changes over time.
 
     A rest angle that is constant is the spring's own.
     """

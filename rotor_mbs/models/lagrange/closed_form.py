@@ -89,7 +89,7 @@ def accelerations(
 def pitches(
     form: RotorForm, angles: Sequence[Number], rates: Sequence[Number], loads: LoadValues
 ) -> Iterator[tuple[BladeForm, Number, Number, Number, Number]]:
-    """Of each pitch that moves: blade, angle, rate, torque, rest angle."""
+    """For each pitch that moves: blade, angle, rate, torque, rest angle."""
     nothing = (0.0,) * len(form.blades)
     return zip(form.blades, angles[1:], rates[1:], loads.pitches or nothing, loads.rests or nothing, strict=True)
 

@@ -138,7 +138,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
 
 
 def _put_loads(block: Block, scenes: Sequence[Scene]) -> None:
-    """Of every run by itself, from its angles and rates."""
+    """Adds the loads of every run by itself, from its angles and rates."""
     for i, (scene, n) in enumerate(zip(scenes, block.samples, strict=True)):
         found = sampled_loads(scene, block.time[i, :n], block.angles[i, :n], block.rates[i, :n])
         for name, values in found.items():

@@ -48,7 +48,7 @@ class BladeBody:
 
 
 class Motion(NamedTuple):
-    """Of all coordinates, rotor first: angles in rad, rates in rad/s, accelerations in rad/s²."""
+    """The motion of all coordinates, rotor first: angles in rad, rates in rad/s, accelerations in rad/s²."""
 
     angles: Sequence[Number]
     rates: Sequence[Number]
@@ -177,7 +177,7 @@ def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> di
 
 
 def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
-    """The same in quad precision, rounded at the end; states (n, 2 × moving coordinates): angles, then rates."""
+    """The loads in quad precision, rounded at the end; states (n, 2 × moving coordinates): angles, then rates."""
     engine, parameters = heyoka(), Parameters()
     form, moving = rotor_form(scene, parameters), scene.moving_coordinates
     count = len(moving)

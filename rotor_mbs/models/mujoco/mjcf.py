@@ -123,7 +123,7 @@ def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, dampi
 
 
 def _quaternion(about_shaft: float, pitch: float) -> tuple[float, float, float, float]:
-    """Of Ry(about_shaft) Rz(pitch), angles in rad; scalar part first."""
+    """The quaternion of Ry(about_shaft) Rz(pitch), angles in rad; scalar part first."""
     c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     return c * cp, s * sp, s * cp, c * sp

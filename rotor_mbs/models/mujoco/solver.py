@@ -138,7 +138,7 @@ class MujocoSolver:
         return np.asarray(self._scene.gravity * (poses.centre[:, :, 2] @ self.engine.masses))
 
     def _loads(self, poses: Poses, values: Array) -> dict[str, Array]:
-        """Of what each body's parent does to it: the moment of an actuator is its part about the pitch axis."""
+        """What each body's parent does to it; the moment of an actuator is the part about the pitch axis."""
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
         in_frame = [np.einsum("nbij,nbi->nbj", poses.frame, vectors)[:, 1:] for vectors in (force, moment)]
         shaft_moment = moment[:, 0].copy()
@@ -186,7 +186,7 @@ def _dampings(scene: Scene) -> tuple[float, ...]:
 
 
 def _springs(scene: Scene, samples: int) -> Iterator[tuple[int, float, Array, bool]]:
-    """Of each spring: coordinate, stiffness (N m/rad), (samples,) rest angle in rad, whether that changes."""
+    """For each spring: coordinate, stiffness (N m/rad), (samples,) rest angle in rad, whether that changes."""
     for number in mjcf.moving(scene)[1:]:
         stiffness, rest = scene.bearing(number - 1)[0], scene.pitch_load(number - 1)[1]
         if stiffness:

@@ -100,7 +100,7 @@ def printed_entries(names: Mapping[str, Any]) -> Entries:
 
 
 def derived_entries(state: State, errata: Errata) -> Entries:
-    """The same entries by the paper's derivation with the chosen errata in."""
+    """The entries by the paper's derivation with the chosen errata in."""
     names = state.names
     entries: Entries = {}
     for equation, name in MATRICES:
@@ -110,7 +110,7 @@ def derived_entries(state: State, errata: Errata) -> Entries:
 
 
 def right_entries(state: State) -> Entries:
-    """The same entries from (3) alone: derivatives of the matrix, of the kinetic and of the potential energy.
+    """The entries from (3) alone: derivatives of the matrix, of the kinetic and of the potential energy.
 
     For a point mass at p(q), T = ½ m ṗ·ṗ and V = m g p_z, Lagrange's equations are Σ_j m p_i·p_j q̈_j
     + Σ_jk m p_i·p_jk q̇_j q̇_k + m g p_i,z, where indices of p are derivatives.

@@ -235,7 +235,7 @@ def _ticks(axis: Any) -> tuple[Array, Sequence[str]]:
 
 
 def _place_of(text: Any) -> tuple[float, float]:
-    """Of a text, or of an annotation without an offset."""
+    """Where a text, or an annotation without an offset, stands."""
     found: tuple[float, float] = getattr(text, "xy", text.get_position())
     return found
 

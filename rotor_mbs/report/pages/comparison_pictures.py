@@ -38,7 +38,7 @@ def at_time(seconds: float) -> str:
 
 
 def side_look(run: StoredRun) -> Look:
-    """Of a line among few: the printed model dashed upon the corrected one."""
+    """The look of a line among few: the printed model is dashed upon the corrected one."""
     look = look_of(run.method)
     return Look(look.colour, "-" if run.method == REFERENCE or is_corrected(run.method) else "--", "")
 

@@ -86,7 +86,7 @@ def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
 
 
 def _look(channel: ChannelErrors) -> Look:
-    """Of a channel: that of its coordinate, 0 the rotor, 1 the pitch of blade 1, ..."""
+    """The look of the channel's coordinate: 0 the rotor, 1 the pitch of blade 1, ..."""
     return coordinate_look(int("".join(filter(str.isdigit, channel.name)) or 0))
 
 

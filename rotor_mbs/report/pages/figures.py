@@ -122,7 +122,7 @@ def _number(claim: Claim) -> str:
 
 
 def comparison(scene: StoredScene) -> ModelComparison:
-    """Of the printed model, the corrected one and Exudyn."""
+    """The printed model, the corrected one and Exudyn on one scene."""
     runs = compared_runs(scene)
     printed, corrected, exudyn = (runs.get(key) for key in HEADINGS)
     visible = largest = ended = gain = pitch = near = None

@@ -82,7 +82,7 @@ def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Sect
 
 
 def _tables(one: LinearModes, i: int, state: str) -> list[PageTable]:
-    """Of the i-th speed; state: the beginning of their captions, which differ on the whole page."""
+    """The tables of the i-th speed; state: the beginning of their captions, which differ on the whole page."""
     return [
         _mode_table(f"{state}: modes by the {one.label} ({one.source})", one, i),
         _shape_table(f"{state}: shapes, the largest amplitude 1", one, i),

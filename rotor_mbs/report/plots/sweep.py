@@ -35,7 +35,7 @@ def spread_panels(spread: Spread) -> Panels:
 
 
 def spread_figure(spread: Spread, title: str) -> str:
-    """The same as a file, with its title and legend."""
+    """SVG text of the picture of the spread, with its title and legend."""
     panel = spread_panels(spread)
     panel.axes[0].legend(loc="lower right", frameon=False)
     return _titled(panel, title)
@@ -57,7 +57,7 @@ def map_panels(found: StabilityMap, x_label: str = "", y_label: str = "") -> Pan
 
 
 def map_figure(found: StabilityMap, title: str) -> str:
-    """The same as a file, with its title and legend."""
+    """SVG text of the map, with its title and legend."""
     panel = map_panels(found)
     if panel.axes[0].get_lines():
         panel.axes[0].legend(loc="upper right")
