@@ -84,10 +84,8 @@ class TaskPool(Protocol):
 class WorkerPool:
     """Worker processes, each of which keeps its state between tasks. A context manager.
 
-    As many as there are cores start at once, the others when there is a task for them.
-
-    The processes are started afresh (spawn), ignore Ctrl-C, and end with this one. A process that dies, or is ended at
-    a time limit, is replaced.
+    As many as there are cores start at once, the others when there is a task for them: afresh (spawn). They ignore
+    Ctrl-C and end with this process. One that dies, or is ended at a time limit, is replaced.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ SIGNIFICANCE = 1e-5
 
 @dataclass(frozen=True)
 class ChannelDistance:
-    """How far two ensembles are apart in one channel at the end; distance and mean are 1 where they are as large as chance allows.
+    """How far two ensembles are apart in one channel at the end; 1 is as large as chance allows.
 
     distance   Kolmogorov and Smirnov's, over the critical one
     mean       difference of the means, over the critical one
