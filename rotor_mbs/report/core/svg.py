@@ -82,7 +82,7 @@ class _Page:
                 yield self._area(artist.get_path(), artist.get_transform(), artist.get_facecolor(), (x, y))
         yield "</svg>"
         for text in axes.texts:
-            place = self._placed(text.get_transform().transform(np.atleast_2d(_place_of(text))))[0]
+            place = self._placed(text.get_transform().transform(np.atleast_2d(text.get_position())))[0]
             yield _text(place, text.get_text(), text)
 
     def _placed(self, pixels: Array) -> Array:
@@ -232,12 +232,6 @@ def _ticks(axis: Any) -> tuple[Array, Sequence[str]]:
     at, margin = scale.transform(places), 1e-6 * (high - low)
     places = places[(at >= low - margin) & (at <= high + margin)]
     return places, axis.get_major_formatter().format_ticks(places) if len(places) else []
-
-
-def _place_of(text: Any) -> tuple[float, float]:
-    """Where a text, or an annotation without an offset, stands."""
-    found: tuple[float, float] = getattr(text, "xy", text.get_position())
-    return found
 
 
 def _text(place: Array, words: str, text: Any) -> str:

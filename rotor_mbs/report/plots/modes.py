@@ -36,7 +36,7 @@ def campbell(modes: LinearModes) -> Panels:
         if not apart and k != _HARMONICS[-1]:
             continue
         end = min(float(speeds[-1]), top / k)
-        panel.axes[0].annotate(f"{k}P", (end, k * end), color=GREY, ha="right", va="bottom", fontsize=8.0)
+        panel.axes[0].text(end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
     for k in range(frequencies.shape[1]):
         look = mode_look(k)
         every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
