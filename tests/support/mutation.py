@@ -218,7 +218,7 @@ _TESTS = {
         f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form",
     ),
     "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py",),
-    f"{_M}.energy": (f"{_PARTS}cumulative_integral_is_exact_for_quintics_on_uneven_rows", "models/test_exudyn_work.py"),
+    f"{_M}.energy": (f"{_PARTS}cumulative_integral_is_exact_on_uneven_rows", "models/test_exudyn_work.py"),
 }
 
 

@@ -16,7 +16,7 @@ from rotor_mbs.scenario.time_table import is_constant, value_at
 from rotor_mbs.solution.trajectory import Array
 
 # Points of the local polynomial that stands in for the power between rows.
-_POINTS = 6
+_POINTS = 8
 
 
 def spring_energy(scene: Scene, angles: Array) -> Array:
@@ -100,7 +100,7 @@ def _losses(scene: Scene, rates: Array) -> Array:
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:
-    """(n,) integral from the first row to each row, by a local polynomial through the six nearest rows.
+    """(n,) integral from the first row to each row, by a local polynomial through the eight nearest rows.
 
     Rows need not be equally spaced; the polynomial is integrated exactly by Gauss-Legendre points.
     """

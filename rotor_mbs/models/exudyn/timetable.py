@@ -21,8 +21,9 @@ Time = TypeVar("Time", float, Array)
 
 # A kink closer to a sample than this share of the sample interval is taken to be on it.
 _ALIGNED = 1e-6
-# Rows kept between two samples where a quadrature or the unwrapping of angles needs them.
-_ROWS = 10
+# Rows kept between two samples where a quadrature or the unwrapping of angles needs them: all steps, or some _ROWS of
+# them where that makes more than _MOST_ROWS.
+_ROWS, _MOST_ROWS = 10, 100
 
 
 @dataclass(frozen=True)
@@ -175,5 +176,5 @@ def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, i
     if not rows_between:
         return steps, 1
     per_row = math.ceil(steps / _ROWS)
-    rows = math.ceil(steps / per_row)
-    return rows * per_row, rows
+    steps = per_row * math.ceil(steps / per_row)
+    return steps, steps if steps <= _MOST_ROWS else steps // per_row

@@ -19,8 +19,9 @@ from rotor_mbs.solution.trajectory import Array
 
 # A kink closer to a sample than this share of the sample interval is moved onto it.
 _SAME = 1e-9
-# States kept in a sample interval where the work has to be integrated along the path.
-_ROWS = 10
+# States kept in a sample interval where the work has to be integrated along the path: of all steps, or of _ROWS of them
+# where that makes more than _MOST_ROWS.
+_ROWS, _MOST_ROWS = 10, 100
 
 
 @dataclass(frozen=True)
@@ -136,4 +137,5 @@ def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, i
     if not rows_between:
         return steps, 1
     rows = min(steps, _ROWS)
-    return rows * math.ceil(steps / rows), rows
+    steps = rows * math.ceil(steps / rows)
+    return steps, steps if steps <= _MOST_ROWS else rows
