@@ -195,10 +195,8 @@ def run_tasks(
 
     Parameters
     ----------
-    timeout_s
-        Time limit of a task in s, or a function of the task.
-    split
-        The parts of a task that stands for many runs; an empty sequence for one that cannot be split.
+    timeout_s : time limit of a task in s, or a function of the task.
+    split : the parts of a task that stands for many runs; an empty sequence for one that cannot be split.
     """
     if not tasks:
         return
@@ -259,7 +257,8 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
         if error is None:
             yield Finished(task, future.result())
         elif isinstance(error, OF_THE_MACHINE):
-            yield Finished(task, None, "worker_died", f"not enough memory, files or processes: {one_line(error)}")
+            lack = "code" if isinstance(error, ImportError) else "memory, files or processes"
+            yield Finished(task, None, "worker_died", f"not enough {lack}: {one_line(error)}")
         elif (failure := pool.failure(error)) == "error":
             yield Finished(task, None, failure, one_line(error), error)
         else:

@@ -26,7 +26,8 @@ BASE_UNITS = {"time": "s", "angle": "rad", "rate": "rad/s"}
 # Names without digits, blanks and marks; a name of a rate is one of an angle with a word of _RATE_WORDS behind it.
 _TIME_NAMES = {"time", "t", "times"}
 _ROTOR_NAMES = {"rotor", "rotorangle", "rotorposition", "rot", "azimuth", "rotorazimuth", "azim", "psi", "shaft"}
-_PITCH_NAMES = {"pitch", "pitchangle", "bladepitch", "bldpitch", "blpitch", "ptchpmzc", "ptchpmzb", "theta"}
+_PITCH_NAMES = {"pitch", "pitchangle", "bladepitch", "bldpitch", "blpitch", "ptchpmzc", "ptchpmzb", "theta", "beta"}
+_ROTOR_RATE_NAMES = {"omega"}
 _RATE_WORDS = ("rate", "speed", "velocity", "vel", "dot")
 _VECTORS = {
     "angle": {"angles", "angle", "q", "qpos", "coordinates", "positions"},
@@ -87,6 +88,8 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     if stem in _PITCH_NAMES:
         only = "1" if len([one for one in known if one.kind == "angle"]) == 2 else ""
         return next((one for one in known if one.name == f"pitch {digits[-1] if digits else only}{rate}"), None)
+    if letters in _ROTOR_RATE_NAMES:
+        stem, rate = "rotor", " rate"
     return next((one for one in known if one.name == f"rotor{rate}"), None) if stem in _ROTOR_NAMES else None
 
 

@@ -35,13 +35,22 @@ def doubts(scene: Scene) -> list[str]:
 
 
 def _of_start(scene: Scene) -> Iterator[str]:
+    # Where one is more than a turn, other whole numbers are in degrees, too.
+    in_degrees = any(abs(angle) > _TURN for angle in scene.initial_angles)
     for i, angle in enumerate(scene.initial_angles, start=1):
-        if abs(angle) > _TURN:
-            turns = f"{abs(angle) / _TURN:.1f} turns"
-            yield f'initial.angles (entry {i}): {angle:g} rad are {turns}; degrees? write "deg({angle:g})"'
+        if abs(angle) > _TURN or (in_degrees and abs(angle) >= 1.0 and angle == round(angle)):
+            yield f"initial.angles (entry {i}): {_as_degrees(angle)}"
+    for blade in range(len(scene.blades)):
+        rest = max((value for _, value in scene.pitch_load(blade)[1]), key=abs, default=0.0)
+        if abs(rest) > 0.5 * _TURN:
+            yield f"bearing.rest (blade {blade + 1}): {_as_degrees(rest)}"
     for i, rate in enumerate(scene.initial_rates, start=1):
         if abs(rate) > _FASTEST:
             yield f'initial.rates (entry {i}): {rate:g} rad/s; degrees per second? write "deg({rate:g})"'
+
+
+def _as_degrees(angle: float) -> str:
+    return f'{angle:g} rad are {abs(angle) / _TURN:.1f} turns; degrees? write "deg({angle:g})"'
 
 
 def _of_blade(blade: Blade) -> Iterator[str]:
@@ -51,3 +60,6 @@ def _of_blade(blade: Blade) -> Iterator[str]:
         distance = math.hypot(*point)
         if not _SHORTEST <= distance <= _LONGEST:
             yield f"{key}: {distance:g} m from the shaft; is it in m?"
+    gyration = math.sqrt(max(blade.inertia[:3]) / blade.mass) if blade.mass else 0.0
+    if gyration > 2.0 * math.hypot(*blade.tip):
+        yield f"inertia: a radius of gyration of {gyration:.3g} m, far beyond the tip; is it in kg m^2, mass in kg?"

@@ -205,6 +205,9 @@ def error(reference, results):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        print("usage: python evaluate.py RESULTS.txt", file=sys.stderr)
+        sys.exit(2)
     found = error(read_reference(), read_results(sys.argv[1]))
     print(f"error {found:.3e}, accepted up to {ACCEPTED:g}: {'accepted' if found <= ACCEPTED else 'not accepted'}")
     sys.exit(0 if found <= ACCEPTED else 1)

@@ -10,6 +10,8 @@ import pytest
 import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.errors import PlausibilityWarning
+from rotor_mbs.scenario.catalogue import list_scenes
+from rotor_mbs.scenario.plausibility import doubts
 from rotor_mbs.scenario.scene_file import new_scene_text
 
 # Mistake: (edits of the template, the command with {file} for the scene file, what the one line must say).
@@ -80,6 +82,17 @@ def test_a_number_that_looks_like_a_slip_is_warned_of_and_not_refused(
     assert says in line
     with pytest.warns(PlausibilityWarning, match="mine.toml"):
         rm.load(path)
+
+
+def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_units() -> None:
+    scene = rm.scene("paper/fig11").replace(**{"initial.angles": [30, 5, 0.1, -45], "bearing.stiffness": 1e3})
+    assert [line[:24] for line in doubts(scene)] == [f"initial.angles (entry {i})" for i in (1, 2, 4)]
+    (line,) = doubts(rm.scene("turbine/pitch-step").replace(**{"bearing.rest": 5.0}))[:1]
+    assert line.startswith("bearing.rest (blade 1): 5 rad are 0.8 turns")
+    (line,) = doubts(rm.scene("paper/fig11").replace(**{"blade.inertia": [9e7, 9e7, 1e3, 0, 0, 0]}))
+    assert line.startswith("blade.inertia: a radius of gyration of 77.5 m")  # sqrt(9e7 / 15000)
+    for name, _ in list_scenes():
+        assert not [line for line in doubts(rm.scene(name)) if "gyration" in line or "rest" in line], name
 
 
 def test_plausible_numbers_are_not_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -178,6 +178,8 @@ def test_the_benchmark_folder_accepts_what_is_right_and_nothing_else(tmp_path: P
     def results_of(run: Trajectory) -> list[str]:
         return [" ".join(map(repr, [t, *a])) for t, a in zip(run.time.tolist(), run.angles.tolist(), strict=True)]
 
+    no_file = plain_python(folder / "evaluate.py")
+    assert (no_file.returncode, no_file.stderr) == (2, "usage: python evaluate.py RESULTS.txt\n")
     assert evaluated(rows) == (0, "error 0.000e+00, accepted up to 1e-06: accepted\n")
     run = solve("exudyn_tree/rk44", scene, {"step": 5e-3}).trajectory
     status, line = evaluated(results_of(run))
