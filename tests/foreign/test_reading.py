@@ -95,6 +95,7 @@ def test_guesses_say_what_they_took_for_what(tmp_path: Path) -> None:
         ("t", "time"), ("Time", "time"), ("time_ms", "time"), ("rotor", "rotor"), ("rotor_deg", "rotor"),
         ("Azimuth", "rotor"), ("rotor speed", "rotor rate"), ("RotSpeed", "rotor rate"), ("psi_dot", "rotor rate"),
         ("pitch 1", "pitch 1"), ("PtchPMzc2", "pitch 2"), ("theta3", "pitch 3"), ("pitch_2_rate", "pitch 2 rate"),
+        ("beta1_dot", "pitch 1 rate"), ("beta2", "pitch 2"), ("omega_rpm", "rotor rate"),
         ("theta_dot_1", "pitch 1 rate"), ("pitch", None), ("tip 1 x", None), ("RotTorq", None), ("pitch 4", None),
     ],
 )  # fmt: skip
