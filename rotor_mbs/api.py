@@ -5,6 +5,7 @@ Prints nothing. Bad input raises `rotor_mbs.errors.InputError`, an unreadable or
 
 from __future__ import annotations
 
+import functools
 import os
 import shutil
 import tempfile
@@ -36,6 +37,7 @@ from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, s
 if TYPE_CHECKING:
     from rotor_mbs.report.mode_study import Modes
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
+    from rotor_mbs.store.sweep_dataset import StoredSweep
 
 
 def scenes(folder: str = "") -> list[str]:
@@ -323,19 +325,26 @@ class SweepData:
 
     def column(self, name: str) -> Any:
         """An array whole, such as "status", "pitch_max" or "angles": one row for each run. Raises StoreError."""
-        from rotor_mbs.store.sweep_dataset import StoredSweep
-
-        return StoredSweep(self.path).column(name)
+        return np.array(self._stored.column(name))
 
     def at(self, name: str, sample: int) -> Any:
-        """(runs, ...) a trajectory, such as "angles", at one sample of all runs; the others are not read."""
-        from rotor_mbs.store.sweep_dataset import StoredSweep
-
-        return StoredSweep(self.path).at(name, sample)
+        """(runs, ...) a trajectory, such as "angles", at one sample of all runs. Raises StoreError."""
+        return np.array(self._stored.column(name)[:, sample])
 
     def to_xarray(self) -> Any:
-        """The dataset as an xarray.Dataset, opened lazily: one variable for each parameter, with its unit."""
-        return need_xarray().open_dataset(self.path)
+        """The dataset as an xarray.Dataset, opened lazily: one variable for each parameter, with its unit.
+
+        Raises StoreError, as `column` and `at` do, where a run is not what was written.
+        """
+        xarray, _ = need_xarray(), self._stored
+        return xarray.open_dataset(self.path)
+
+    @functools.cached_property
+    def _stored(self) -> StoredSweep:
+        """Read whole once, to verify it."""
+        from rotor_mbs.store.sweep_dataset import StoredSweep
+
+        return StoredSweep(self.path)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class RotorError(Exception):
@@ -35,6 +36,15 @@ class StoreError(RotorError):
 
 class PlausibilityWarning(UserWarning):
     """A number that is allowed, and yet looks like a slip: degrees, millimetres, tonnes."""
+
+
+@contextmanager
+def saving(path: object) -> Iterator[None]:
+    """What the system refuses in the block is a StoreError about `path`."""
+    try:
+        yield
+    except OSError as exc:
+        raise StoreError(f"{path}: cannot be written: {exc.strerror}; nothing stored before is lost") from exc
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.store.sweep_columns import parameter_name
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
 Array = NDArray[np.float64]
@@ -80,14 +82,14 @@ def lyapunov_exponent(time: Array, growth: Array) -> tuple[float, float, float, 
 def _separations(sweep: StoredSweep) -> Array:
     """(pairs, n) rad."""
     well = sweep.column("status") == 0
+    stored = sweep.column("angles")
     found = []
-    first = 0
-    for angles in sweep.pieces("angles", 2 * _PAIRS_AT_ONCE):
+    for first in range(0, len(stored), 2 * _PAIRS_AT_ONCE):
+        angles = stored[first : first + 2 * _PAIRS_AT_ONCE]
         pairs = len(angles) // 2
         both = well[first : first + 2 * pairs].reshape(pairs, 2).all(axis=1)
         difference = angles[1 : 2 * pairs : 2].astype(float) - angles[0 : 2 * pairs : 2]
         found.append(np.sqrt((difference[both] ** 2).sum(axis=2)))
-        first += len(angles)
     if not sum(map(len, found)):
         raise InputError("spread: no pair of runs ended well; allowed: a sweep with two or more such runs")
     return np.concatenate(found)
@@ -115,14 +117,16 @@ class StabilityMap:
 
 def stability_map(sweep: StoredSweep, start: float) -> StabilityMap:
     """start: the largest pitch at the start, rad. Raises InputError where the sweep is no grid of two axes."""
-    if len(sweep.shape) != 2 or len(sweep.keys) != 2:
+    shape = json.loads(sweep.attributes["shape"])  # values along every axis of the grid, slowest first
+    if len(shape) != 2 or len(sweep.keys) != 2:
         raise InputError(f"map: {len(sweep.keys)} axes; allowed: a grid of two axes, by one method")
     if not start > 0.0:
         raise InputError("map: every pitch starts at zero and nothing could grow; allowed: a small pitch at the start")
-    rows, columns = sweep.shape
-    y, x = (sweep.parameter(key)[: rows * columns].reshape(rows, columns) for key in sweep.keys)
+    rows, columns = shape
+    names = [parameter_name(key) for key in sweep.keys]
+    y, x = (sweep.column(name)[: rows * columns].reshape(rows, columns) for name in names)
     largest = sweep.column("pitch_max")[: rows * columns].reshape(rows, columns)
     return StabilityMap(
-        sweep.keys[1], sweep.keys[0], sweep.units[1], sweep.units[0],
+        sweep.keys[1], sweep.keys[0], sweep.columns[names[1]].units, sweep.columns[names[0]].units,
         x[0], y[:, 0], largest / start,
     )  # fmt: skip

@@ -82,9 +82,10 @@ def _summarize(result: SweepResult, *, as_json: bool) -> None:
 
 
 def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
+    from rotor_mbs.store.sweep_columns import row_type
     from rotor_mbs.studies.sweep import estimate_seconds
 
-    size, seconds = plan.runs * plan.layout.row.itemsize, estimate_seconds(plan, pool)
+    size, seconds = plan.runs * row_type(plan.sweep).itemsize, estimate_seconds(plan, pool)
     if arguments.json:
         facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
         print(json.dumps(facts))
@@ -110,7 +111,6 @@ def draw(sweep: Sweep, dataset: Path, path: Path) -> str:
     from rotor_mbs.store.sweep_dataset import StoredSweep
 
     stored = StoredSweep(dataset)
-    stored.refuse_damaged_runs()
     if sweep.table.picture == "spread":
         spread = spread_of(stored)
         text = spread_figure(spread, sweep.table.title)

@@ -14,24 +14,19 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
-from contextlib import suppress
-from typing import Any, TypeVar
+from contextlib import ExitStack, suppress
+from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.pool import TaskPool, WorkerPool, one_line
+from rotor_mbs.execution.pool import R, T, TaskPool, WorkerPool, one_line
 from rotor_mbs.execution.provenance import fingerprint, versions
-
-T = TypeVar("T")
-R = TypeVar("R")
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 _CONNECT_S = 3.0
 _NO_WORKERS_S = 30.0
+_OTHER_CODE = "a worker has other versions or other code; allowed: workers with the same"
 # Of the package: all that decides a number of a sweep.
 _CODE = ("scenario", "solution", "methods", "models", "execution", "store", "studies")
-
-# By its name: only the workers import it.
-_LOAD = "rotor_mbs.studies.sweep_work:prepare"
 
 # A task's arrays are as large as the last one's. Memory that a process keeps (with the GNU C library, up to 128 MB) it
 # need not get from the system again, page by page: an eleventh of a fast run with many samples.
@@ -53,42 +48,46 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
 
 
 def _load() -> None:
-    pkgutil.resolve_name(_LOAD)()
+    pkgutil.resolve_name("rotor_mbs.studies.sweep_work:prepare")()  # by its name: only the workers import it
 
 
 def _open_cluster(address: str) -> Cluster:
+    engine = f"--engine dask:{address}"
     try:
         from distributed import Client
     except ImportError as exc:
         raise InputError("--engine dask: dask is not installed; pip install distributed") from exc
-    if not _answers(address):
-        raise InputError(f"--engine dask:{address}: no dask scheduler answers there; allowed: {ENGINE_FORMS}")
-    make: Any = Client
-    client = make(address, timeout=_CONNECT_S, set_as_default=False)
-    try:
-        for worker, found in client.run(identity).items():
-            _refuse_others(identity(), found, f"worker {worker}")
-    except BaseException as exc:
-        client.close()
-        if isinstance(exc, InputError):
-            raise
-        raise InputError(
-            f"--engine dask:{address}: a worker cannot tell its version ({one_line(exc)}); allowed: workers with "
-            "the same versions and code"
-        ) from exc
-    _silence_dask()
-    workers = sum(client.nthreads().values())
-    if not workers:
-        client.close()
-        raise InputError(f"--engine dask:{address}: the scheduler has no workers; allowed: one with workers")
-    return Cluster(client, workers)
-
-
-def _silence_dask() -> None:
-    """What it logs of a lost connection is what this program says in a line."""
     for name in list(logging.root.manager.loggerDict):
-        if name.startswith(("distributed", "tornado")):
+        if name.startswith(("distributed", "tornado")):  # what it logs of a lost connection is said here in a line
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    if not _answers(address):
+        raise InputError(f"{engine}: no dask scheduler answers there; allowed: {ENGINE_FORMS}")
+    with ExitStack() as stack:
+        client = stack.enter_context(Client(address, timeout=_CONNECT_S, set_as_default=False))
+        try:
+            client.run(refuse_other_code, identity())
+        except Exception as exc:  # also of a worker that has no such function
+            raise InputError(f"{engine}: {_OTHER_CODE} ({one_line(exc)})") from exc
+        if not client.nthreads():
+            raise InputError(f"{engine}: the scheduler has no workers; allowed: one with workers")
+        stack.pop_all()
+    return Cluster(client)
+
+
+def _answers(address: str) -> bool:
+    """Whether a scheduler answers there: a client would wait for the answer of another program without end."""
+    import asyncio
+
+    from distributed.comm.core import connect
+
+    async def greet() -> None:
+        await (await connect(address, timeout=_CONNECT_S)).close()
+
+    try:
+        asyncio.run(asyncio.wait_for(greet(), _CONNECT_S))
+    except Exception:  # whatever another program at that address may answer
+        return False
+    return True
 
 
 class Cluster:
@@ -99,11 +98,10 @@ class Cluster:
 
     shares_disk = False
 
-    def __init__(self, client: Any, workers: int) -> None:
-        self._client, self.workers = client, workers
+    def __init__(self, client: Any) -> None:
+        self._client, self.workers = client, sum(client.nthreads().values())
         self._executor = client.get_executor(pure=False)  # two equal calls are two runs
         self._waiting: set[Future[Any]] = set()
-        self._is_closed = threading.Event()
         threading.Thread(target=self._watch, daemon=True).start()
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
@@ -120,7 +118,6 @@ class Cluster:
         return "worker_died" if isinstance(error, KilledWorker | CancelledError) else "error"
 
     def close(self) -> None:
-        self._is_closed.set()
         self._client.close()
 
     def _refuse_without_scheduler(self) -> None:
@@ -130,52 +127,28 @@ class Cluster:
     def _watch(self) -> None:
         """A cluster whose last worker is gone would be waited for without end."""
         without_since = time.monotonic()
-        while not self._is_closed.wait(1.0):
-            if self._client.status != "running" or self._client.nthreads():
-                without_since = time.monotonic()
-            elif time.monotonic() - without_since > _NO_WORKERS_S:
-                error = StoreError(f"--engine dask: no workers for {_NO_WORKERS_S:g} s; what is stored is kept")
-                for future in list(self._waiting):
-                    with suppress(Exception):  # one that has just ended
-                        future.set_exception(error)
-                return
+        while time.monotonic() - without_since < _NO_WORKERS_S:
+            time.sleep(1.0)
+            with suppress(Exception):  # the scheduler is gone, which ends the futures, too; or this client is closed
+                if self._client.nthreads():
+                    without_since = time.monotonic()
+        error = StoreError(f"--engine dask: no workers for {_NO_WORKERS_S:g} s; what is stored is kept")
+        for future in list(self._waiting):
+            with suppress(Exception):  # one that has just ended
+                future.set_exception(error)
 
 
 def identity() -> dict[str, str]:
-    """What must be equal here and in a worker of a cluster, or its numbers would be others: versions and code."""
+    """What must be equal here and in a worker, or its numbers would be others: versions and code."""
     return {**versions(), "code of rotor_mbs": fingerprint(*_CODE)[:12]}
 
 
-def _refuse_others(expected: Mapping[str, str], found: Mapping[str, str], where: str) -> None:
-    """Raises InputError where a worker has another version of anything that decides a number."""
-    wrong = [
-        f"{name} {found.get(name, 'missing')} (here {here})"
-        for name, here in expected.items()
-        if found.get(name) != here
-    ]
+def refuse_other_code(expected: Mapping[str, str]) -> None:
+    """In a worker. Raises InputError where it has another version of anything that decides a number."""
+    found = {name: identity().get(name, "missing") for name in expected}
+    wrong = [f"{name} {found[name]} (here {here})" for name, here in expected.items() if found[name] != here]
     if wrong:
-        raise InputError(
-            f"--engine dask: {where} has {', '.join(wrong)}; allowed: workers with the same versions and code"
-        )
-
-
-def _answers(address: str) -> bool:
-    """Whether a scheduler answers there: a client that finds none, or another program, waits for minutes."""
-    import asyncio
-
-    from distributed.comm.core import connect
-
-    async def greet() -> None:
-        meet: Any = connect
-        comm = await meet(address, timeout=_CONNECT_S)
-        await comm.close()
-
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    try:
-        asyncio.run(asyncio.wait_for(greet(), _CONNECT_S))
-    except Exception:  # whatever another program at that address may answer
-        return False
-    return True
+        raise InputError(f"--engine dask: {_OTHER_CODE} (on {socket.gethostname()}: {', '.join(wrong)})")
 
 
 def run_as_worker(work: Callable[[T], R], task: T, timeout_s: float, expected: Mapping[str, str]) -> R:
@@ -185,7 +158,7 @@ def run_as_worker(work: Callable[[T], R], task: T, timeout_s: float, expected: M
     """
     import faulthandler
 
-    _refuse_others(expected, identity(), f"the worker on {socket.gethostname()}")  # it may have joined later
+    refuse_other_code(expected)  # the worker may have joined later
     with open(os.devnull, "w") as nowhere:  # noqa: PTH123  (a device)
         faulthandler.dump_traceback_later(timeout_s, exit=True, file=nowhere)
         try:

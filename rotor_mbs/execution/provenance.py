@@ -55,12 +55,15 @@ def numerics_fingerprint() -> str:
 
 @functools.cache
 def fingerprint(*parts: str) -> str:
-    """sha256 over every file of this package in `parts`, which are folders or files."""
+    """sha256 over every file of this package in `parts`, which are folders or files.
+
+    Without what Python keeps of them: a process that compiles them has files of passing names there.
+    """
     package = Path(rotor_mbs.__file__).parent
     digest = hashlib.sha256()
     for part in parts:
         for path in sorted({package / part, *(package / part).rglob("*")}):
-            if path.is_file() and path.suffix != ".pyc":
+            if path.parent.name != "__pycache__" and path.is_file():
                 digest.update(str(path.relative_to(package)).encode())
                 digest.update(path.read_bytes())
     return digest.hexdigest()

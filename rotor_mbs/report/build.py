@@ -39,9 +39,9 @@ from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.report.paper_figures import PaperFigure, available
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import OpenResults, StoredScene, open_results
+from rotor_mbs.store.read import OpenResults, StoredScene, is_sweep, open_results
 from rotor_mbs.store.records import Record, read_records
-from rotor_mbs.store.sweep_dataset import StoredSweep, is_sweep
+from rotor_mbs.store.sweep_dataset import StoredSweep
 
 Part = str | PaperFigure  # a scene by its name, or a figure of the paper
 _GROUPS = 2  # per worker

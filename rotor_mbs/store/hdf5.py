@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import StoreError, saving
 from rotor_mbs.solution.quantities import Quantity
 from rotor_mbs.store.digests import DIGESTS, plain, seal_all
 from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Column
@@ -64,22 +64,29 @@ def replace_file(path: Path, content: Buffer) -> None:
 
     Of a symbolic link the file that it points to is replaced; a device or a pipe is written to.
     """
-    place = path.resolve() if path.is_symlink() else path
-    temporary = place.with_name(f".{place.name}.{os.getpid()}.tmp")
-    try:
-        if path.exists() and not path.is_file() and not path.is_dir():
+    if path.exists() and not path.is_file() and not path.is_dir():
+        with saving(path):
             path.write_bytes(content)
-            return
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(place)
-    except OSError as exc:
-        with suppress(OSError):
-            temporary.unlink()
-        raise StoreError(f"{path}: cannot be written: {exc.strerror}; nothing stored before is lost") from exc
+        return
+    with replacing(path.resolve() if path.is_symlink() else path) as temporary, temporary.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """The name of a file to be written in the block, which then takes the place of `path`, or goes where the block
+    raises. Raises StoreError where it cannot be written."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    with saving(path):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield temporary
+            temporary.replace(path)
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
 
 
 @contextmanager

@@ -22,6 +22,9 @@ KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, mo
 KEY_ATTRIBUTE = "run_hash"
 _KEY_NAMES = (KEY_ATTRIBUTE, "bench_hash", "record_hash")
 
+# The attribute with the hash of all that decides a sweep's numbers, which only the dataset of a sweep has.
+SWEEP_IDENTITY = "sweep_identity"
+
 # The attribute with the time limit, in s, of a run that it ended.
 LIMIT = "time_limit_s"
 

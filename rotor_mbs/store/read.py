@@ -16,7 +16,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import digests, hdf5
-from rotor_mbs.store.layout import key_of
+from rotor_mbs.store.layout import SWEEP_IDENTITY, key_of
 
 
 @dataclass(frozen=True)
@@ -136,6 +136,12 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
             scenes = {scene.name: scene for scene in _scenes(file, "", verify, {hdf5.address(file)})}
             attributes = hdf5.attributes_of(file)
         yield OpenResults(path, attributes, scenes, file)
+
+
+def is_sweep(path: Path) -> bool:
+    """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
+    with hdf5.open_file(path) as file, hdf5.reading(path):
+        return SWEEP_IDENTITY in file.attrs
 
 
 def _scenes(group: Any, name: str, verify: bool, seen: set[int]) -> Iterator[StoredScene]:

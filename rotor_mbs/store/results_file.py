@@ -16,7 +16,7 @@ from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.digests import DIGESTS
 from rotor_mbs.store.layout import KEYWORDS, LIMIT, TOGETHER, key_of
-from rotor_mbs.store.read import OpenResults, StoredRun, all_damages, open_results
+from rotor_mbs.store.read import OpenResults, StoredRun, all_damages, is_sweep, open_results
 from rotor_mbs.store.records import records_in
 from rotor_mbs.store.summary import put_summary
 
@@ -103,13 +103,9 @@ def merge(
 
 
 def refuse_other_kinds(path: Path) -> None:
-    """Raises StoreError where `path` has what a merge would not carry over: a sweep's dataset, which has its arrays at
-    the root, where a results file has groups alone."""
-    if not path.exists():
-        return
-    with hdf5.open_file(path) as file, hdf5.reading(path):
-        if not all(hdf5.is_group(item) for _, item in hdf5.members(file)):
-            raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
+    """Raises StoreError where `path` has what a merge would not carry over: a sweep's dataset."""
+    if path.exists() and is_sweep(path):
+        raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
 
 
 def _members(results: OpenResults) -> Iterator[tuple[str, str, str, str]]:

@@ -19,9 +19,9 @@ from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import changed_arrays
-from rotor_mbs.store.read import open_results
+from rotor_mbs.store.read import is_sweep, open_results
 from rotor_mbs.store.sweep_columns import MISSING
-from rotor_mbs.store.sweep_dataset import StoredSweep, is_sweep
+from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.check_probes import measured, perform_probe, probes, speed_probes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_files
@@ -95,7 +95,7 @@ def _damage_reported(path: Path) -> Iterator[None]:
 def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
     """Verdicts on what is there: runs, or a sweep. Raises StoreError, InputError."""
     if is_sweep(path):
-        return _judge_sweep(StoredSweep(path), bounds)
+        return _judge_sweep(StoredSweep(path, allow_damaged_runs=True), bounds)
     with ExitStack() as stack:
         results = stack.enter_context(open_results(path, verify=False))
         shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
@@ -106,7 +106,7 @@ def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Verdict]:
     """Whether all runs are there, and as they were written; their energies were judged when they were computed."""
     scene = str(sweep.attributes.get("base_scene", "sweep"))
     missing = int((sweep.column("status") == MISSING).sum())
-    damaged = len(sweep.damaged_runs())
+    damaged = len(sweep.damaged_runs)
     look = f"{missing} runs missing; the sweep's own command computes them"
     changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
     return [

@@ -8,7 +8,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -26,11 +26,10 @@ from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.store.layout import KEYWORDS
-from rotor_mbs.store.sweep_columns import MISSING, Rows
-from rotor_mbs.store.sweep_dataset import SweepDataset
-from rotor_mbs.store.sweep_layout import SweepLayout, lost_rows
-from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, perform
+from rotor_mbs.store.layout import KEYWORDS, SWEEP_IDENTITY
+from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns, row_type
+from rotor_mbs.store.sweep_dataset import open_sweep
+from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, lost_rows, perform
 
 # Runs handed to a worker at once by the fast path: an eighth of a second of work, fewer towards the end, so that all
 # workers end together. The least fills the lanes of any processor.
@@ -66,13 +65,14 @@ class SweepPlan:
     def rows(self) -> int:
         return self.sweep.design.count
 
-    @property
-    def layout(self) -> SweepLayout:
-        return SweepLayout(self._identity(), self._attributes(), self.sweep, self.methods, self.first, self.last)
+    def opened(self, output: Path) -> AbstractContextManager[tuple[RunColumns, NDArray[np.int8]]]:
+        """Its dataset, and the statuses of its runs: `open_sweep`."""
+        numbers = range(self.first, self.last)
+        return open_sweep(output, self.sweep, self.methods, numbers, self._attributes(), self.time_limit_s)
 
     def chunks(self, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
         """The runs of `gaps`, cut into what one of `workers` does at once."""
-        variants, row = self.sweep.variants(), self.layout.row
+        variants, row = self.sweep.variants(), row_type(self.sweep)
         for first, _ in gaps[:1]:
             variants.scene(self.sweep.design.rows(first, first + 1)[0].tolist())
         left = sum(last - first for first, last in gaps)
@@ -145,6 +145,9 @@ class SweepPlan:
             "test_share": table.test,
             "settings": json.dumps(table.settings, sort_keys=True),
             "runs_of_all_parts": self.rows * len(self.methods),
+            SWEEP_IDENTITY: self._identity(),
+            "runs": self.runs,
+            "parameter_keys": list(sweep.keys),
             **versions(),
             **machine(),
         }
@@ -238,25 +241,34 @@ def run_sweep(
     plan = plan_sweep(sweep, methods, part, timeout_s)
     start = time.monotonic()
     pool = open_task_pool(engine, workers or os.cpu_count() or 1) if isinstance(engine, str) else engine
-    with nullcontext() if pool is engine else closing(pool), SweepDataset(output, plan.layout, timeout_s) as dataset:
-        gaps = dataset.missing()
-        missing = sum(last - first for first, last in gaps)
-        done, lost = plan.runs - missing, list[str]()
+    with nullcontext() if pool is engine else closing(pool), plan.opened(output) as (dataset, statuses):
+        missing, lost = int((statuses == MISSING).sum()), list[str]()
+        done = plan.runs - missing
         on_progress(done, plan.runs, Counter())
-        columns = dataset.columns if pool.shares_disk else None
-        chunks = (replace(chunk, columns=columns) for chunk in plan.chunks(gaps, pool.workers))
+        columns = dataset if pool.shares_disk else None
+        chunks = (replace(chunk, columns=columns) for chunk in plan.chunks(_gaps(plan, statuses), pool.workers))
         for end in run_in(pool, work, chunks, _hard_limit, Chunk.split):
             if end.failure == "worker_died":  # nothing is known of these runs: they stay missing
                 lost += [f"run {run}: {end.message}" for run in range(end.task.first, end.task.last)]
                 on_progress(done, plan.runs, Counter({end.failure: len(end.task.values)}))
                 continue
-            first, found = end.task.first, _found(end)
-            stored = dataset.write(first, found) if isinstance(found, dict) else dataset.note(first, found)
+            found = _found(end)
+            stored = dataset.write(end.task.first, found) if isinstance(found, dict) else found
+            statuses[end.task.first - plan.first : end.task.last - plan.first] = stored
             done += len(stored)
-            on_progress(done, plan.runs, Counter(STATUSES[code] for code in stored.tolist()))
-        statuses = Counter(STATUSES[code] for code in dataset.statuses.tolist() if code != MISSING)
-        seconds, is_ok = time.monotonic() - start, _is_ok(plan, dataset.statuses)
-        return SweepResult(dataset.path, plan.runs, missing, statuses, seconds, is_ok, tuple(lost))
+            on_progress(done, plan.runs, _counted(stored))
+        seconds, is_ok = time.monotonic() - start, _is_ok(plan, statuses)
+        return SweepResult(dataset.path, plan.runs, missing, _counted(statuses), seconds, is_ok, tuple(lost))
+
+
+def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
+    return Counter(STATUSES[code] for code in statuses.tolist() if code != MISSING)
+
+
+def _gaps(plan: SweepPlan, statuses: NDArray[np.int8]) -> list[tuple[int, int]]:
+    """(first, last) of every span of missing runs."""
+    edges = np.flatnonzero(np.diff(statuses == MISSING, prepend=False, append=False))
+    return [(int(first), int(last)) for first, last in plan.first + edges.reshape(-1, 2)]
 
 
 def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.int8]:

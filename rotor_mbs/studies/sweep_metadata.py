@@ -23,8 +23,8 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.layout import KEYWORDS
-from rotor_mbs.store.sweep_dataset import StoredSweep, Variable
-from rotor_mbs.store.sweep_layout import SPLITS
+from rotor_mbs.store.sweep_columns import SPLITS
+from rotor_mbs.store.sweep_dataset import StoredSweep
 
 _PIECE = 1 << 24  # bytes of a variable that are read at once
 _CRATE = "ro-crate-metadata.json"
@@ -59,7 +59,6 @@ def describe(path: Path) -> list[Path]:
         written here and would be lost.
     """
     stored = StoredSweep(path)
-    stored.refuse_damaged_runs()
     content = hashlib.sha256(path.read_bytes()).hexdigest()
     files = {
         path.with_name(_CRATE): _crate(path, stored, content),
@@ -83,23 +82,24 @@ def statistics(stored: StoredSweep) -> dict[str, Any]:
     `{"runs": 800, "variables": {"angles": {"unit": "rad", "mean": [...], "std": [...], ...}}}`
     """
     chosen = stored.column("status") == code_of("ok")
-    if "split" in {variable.name for variable in stored.variables()}:
+    if "split" in stored.columns:
         chosen &= stored.column("split") == SPLITS.index("train")
     found = {}
-    for variable in stored.variables():
-        if variable.dimensions[0] == "run" and variable.kind == "f":
-            axes = tuple(i for i, name in enumerate(variable.dimensions) if name in ("run", "time"))
-            numbers = _moments(_rows(stored, variable, chosen), axes)
-            found[variable.name] = {"unit": variable.units, "dimensions": list(variable.dimensions), **numbers}
+    for name, column in stored.columns.items():
+        values = stored.column(name)
+        if column.dimensions[0] == "run" and values.dtype.kind == "f":
+            axes = tuple(i for i, one in enumerate(column.dimensions) if one in ("run", "time"))
+            numbers = _moments(_chosen(values, chosen), axes)
+            found[name] = {"unit": column.units, "dimensions": list(column.dimensions), **numbers}
     return {"runs": int(chosen.sum()), "split": "train", "variables": found}
 
 
-def _rows(stored: StoredSweep, variable: Variable, chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
-    runs = max(_PIECE // max(8 * int(np.prod(variable.shape[1:], dtype=np.int64)), 1), 1)
-    first = 0
-    for piece in stored.pieces(variable.name, runs):
-        yield np.asarray(piece[chosen[first : first + len(piece)]], dtype=np.float64)
-        first += len(piece)
+def _chosen(values: NDArray[Any], chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+    """The chosen runs, piece by piece."""
+    runs = max(_PIECE * len(values) // values.nbytes, 1)
+    for first in range(0, len(values), runs):
+        piece = slice(first, first + runs)
+        yield np.asarray(values[piece][chosen[piece]], dtype=np.float64)
 
 
 @dataclass
@@ -150,19 +150,19 @@ def _crate(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
     kept = [one for one in known if one["@type"] == "PropertyValue" and not one["@id"].startswith(f"#{path.name}/")]
     measured = [
         {
-            "@id": f"#{path.name}/{one.name}",
+            "@id": f"#{path.name}/{name}",
             "@type": "PropertyValue",
-            "name": one.name,
+            "name": name,
             "unitText": one.units,
             "description": one.long_name,
         }
-        for one in stored.variables()
+        for name, one in stored.columns.items()
     ]
     file = {
         "@id": path.name,
         "@type": "File",
-        "name": stored.title,
-        "description": stored.summary,
+        "name": stored.attributes["title"],
+        "description": stored.attributes["summary"],
         "encodingFormat": ["application/x-hdf5", "application/netcdf"],
         "contentSize": str(path.stat().st_size),
         "sha256": content,
@@ -180,8 +180,8 @@ def _crate(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
     root = {
         "@id": "./",
         "@type": "Dataset",
-        "name": "Parameter studies of a wind turbine rotor" if others else stored.title,
-        "description": "Datasets of rotor_mbs" if others else stored.summary,
+        "name": "Parameter studies of a wind turbine rotor" if others else stored.attributes["title"],
+        "description": "Datasets of rotor_mbs" if others else stored.attributes["summary"],
         "keywords": KEYWORDS,
         "datePublished": date.today().isoformat(),
         "hasPart": [{"@id": one["@id"]} for one in files],
@@ -214,13 +214,13 @@ def _croissant(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
     fields = [
         {
             "@type": "cr:Field",
-            "@id": f"runs/{one.name}",
-            "name": one.name,
+            "@id": f"runs/{name}",
+            "name": name,
             "description": f"{one.long_name} [{one.units}], dimensions {' x '.join(one.dimensions)}",
-            "dataType": kinds[one.kind],
-            "source": {"fileObject": {"@id": path.name}, "extract": {"column": one.name}},
+            "dataType": kinds[stored.column(name).dtype.kind],
+            "source": {"fileObject": {"@id": path.name}, "extract": {"column": name}},
         }
-        for one in stored.variables()
+        for name, one in stored.columns.items()
         if one.dimensions[0] == "run"
     ]
     return {
@@ -228,7 +228,7 @@ def _croissant(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
         "@type": "sc:Dataset",
         "conformsTo": _CROISSANT_PROFILE,
         "name": path.stem,
-        "description": stored.summary,
+        "description": stored.attributes["summary"],
         "keywords": KEYWORDS.split(", "),
         "datePublished": date.today().isoformat(),
         "version": "1.0.0",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,8 +25,7 @@ from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-from rotor_mbs.store.sweep_columns import Rows, RunColumns
-from rotor_mbs.store.sweep_layout import AMPLIFICATION, MESSAGE_BYTES, METRICS, empty_rows, lost_rows
+from rotor_mbs.store.sweep_columns import AMPLIFICATION, MESSAGE_BYTES, METRICS, Rows, RunColumns
 
 ENSEMBLE_METHOD = "lagrange/taylor"
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that `solve_many` computes
@@ -101,6 +100,27 @@ def rows_of(chunk: Chunk) -> Rows:
     return rows
 
 
+def empty_rows(count: int, row: np.dtype[np.void], names: Iterable[str] | None = None) -> Rows:
+    """Runs that left nothing: NaN, -1 and no text. `names`: these columns only."""
+    blank = {"f": np.nan, "i": -1, "u": 0}
+    kinds = {name: row[name] for name in names or row.names or ()}
+    return {name: np.full((count, *kind.shape), blank[kind.base.kind], kind.base) for name, kind in kinds.items()}
+
+
+def put_end(rows: Rows, runs: int | slice, status: str, message: str) -> None:
+    """How these runs ended."""
+    text = message.encode()[:MESSAGE_BYTES].ljust(MESSAGE_BYTES, b"\0")
+    rows["status"][runs], rows["message"][runs] = code_of(status), np.frombuffer(text, np.uint8)
+
+
+def lost_rows(count: int, row: np.dtype[np.void], status: str, message: str) -> Rows:
+    """Of runs whose process died, or was ended."""
+    rows = empty_rows(count, row)
+    put_end(rows, slice(None), status, message)
+    rows["time_reached"][:] = 0.0
+    return rows
+
+
 def _put_amplification(rows: Rows, i: int, scene: Scene) -> None:
     """Adds the motion's error amplification, from the variational equations of the closed form, whatever the method."""
     angles = np.empty((scene.samples, 0))
@@ -136,7 +156,7 @@ def _solved(chunk: Chunk, scene: Scene) -> Solution | str:
 
 def _put_run(rows: Rows, i: int, scene: Scene, run: Solution | str) -> None:
     if isinstance(run, str):
-        rows["status"][i], rows["message"][i] = code_of("timed_out"), run.encode()[:MESSAGE_BYTES]
+        put_end(rows, i, "timed_out", run)
         rows["time_reached"][i] = 0.0
         return
     _put_verdict(rows, i, scene, run)
@@ -151,8 +171,7 @@ def _put_run(rows: Rows, i: int, scene: Scene, run: Solution | str) -> None:
 
 def _put_verdict(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
     verdict = judge(scene, run, None)
-    rows["status"][i] = code_of(verdict.status)
-    rows["message"][i] = verdict.message.encode()[:MESSAGE_BYTES]
+    put_end(rows, i, verdict.status, verdict.message)
     rows["energy_drift_max"][i] = verdict.metrics.get("energy_drift_max", np.nan)
 
 

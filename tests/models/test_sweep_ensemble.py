@@ -11,13 +11,14 @@ from support.scenes import general, paper
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.sweep import sweep_of
 from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts
 from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store.sweep_layout import row_type
+from rotor_mbs.store.sweep_columns import row_type
 from rotor_mbs.studies.sweep_work import Chunk, perform, rows_of
 
 pytest.importorskip("heyoka")
@@ -162,8 +163,8 @@ def test_any_chunks_give_the_same_bytes(changes: dict[str, object], keys: list[s
         },
     }
     variants = Variants("t", tables, keys)
-    row = row_type(variants.scene(values[0]), ("angles", "rates", "tip", "energy"), "float64")
-    whole = Chunk(variants, "lagrange/taylor", {}, row, 0, np.array(values), 60.0)
+    sweep = sweep_of(variants.scene(values[0]), {"gravity": [9.8]}, outputs=["angles", "rates", "tip", "energy"])
+    whole = Chunk(variants, "lagrange/taylor", {}, row_type(sweep), 0, np.array(values), 60.0)
     expected = rows_of(whole)
     for size in (1, LANES - 1, LANES):
         for start in range(0, len(values), size):
@@ -236,7 +237,7 @@ def test_a_loose_tolerance_is_found_out_run_by_run() -> None:
         "initial": {"angles": list(scene.initial_angles), "rates": list(scene.initial_rates)},
     }
     variants = Variants("t", tables, ("initial.angles[0]",))
-    row = row_type(variants.scene([0.0]), ("angles",), "float32")
+    row = row_type(sweep_of(variants.scene([0.0]), {"gravity": [9.8]}, outputs=["angles"], precision="float32"))
     values = np.linspace(0.1, 0.5, 3)[:, None]
     statuses = {}
     for tolerance in (1e-6, 1e-15):

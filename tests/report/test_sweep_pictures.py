@@ -10,27 +10,19 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support.scenes import ARM, GRAVITY, MASS, OFFSET, paper
+from support.sweeps import made_sweep
 
 from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
 from rotor_mbs.cli.sweep import draw
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.plots.sweep import map_figure, spread_figure
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
-from rotor_mbs.store.sweep_dataset import StoredSweep, SweepDataset
-from rotor_mbs.studies.sweep import plan_sweep
-from rotor_mbs.studies.sweep_work import rows_of
+from rotor_mbs.store.sweep_dataset import StoredSweep
 
 
 def _run(folder: Path, text: str) -> tuple[Sweep, Path]:
-    """A sweep in this process: no pool is needed for a few runs."""
-    (folder / "s.toml").write_text(text)
-    sweep = load_sweep(folder / "s.toml")
-    plan = plan_sweep(sweep, (), (1, 1), 60.0)
-    output = folder / "s.h5"
-    with SweepDataset(output, plan.layout) as dataset:
-        for chunk in plan.chunks(dataset.missing()):
-            dataset.write(chunk.first, rows_of(chunk))
-    return sweep, output
+    output = made_sweep(folder, text)
+    return load_sweep(folder / "s.toml"), output
 
 
 def test_an_exponential_growth_gives_its_rate_with_no_uncertainty() -> None:

@@ -231,4 +231,5 @@ def test_a_changed_number_of_a_finished_sweep_is_found(
         assert status == 1
         assert "1 runs changed after they were written" in out.out
         with pytest.raises(StoreError, match="runs 0 changed"):
-            StoredSweep(copy).refuse_damaged_runs()
+            StoredSweep(copy)
+        assert main(["report", str(copy), "-o", str(tmp_path / "report")]) == 2

@@ -17,40 +17,51 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.scenario.sweep import sweep_of
+from rotor_mbs.scenario.sweep import Sweep, sweep_of
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.store.sweep_columns import MISSING, Rows
-from rotor_mbs.store.sweep_dataset import StoredSweep, SweepDataset
-from rotor_mbs.store.sweep_layout import SweepLayout, empty_rows, lost_rows, parameter_name
+from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns, parameter_name, row_type
+from rotor_mbs.store.sweep_dataset import StoredSweep, open_sweep
+from rotor_mbs.studies.sweep_work import empty_rows, lost_rows
 
 _RUNS = 23
+Layout = tuple[Sweep, tuple[str, ...], range, dict[str, object]]  # what `open_sweep` takes beside the output
 _STARTS = list(range(0, _RUNS, 4))
 
 
-def _layout(identity: str = "i", last: int = _RUNS, samples: int = 5) -> SweepLayout:
+def _layout(identity: str = "i", samples: int = 5) -> Layout:
     axes = {"bearing.stiffness": np.arange(_RUNS), "initial.angles[1]": 0.1 * np.arange(_RUNS)}
     outputs = ["angles", "energy"]
     sweep = sweep_of(paper("fig11"), axes, combine="zip", samples=samples, outputs=outputs, validation=0.25, test=0.25)
-    return SweepLayout(identity, {"title": "t", "shape": "[23]"}, sweep, ("lagrange/taylor",), 0, last)
+    facts = {"title": "t", "sweep_identity": identity, "parameter_keys": list(sweep.keys)}
+    return sweep, ("lagrange/taylor",), range(_RUNS), facts
 
 
-def _rows(first: int, count: int, layout: SweepLayout) -> Rows:
-    rows = empty_rows(count, layout.row)
+def _rows(first: int, count: int, layout: Layout) -> Rows:
+    rows = empty_rows(count, row_type(layout[0]))
     rows["status"][:] = code_of("ok")
     rows["angles"][:] = np.arange(first, first + count)[:, None, None]
     return rows
 
 
-def _fill(dataset: SweepDataset, layout: SweepLayout, starts: list[int]) -> None:
+@contextlib.contextmanager
+def _opened(path: Path, layout: Layout) -> Iterator[tuple[RunColumns, list[int]]]:
+    """Where the runs are, and which are missing."""
+    with open_sweep(path, *layout) as (runs, statuses):
+        yield runs, np.flatnonzero(statuses == MISSING).tolist()
+        with h5py.File(path) as file:
+            statuses[:] = file["status"][()]
+
+
+def _fill(runs: RunColumns, layout: Layout, starts: list[int]) -> None:
     for first in starts:
-        dataset.write(first, _rows(first, min(4, _RUNS - first), layout))
+        runs.write(first, _rows(first, min(4, _RUNS - first), layout))
 
 
 def _whole(folder: Path) -> bytes:
     """The file of an uninterrupted sweep."""
     layout, path = _layout(), folder / "whole.h5"
-    with SweepDataset(path, layout) as dataset:
-        _fill(dataset, layout, _STARTS)
+    with _opened(path, layout) as (runs, _missing):
+        _fill(runs, layout, _STARTS)
     return path.read_bytes()
 
 
@@ -59,11 +70,11 @@ def test_it_opens_in_xarray_at_every_moment(tmp_path: Path, engine: str) -> None
     xr = pytest.importorskip("xarray")
     pytest.importorskip({"netcdf4": "netCDF4"}.get(engine, engine))
     layout, path = _layout(), tmp_path / "s.h5"
-    with SweepDataset(path, layout) as dataset:
+    with _opened(path, layout) as (runs, _missing):
         for first in _STARTS:
             with xr.open_dataset(path, engine=engine) as data:
                 assert (data.status.values != MISSING).sum() == first
-            _fill(dataset, layout, [first])
+            _fill(runs, layout, [first])
     with xr.open_dataset(path, engine=engine) as data:
         assert data.angles.dims == ("run", "time", "coordinate")
         assert data.angles.sel(run=17).values.tolist() == [[17.0] * 4] * 5
@@ -94,32 +105,33 @@ def test_names_of_parameters_follow_their_keys() -> None:
 def test_it_has_the_same_bytes_whatever_the_order_of_its_runs(tmp_path: Path) -> None:
     layout = _layout()
     for name, order in (("a.h5", _STARTS), ("b.h5", _STARTS[::-1])):
-        with SweepDataset(tmp_path / name, layout) as dataset:
-            _fill(dataset, layout, order)
+        with _opened(tmp_path / name, layout) as (runs, _missing):
+            _fill(runs, layout, order)
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
     assert {path.name for path in tmp_path.iterdir()} == {"a.h5", "b.h5"}
 
 
 def test_an_interrupted_one_continues_and_a_complete_one_misses_nothing(tmp_path: Path) -> None:
     layout, path = _layout(), tmp_path / "s.h5"
-    with SweepDataset(path, layout) as dataset:
-        _fill(dataset, layout, [0, 12])
-    with SweepDataset(path, layout) as dataset:
-        assert dataset.missing() == [(4, 12), (16, _RUNS)]
-        _fill(dataset, layout, [4, 8, 16, 20])
-    with SweepDataset(path, layout) as dataset:
-        assert dataset.missing() == []
+    with _opened(path, layout) as (runs, missing):
+        _fill(runs, layout, [0, 12])
+    with _opened(path, layout) as (runs, missing):
+        assert missing == [*range(4, 12), *range(16, _RUNS)]
+        _fill(runs, layout, [4, 8, 16, 20])
+    with _opened(path, layout) as (runs, missing):
+        assert missing == []
     assert path.read_bytes() == _whole(tmp_path)
 
 
 def test_columns_written_without_their_status_do_not_count(tmp_path: Path) -> None:
     """As after a kill between the numbers and the status."""
     layout, path = _layout(), tmp_path / "s.h5"
-    with SweepDataset(path, layout) as dataset:
-        _fill(dataset, layout, [0, 4])
-        dataset.columns.mark_missing(np.array([5]))
-    with SweepDataset(path, layout) as dataset:
-        assert dataset.missing() == [(5, 6), (8, _RUNS)]
+    with _opened(path, layout) as (runs, missing):
+        _fill(runs, layout, [0, 4])
+        with h5py.File(path, "r+") as file:
+            file["status"][5] = MISSING
+    with _opened(path, layout) as (runs, missing):
+        assert missing == [5, *range(8, _RUNS)]
 
 
 @pytest.mark.parametrize("column", ["angles", "crc32", "status", "message", "steps"])
@@ -130,56 +142,54 @@ def test_a_flipped_bit_of_any_column_is_found(tmp_path: Path, column: str) -> No
         dataset = file[column]
         content[dataset.id.get_offset() + 13 * dataset.id.get_storage_size() // _RUNS] ^= 1
     path.write_bytes(content)
-    with SweepDataset(path, layout) as dataset:
-        assert dataset.missing() == [(13, 14)]
+    with _opened(path, layout) as (runs, missing):
+        assert missing == [13]
     with h5py.File(path) as file:  # readers see it, too, before it is computed again
         assert file["status"][13] == MISSING
-    with SweepDataset(path, layout) as dataset:
-        dataset.write(13, _rows(13, 1, layout))
+    with _opened(path, layout) as (runs, missing):
+        runs.write(13, _rows(13, 1, layout))
     assert path.read_bytes() == _whole(tmp_path / "other")
 
 
 def test_a_file_that_was_cut_off_is_refused_with_one_line(tmp_path: Path) -> None:
     content, path = _whole(tmp_path), tmp_path / "whole.h5"
     path.write_bytes(content[: len(content) // 2])
-    with pytest.raises(StoreError, match="not a readable HDF5 file"), SweepDataset(path, _layout()):
+    with pytest.raises(StoreError, match="not a readable HDF5 file"), open_sweep(path, *_layout()):
         pass
 
 
 def test_other_files_are_refused_and_stay(tmp_path: Path) -> None:
     content, path = _whole(tmp_path), tmp_path / "whole.h5"
-    for other in (_layout(identity="j"), _layout(last=_RUNS - 1)):
-        with pytest.raises(InputError, match="something else than this sweep"), SweepDataset(path, other):
-            pass
+    with pytest.raises(InputError, match="something else than this sweep"), open_sweep(path, *_layout("another")):
+        pass
     assert path.read_bytes() == content
     path.write_text("notes")
-    with pytest.raises(StoreError, match="not a readable HDF5 file"), SweepDataset(path, _layout()):
+    with pytest.raises(StoreError, match="not a readable HDF5 file"), open_sweep(path, *_layout()):
         pass
     assert path.read_text() == "notes"
 
 
 def test_a_worker_of_an_earlier_sweep_does_not_write_to_another_file_of_that_name(tmp_path: Path) -> None:
     layout, path = _layout(), tmp_path / "s.h5"
-    with SweepDataset(path, layout) as dataset:
-        columns = dataset.columns
+    with _opened(path, layout) as (runs, _missing):
         path.rename(tmp_path / "moved.h5")
         path.write_bytes(b"another file")
         with pytest.raises(StoreError, match="another file"):
-            columns.write(0, _rows(0, 4, layout))
+            runs.write(0, _rows(0, 4, layout))
         (tmp_path / "moved.h5").replace(path)
-        _fill(dataset, layout, [0])
+        _fill(runs, layout, [0])
 
 
 def test_a_sweep_that_stored_nothing_leaves_nothing(tmp_path: Path) -> None:
-    with SweepDataset(tmp_path / "s.h5", _layout()):
+    with open_sweep(tmp_path / "s.h5", *_layout()):
         assert (tmp_path / "s.h5").exists()
     assert not list(tmp_path.iterdir())
 
 
 def test_lost_runs_say_why(tmp_path: Path) -> None:
     layout, path = _layout(), tmp_path / "s.h5"
-    with SweepDataset(path, layout) as dataset:
-        dataset.write(4, lost_rows(1, layout.row, "worker_died", "its process died (exit code -9)"))
+    with _opened(path, layout) as (runs, _missing):
+        runs.write(4, lost_rows(1, row_type(layout[0]), "worker_died", "its process died (exit code -9)"))
     stored = StoredSweep(path)
     messages = stored.column("message")
     assert messages[4].tobytes().rstrip(b"\0") == b"its process died (exit code -9)"
@@ -201,7 +211,7 @@ def _largest_file(size: int) -> Iterator[None]:
 
 def test_a_disk_without_room_is_reported_before_the_first_run(tmp_path: Path) -> None:
     with _largest_file(20_000), pytest.raises(StoreError, match="cannot be written: File too large"):
-        SweepDataset(tmp_path / "s.h5", _layout()).__enter__()
+        open_sweep(tmp_path / "s.h5", *_layout()).__enter__()
     assert not list(tmp_path.iterdir())
 
 
@@ -214,10 +224,10 @@ def test_a_full_tmpfs_is_reported_before_the_first_run(tmp_path: Path) -> None:
         pytest.skip("may not mount a tmpfs here")
     try:
         with pytest.raises(StoreError, match=os.strerror(errno.ENOSPC)):
-            SweepDataset(place / "s.h5", _layout(samples=2001)).__enter__()
+            open_sweep(place / "s.h5", *_layout(samples=2001)).__enter__()
         assert not list(place.iterdir())
-        with SweepDataset(place / "s.h5", _layout()) as dataset:
-            _fill(dataset, _layout(), _STARTS)
+        with _opened(place / "s.h5", _layout()) as (runs, _missing):
+            _fill(runs, _layout(), _STARTS)
     finally:
         subprocess.run(["umount", "-l", str(place)], check=True)
 
@@ -239,8 +249,8 @@ def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
         assert holder.stdout is not None
         holder.stdout.readline()
         with pytest.raises(InputError, match=r"s\.h5: another process is writing it now; allowed: wait"):
-            SweepDataset(tmp_path / "s.h5", _layout()).__enter__()
+            open_sweep(tmp_path / "s.h5", *_layout()).__enter__()
         holder.kill()
         holder.wait()
-    with SweepDataset(tmp_path / "s.h5", _layout()):
+    with open_sweep(tmp_path / "s.h5", *_layout()):
         pass

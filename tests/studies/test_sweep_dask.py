@@ -90,7 +90,7 @@ def test_a_worker_with_other_code_or_another_version_is_refused() -> None:
     assert {"rotor_mbs", "numpy", "heyoka", "python", "code of rotor_mbs"} <= set(here)
     for name in here:
         other = SerialPool().submit(partial(_run_as_worker, here | {name: "other"}), 3, 1.0)
-        with pytest.raises(InputError, match=rf"has {name} .* \(here other\); allowed: workers with the same versions"):
+        with pytest.raises(InputError, match=rf"allowed: workers with the same \(on .*: {name} .* \(here other\)\)"):
             other.result()
     assert SerialPool().submit(partial(_run_as_worker, here), -3, 1.0).result() == 3
 

@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.store.sweep_dataset import SweepDataset
 from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import rows_of
 
@@ -33,12 +32,12 @@ linear = {start = 0.25, end = 20, count = 4}
 
 
 def made_sweep(folder: Path, text: str = MAP) -> Path:
-    """The dataset of the sweep file `text`, complete."""
+    """The dataset of the sweep file `text`, complete, made in this process."""
     (folder / "s.toml").write_text(text)
     plan = plan_sweep(load_sweep(folder / "s.toml"), (), (1, 1), 60.0)
-    with SweepDataset(folder / "s.h5", plan.layout) as dataset:
-        for chunk in plan.chunks(dataset.missing()):
-            dataset.write(chunk.first, rows_of(chunk))
+    with plan.opened(folder / "s.h5") as (runs, statuses):
+        for chunk in plan.chunks([(0, plan.runs)]):
+            statuses[chunk.first : chunk.last] = runs.write(chunk.first, rows_of(chunk))
     return folder / "s.h5"
 
 

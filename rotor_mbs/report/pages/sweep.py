@@ -18,6 +18,7 @@ from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.report.plots import sweep as plots
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.store.sweep_columns import parameter_name
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
@@ -30,8 +31,8 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     shown, lines = _asked_picture(sweep)
     statuses = sweep.column("status")
     return {
-        "title": sweep.title,
-        "summary": [with_capital(sweep.summary.rstrip(".")) + ".", *lines],
+        "title": sweep.attributes["title"],
+        "summary": [with_capital(sweep.attributes["summary"].rstrip(".")) + ".", *lines],
         "picture": Section([shown] if shown else [], tables=[_status_table(statuses)] if shown else []),
         "statuses": Section(tables=[] if shown else [_status_table(statuses)]),
         "parameters": Section(tables=[_parameter_table(sweep)]),
@@ -120,8 +121,8 @@ def _status_table(statuses: object) -> PageTable:
 
 def _parameter_table(sweep: StoredSweep) -> PageTable:
     rows = []
-    for key, unit in zip(sweep.keys, sweep.units, strict=True):
-        values = sweep.parameter(key)
+    for key in sweep.keys:
+        values, unit = sweep.column(parameter_name(key)), sweep.columns[parameter_name(key)].units
         limits = [with_unit(float(value), unit, 4) for value in (np.nanmin(values), np.nanmax(values))]
         rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
     return PageTable("Varied parameters", ("Parameter", "Key", "From", "To", "Values"), rows, (2, 3, 4))
@@ -130,20 +131,19 @@ def _parameter_table(sweep: StoredSweep) -> PageTable:
 def _distributions(sweep: StoredSweep, ok: object) -> list[Picture]:
     """A picture for each number of the runs that ended well."""
     found = []
-    varied = {re.sub(r"\W+", "_", key).strip("_") for key in sweep.keys}
-    for variable in sweep.variables():
-        is_metric = variable.dimensions == ("run",) and variable.kind == "f" and variable.name not in varied
-        if not is_metric or variable.name in _COUNTS:
+    left_out = {*map(parameter_name, sweep.keys), *_COUNTS}
+    for name, column in sweep.columns.items():
+        if column.dimensions != ("run",) or name in left_out or sweep.column(name).dtype.kind != "f":
             continue
-        values = sweep.column(variable.name)[np.asarray(ok)]
+        values = sweep.column(name)[np.asarray(ok)]
         values = values[np.isfinite(values)]
         if len(values) < 2 or not np.ptp(values):
             continue
         positive = values[values > 0.0]
         logarithmic = len(positive) > 1 and positive.max() > _SPAN * positive.min() and len(positive) == len(values)
         low, middle, high = (number(float(x), 3) for x in np.quantile(values, (0.05, 0.5, 0.95)))
-        unit = "" if variable.units == "1" else f" ({variable.units})"
-        caption = f"{with_capital(variable.long_name)}: median {middle}, 5 to 95 % from {low} to {high}{unit}"
-        panels = plots.distribution(values, f"{variable.name.replace('_', ' ')}{unit}", logarithmic=logarithmic)
-        found.append(picture(panels, f"of-{variable.name}", caption, f"{caption}, over {len(values)} runs."))
+        unit = "" if column.units == "1" else f" ({column.units})"
+        caption = f"{with_capital(column.long_name)}: median {middle}, 5 to 95 % from {low} to {high}{unit}"
+        panels = plots.distribution(values, f"{name.replace('_', ' ')}{unit}", logarithmic=logarithmic)
+        found.append(picture(panels, f"of-{name}", caption, f"{caption}, over {len(values)} runs."))
     return found
