@@ -66,7 +66,9 @@ def _open_cluster(address: str) -> Cluster:
         client = stack.enter_context(Client(address, timeout=_CONNECT_S, set_as_default=False))
         try:
             client.run(refuse_other_code, identity())
-        except Exception as exc:  # also of a worker that has no such function
+        except InputError:
+            raise
+        except Exception as exc:  # of a worker that has no such function
             raise InputError(f"{engine}: {_OTHER_CODE} ({one_line(exc)})") from exc
         if not client.nthreads():
             raise InputError(f"{engine}: the scheduler has no workers; allowed: one with workers")
@@ -80,11 +82,8 @@ def _answers(address: str) -> bool:
 
     from distributed.comm.core import connect
 
-    async def greet() -> None:
-        await (await connect(address, timeout=_CONNECT_S)).close()
-
     try:
-        asyncio.run(asyncio.wait_for(greet(), _CONNECT_S))
+        asyncio.run(asyncio.wait_for(connect(address), _CONNECT_S)).abort()
     except Exception:  # whatever another program at that address may answer
         return False
     return True

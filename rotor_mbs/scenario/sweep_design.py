@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SPLITS = ("train", "validation", "test")
+
 
 @dataclass(frozen=True)
 class Axis:
@@ -119,7 +121,7 @@ def _sobol(axes: Sequence[Axis], seed: int) -> dict[str, Array]:
 
 
 def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
-    """(count,) 0 for training, 1 for validation, 2 for testing; shares to the nearest row, rows drawn by `seed`."""
+    """(count,) numbers of `SPLITS`; shares to the nearest row, rows drawn by `seed`."""
     drawn = np.random.default_rng([seed, 2**32]).permutation(count)
     first, second = round(validation * count), round(validation * count) + round(test * count)
     codes = np.zeros(count, np.int8)

@@ -34,7 +34,6 @@ Rows = dict[str, NDArray[Any]]
 MISSING = -1  # status of a run that is not stored
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
 
-SPLITS = ("train", "validation", "test")
 MESSAGE_BYTES = 120
 
 METRICS = {

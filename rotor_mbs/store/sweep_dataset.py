@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.execution.output_lock import SWEEP, writing
 from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.scenario.sweep_design import split_rows
+from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
 from rotor_mbs.solution.quantities import SCALES
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store import digests, hdf5, sweep_columns
@@ -136,7 +136,7 @@ def _put_columns(file: Any, sweep: Sweep, methods: Sequence[str], numbers: range
     hdf5.put_flags(hdf5.put(file, "solver", (runs // rows).astype(np.int8), COLUMNS["solver"]), methods)
     if table.validation or table.test:
         splits = split_rows(rows, table.validation, table.test, table.seed)
-        hdf5.put_flags(hdf5.put(file, "split", splits[runs % rows], COLUMNS["split"]), sweep_columns.SPLITS)
+        hdf5.put_flags(hdf5.put(file, "split", splits[runs % rows], COLUMNS["split"]), SPLITS)
     columns, row = sweep_columns.result_columns(sweep), sweep_columns.row_type(sweep)
     used = {name for column in columns.values() for name in column.dimensions}
     for name, scale in sweep_columns.scale_values(sweep.base).items():

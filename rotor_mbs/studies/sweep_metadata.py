@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.scenario.sweep_design import SPLITS
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.layout import KEYWORDS
-from rotor_mbs.store.sweep_columns import SPLITS
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
 _PIECE = 1 << 24  # bytes of a variable that are read at once

@@ -89,7 +89,8 @@ def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
 def _body(placed: Placed, node: str) -> list[Part]:
     body, name = placed.body, placed.name
     position = placed.rotation @ body.com
-    velocity = np.cross(placed.omega, position)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a rate that has no bound: the run says so
+        velocity = np.cross(placed.omega, position)
     p = quaternion(placed.about_shaft, placed.pitch)
     if node == "euler_parameters":
         type_, pose, motion = "NodeRigidBodyEP", p, quaternion_rate(p, placed.omega)
