@@ -52,16 +52,21 @@ def _load() -> None:
 
 
 def _open_cluster(address: str) -> Cluster:
+    import asyncio
+
     engine = f"--engine dask:{address}"
     try:
         from distributed import Client
+        from distributed.comm.core import connect
     except ImportError as exc:
         raise InputError("--engine dask: dask is not installed; pip install distributed") from exc
     for name in list(logging.root.manager.loggerDict):
         if name.startswith(("distributed", "tornado")):  # what it logs of a lost connection is said here in a line
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    if not _answers(address):
-        raise InputError(f"{engine}: no dask scheduler answers there; allowed: {ENGINE_FORMS}")
+    try:  # a client would wait for the answer of another program without end
+        asyncio.run(asyncio.wait_for(connect(address), _CONNECT_S)).abort()
+    except Exception as exc:  # whatever answers there
+        raise InputError(f"{engine}: no dask scheduler answers there; allowed: {ENGINE_FORMS}") from exc
     with ExitStack() as stack:
         client = stack.enter_context(Client(address, timeout=_CONNECT_S, set_as_default=False))
         try:
@@ -76,24 +81,8 @@ def _open_cluster(address: str) -> Cluster:
     return Cluster(client)
 
 
-def _answers(address: str) -> bool:
-    """Whether a scheduler answers there: a client would wait for the answer of another program without end."""
-    import asyncio
-
-    from distributed.comm.core import connect
-
-    try:
-        asyncio.run(asyncio.wait_for(connect(address), _CONNECT_S)).abort()
-    except Exception:  # whatever another program at that address may answer
-        return False
-    return True
-
-
 class Cluster:
-    """Runs tasks on the workers of a dask client; a TaskPool.
-
-    A scheduler that is gone, or has no worker for a while, is a StoreError: what is stored is kept.
-    """
+    """A TaskPool of a dask client's workers. A scheduler that is gone, or has none for a while, is a StoreError."""
 
     shares_disk = False
 

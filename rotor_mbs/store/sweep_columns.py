@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError, saving
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.status import STATUSES
@@ -81,14 +80,10 @@ def result_columns(sweep: Sweep) -> dict[str, Column]:
     return METRICS | (AMPLIFICATION if sweep.table.amplification else {}) | trajectories
 
 
-def scale_values(scene: Scene) -> dict[str, NDArray[Any]]:
-    """The scales of all dimensions but `run`."""
-    return quantities.scale_values(scene) | {"message_byte": np.arange(MESSAGE_BYTES, dtype=np.int16)}
-
-
 def row_type(sweep: Sweep) -> np.dtype[np.void]:
     """The results of one run: a field for each column."""
-    lengths = {name: len(values) for name, values in scale_values(sweep.base).items()}
+    scales = quantities.scale_values(sweep.base)
+    lengths = {name: len(values) for name, values in scales.items()} | {"message_byte": MESSAGE_BYTES}
     types = dict.fromkeys(METRICS | AMPLIFICATION, "<f8") | _TYPES
     kind = {"float64": "<f8", "float32": "<f4"}[sweep.table.precision]
     columns = result_columns(sweep).items()

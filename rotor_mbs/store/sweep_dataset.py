@@ -10,7 +10,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,13 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.execution.output_lock import SWEEP, writing
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
-from rotor_mbs.solution.quantities import SCALES
+from rotor_mbs.solution.quantities import scale_values
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store import digests, hdf5, sweep_columns
 from rotor_mbs.store.layout import SWEEP_IDENTITY, Column
 from rotor_mbs.store.read import damages_of
 from rotor_mbs.store.sweep_columns import COLUMNS, MISSING, RunColumns
+from rotor_mbs.store.write import put_scales
 
 _HEAD_BYTES = 1 << 17  # of a file beside its runs, at most: descriptions and texts
 
@@ -68,8 +69,7 @@ def open_sweep(
             yield runs, statuses
         finally:
             if (statuses == MISSING).all():
-                with suppress(OSError):  # a sweep that stored nothing leaves nothing
-                    path.unlink()
+                path.unlink(missing_ok=True)  # a sweep that stored nothing leaves nothing
 
 
 def _stored_runs(file: Any) -> tuple[RunColumns, NDArray[np.int8], NDArray[np.int8]]:
@@ -138,14 +138,9 @@ def _put_columns(file: Any, sweep: Sweep, methods: Sequence[str], numbers: range
         splits = split_rows(rows, table.validation, table.test, table.seed)
         hdf5.put_flags(hdf5.put(file, "split", splits[runs % rows], COLUMNS["split"]), SPLITS)
     columns, row = sweep_columns.result_columns(sweep), sweep_columns.row_type(sweep)
-    used = {name for column in columns.values() for name in column.dimensions}
-    for name, scale in sweep_columns.scale_values(sweep.base).items():
-        if name in used:
-            hdf5.put(file, name, scale, (COLUMNS | SCALES)[name])
-    if "time" in used:
-        hdf5.put_attributes(file["time"], {"standard_name": "time"})
-    if "coordinate" in used:
-        hdf5.put_attributes(file["coordinate"], {"labels": sweep.base.coordinate_labels})
+    hdf5.put(file, "message_byte", np.arange(sweep_columns.MESSAGE_BYTES, dtype=np.int16), COLUMNS["message_byte"])
+    put_scales(file, columns.values(), scale_values(sweep.base), sweep.base.coordinate_labels)
+    hdf5.put_attributes(file["time"], {"standard_name": "time"})
     for name, column in columns.items():
         fill = MISSING if name == "status" else None
         hdf5.put_empty(file, name, (len(runs), *row[name].shape), row[name].base, column, fill)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.solution.quantities import SCALES, Quantity, quantities, scale_values
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.store import hdf5
+from rotor_mbs.store.layout import Column
 
 
 def write_run(path: Path, scene_hash: str, run: Solution, attributes: Mapping[str, object]) -> None:
@@ -62,13 +63,18 @@ def _facts(run: Solution) -> dict[str, object]:
 def put_datasets(group: Any, named: Mapping[str, Any], known: Sequence[Quantity], labels: Sequence[str]) -> None:
     """The scales that the data use, then the data: those arrays of `named` that `known` describes."""
     data = [quantity for quantity in known if quantity.name in named]
-    used = {"time"}.union(*(quantity.dimensions for quantity in data))
-    for name, scale in SCALES.items():
-        if name in used:
-            dataset = hdf5.put(group, name, named[name], scale)
-            if name == "coordinate":
-                hdf5.put_attributes(dataset, {"labels": labels})
+    put_scales(group, data, named, labels)
     for quantity in data:
         hdf5.put(group, quantity.name, named[quantity.name], quantity, compress=not quantity.is_over_time)
     if "angles" in group:
         hdf5.put_attributes(group, {"NX_class": "NXdata", "signal": "angles", "axes": ["time", "coordinate"]})
+
+
+def put_scales(group: Any, data: Iterable[Column | Quantity], values: Mapping[str, Any], labels: Sequence[str]) -> None:
+    """The time, and the other scales that the data use."""
+    used = {"time"}.union(*(one.dimensions for one in data))
+    for name, scale in SCALES.items():
+        if name in used:
+            dataset = hdf5.put(group, name, values[name], scale)
+            if name == "coordinate":
+                hdf5.put_attributes(dataset, {"labels": labels})
