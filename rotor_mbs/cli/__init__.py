@@ -25,7 +25,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             with _ended_in_order():
                 status = _run(words)
             sys.stdout.flush()
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemError) as exc:
+            # Inside compiled code of a library an interrupt may become a SystemError that it is the cause of.
+            if not isinstance(exc, KeyboardInterrupt) and not isinstance(exc.__cause__, KeyboardInterrupt):
+                raise
             show("interrupted; what was finished is kept, the same command goes on from there", sys.stderr)
             return EXIT_INTERRUPTED
         except BrokenPipeError:

@@ -7,6 +7,7 @@ import time
 
 import pytest
 
+from rotor_mbs.cli import main
 from rotor_mbs.cli.terminal import ProgressLine, coloured, has_colour
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Outcome, Result
@@ -73,3 +74,16 @@ def test_an_estimate_counts_what_comes_after_the_cases() -> None:
         progress.stage("pages", 5, 10)
         assert " 75%, about" in screen.getvalue()
         assert "pages 5/10" in screen.getvalue()
+
+
+def test_an_interrupt_inside_compiled_code_is_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """h5py's locks make a SystemError of it."""
+
+    def interrupted(_: object) -> None:
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
+    assert main(["run", "paper/fig03"]) == 130
+    assert capsys.readouterr().err.startswith("interrupted; ")
