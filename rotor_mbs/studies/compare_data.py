@@ -21,6 +21,7 @@ from rotor_mbs.analysis.data_verdict import (
 )
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.provenance import versions
+from rotor_mbs.foreign.channels import channels
 from rotor_mbs.foreign.trajectory import ForeignData
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
@@ -40,6 +41,7 @@ METHOD = "data"  # what takes the place of a method's name
 _ENERGY_PER_ANGLE = 100.0
 _ROUNDING = 1e-9  # of the duration: times that are sums of steps may end so far past it
 _FEWEST = 3
+_START = 1e-3  # rad, rad/s: starts that differ by more are another start
 _MOST_NAMES = 100  # of columns that were not used
 _SEARCH_S = 60.0  # of the search for causes: scenes that are stiff or have many blades would take many minutes
 
@@ -117,7 +119,9 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     if not verdict.agrees:
         ends = monotonic() + _SEARCH_S
         likely, note = likely_causes(CauseSearch(scene, _aligned(data, cut), exact, tolerance, worst, ends))
-        verdict = replace(verdict, likely=tuple(likely), notes=(*verdict.notes, *[note] * bool(note)))
+        start = "" if likely else _other_start(scene, cut, _states(at_rows)[0, cut.columns])
+        notes = (*verdict.notes, *(line for line in (note, start) if line))
+        verdict = replace(verdict, likely=tuple(likely), notes=notes)
     return DataStudy(scene, cut, _states(at_rows)[:, cut.columns], carried, verdict)
 
 
@@ -233,6 +237,16 @@ def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: in
     if until < _FEWEST:
         return "unchecked", f"{until} rows up to the horizon: too few to be compared"
     return None
+
+
+def _other_start(scene: Scene, data: ForeignData, expected: Array) -> str:
+    """What of the first row is not the scene's start, "" where all is, or the data begin later."""
+    names = [channel.name for channel in channels(scene)[1:]]
+    rows = zip(data.columns, data.values[0].tolist(), expected.tolist(), strict=True)
+    apart = [f"{names[i]} {value:.4g} (scene: {start:.4g})" for i, value, start in rows if abs(value - start) > _START]
+    if data.time[0] > 0.0 or not apart:
+        return ""
+    return f"the data start elsewhere, in rad and rad/s: {', '.join(apart)}; another scene, start or unit?"
 
 
 def _notes(scene: Scene, whole: ForeignData, data: ForeignData, run: Solution, tolerance: float) -> Sequence[str]:

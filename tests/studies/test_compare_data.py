@@ -241,6 +241,19 @@ def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
     assert wrong.verdict.channels[0].scale == pytest.approx(1.001, abs=1e-9)
 
 
+def test_data_without_a_likely_cause_are_told_where_they_start() -> None:
+    """Two mistakes at once, degrees in a scene that starts elsewhere: no single correction fits."""
+    scene = rm.scene("paper/fig03")
+    run = rm.run(scene.replace(**{"initial.angles": [0.3, 0.2]}), "lagrange/dop853")
+    found = rm.compare_data({"t": run.time, "angles": np.degrees(run.angles)}, scene)
+    assert not found.verdict.likely
+    (line,) = (note for note in found.verdict.notes if note.startswith("the data start elsewhere"))
+    assert "rotor 17.19 (scene: 2.88)" in line
+    assert "unit?" in line
+    same = rm.compare_data({"t": run.time, "angles": run.angles}, run.scene)
+    assert not any("start elsewhere" in note for note in same.verdict.notes)
+
+
 def test_numbers_of_few_digits_are_noticed(tmp_path: Path) -> None:
     """OpenFAST's usual four digits: a right run is not within the tolerance, and the page says why; 1e-3 it is."""
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
