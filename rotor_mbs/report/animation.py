@@ -47,6 +47,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
         raise InputError(
             f"{output}: MP4 needs ffmpeg, which is not found here; allowed: .webp, .gif, or install ffmpeg"
         )
+    name = Path(name).stem if name.endswith(".toml") else name  # a scene of one's own is stored by the stem of its file
     with open_results(results) as opened:
         if name not in opened.scenes:
             raise InputError(f"{results}: {name!r}: no such scene in it; allowed: {', '.join(opened.scenes) or 'none'}")

@@ -73,6 +73,7 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(results: Path) -
         (["figures", "--figure", "../11", "-o", "out"], "figure ../11: not in it"),
         (["figures", "--results", "none.h5", "-o", "out"], "none.h5: no such file"),
         (["animate", "paper/fig12", "-o", "a.webp"], "'paper/fig12': no such scene in it; allowed: paper/fig08"),
+        (["animate", "folder/mine.toml", "-o", "a.webp"], "'mine': no such scene in it"),  # stored by its stem
         (["animate", "../fig11", "-o", "a.webp"], "no such scene"),
         (["animate", "paper/fig11", "-o", "a.avi"], "unknown kind of file .avi; allowed: .webp, .gif, .mp4"),
         (["animate", "paper/fig11", "-o", "a.webp", "--results", "none.h5"], "no such file"),
