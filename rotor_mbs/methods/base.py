@@ -43,31 +43,16 @@ class Solver(Protocol):
 class RunBlock(Protocol):
     """Many runs at once, of scenes with the same number of blades and samples and the same outputs.
 
-    Arrays have the run as their first dimension; None where the scenes do not ask for them. After a run broke off its
-    samples are NaN.
-
-    angles, rates           (runs, n, 1 + blades) rad, rad/s
-    kinetic_energy, potential_energy, work   (runs, n) J
+    quantities              by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
     integrations, samples   what the engine reports of each run, and how many samples it has
     """
 
-    @property
-    def angles(self) -> Array: ...
-    @property
-    def rates(self) -> Array: ...
-    @property
-    def kinetic_energy(self) -> Array | None: ...
-    @property
-    def potential_energy(self) -> Array | None: ...
-    @property
-    def work(self) -> Array | None: ...
     @property
     def integrations(self) -> Sequence[Integration]: ...
     @property
     def samples(self) -> Sequence[int]: ...
     @property
-    def quantities(self) -> Mapping[str, Array]:
-        """Arrays by name, those that are there."""
+    def quantities(self) -> Mapping[str, Array]: ...
 
     def trajectory(self, i: int) -> Trajectory:
         """Run i alone, cut where it broke off."""

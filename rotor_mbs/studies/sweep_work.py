@@ -192,12 +192,11 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     assert method.solve_many is not None
     settings = method.settings.of(chunk.method, chunk.settings)
     block = method.solve_many(scenes, settings)
-    assert block.kinetic_energy is not None  # a sweep's scenes ask for the energy
-    assert block.potential_energy is not None
-    assert block.work is not None
-    errors = energy_balance(block.kinetic_energy, block.potential_energy, block.work)
-    drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
-    angles = largest(block.angles.reshape(len(scenes), -1))
+    found = block.quantities
+    kinetic, work = found["kinetic_energy"], found["work"]  # which a sweep's scenes ask for
+    errors = energy_balance(kinetic, found["potential_energy"], work)
+    drifts = energy_drifts(scenes, kinetic, work, errors)
+    angles = largest(found["angles"].reshape(len(scenes), -1))
     ok = clearly_ok(scenes, chunk.method, block.integrations, block.samples, drifts, angles)
     rows = empty_rows(len(scenes), chunk.row, (METRICS | AMPLIFICATION).keys() & set(chunk.row.names or ()))
     for name in chunk.row.names or ():
@@ -206,7 +205,7 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
             rows[name] = np.ascontiguousarray(values, chunk.row[name].base)
     rows["status"][ok] = code_of("ok")
     rows["energy_drift_max"] = drifts
-    _put_extremes(rows, slice(None), block.angles, block.rates)
+    _put_extremes(rows, slice(None), found["angles"], found["rates"])
     for i, integration in enumerate(block.integrations):
         _put_effort(rows, i, integration, integration.time_reached)
     for i in np.flatnonzero(~ok).tolist():

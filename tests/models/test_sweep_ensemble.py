@@ -96,7 +96,7 @@ def test_runs_side_by_side_are_the_runs_one_by_one(scenes: list[Scene]) -> None:
         assert block.integrations[i].success
         assert 0 < block.integrations[i].steps <= single.integration.steps + 3  # most motions take fewer in momenta
         for name in _NAMES:
-            expected, found = getattr(single.trajectory, name), getattr(block, name)[i]
+            expected, found = getattr(single.trajectory, name), block.quantities[name][i]
             # Round-off of other instructions, which two seconds of fig11 carry on a thousandfold; rates by the
             # energy's scale are larger still.
             scale = max(1.0, float(np.abs(expected).max()))
@@ -109,7 +109,7 @@ def test_a_run_does_not_depend_on_its_neighbours() -> None:
     for i in (0, LANES - 1, LANES + 2, 2 * LANES):
         alone = solve_many([scenes[i]], _EPS)
         for name in _NAMES:
-            np.testing.assert_array_equal(getattr(alone, name)[0], getattr(block, name)[i], err_msg=name)
+            np.testing.assert_array_equal(alone.quantities[name][0], block.quantities[name][i], err_msg=name)
         assert alone.integrations[0].steps == block.integrations[i].steps
 
 
@@ -117,16 +117,15 @@ def test_a_run_does_not_depend_on_its_neighbours() -> None:
 def test_what_is_not_asked_for_is_not_made(outputs: tuple[str, ...]) -> None:
     scenes = [replace(scene, outputs=outputs) for scene in _perturbed(paper("fig11", duration=1.0, samples=11), 2)]
     block = solve_many(scenes, _EPS)
-    assert (block.tip is not None) == ("tip" in outputs)
-    assert (block.kinetic_energy is not None) == ("energy" in outputs)
+    assert ("tip" in block.quantities) == ("tip" in outputs)
+    assert ("work" in block.quantities) == ("energy" in outputs)
     assert all(word.success for word in block.integrations)
 
 
 def test_many_samples_are_evaluated_in_pieces() -> None:
     scene = paper("fig11", duration=1.0, samples=2501)
     block, single = solve_many([scene], _EPS), solve("lagrange/taylor", scene, {"tolerance": _EPS})
-    assert block.tip is not None
-    np.testing.assert_allclose(block.tip[0], single.trajectory.tip, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(block.quantities["tip"][0], single.trajectory.tip, rtol=0.0, atol=1e-10)
 
 
 # Of one scene file each: what it changes in fig11's or fig03's, the varied keys, and a row of values for each run.
@@ -179,7 +178,7 @@ def test_a_run_that_fails_at_once_has_its_start() -> None:
     )
     block, single = solve_many([scene], _EPS), solve("lagrange/taylor", scene, {"tolerance": _EPS})
     assert block.samples == [1] == [len(single.trajectory.time)]
-    np.testing.assert_array_equal(block.angles[0, 0], scene.initial_angles)
+    np.testing.assert_array_equal(block.quantities["angles"][0, 0], scene.initial_angles)
 
 
 def _towards_the_singularity(count: int) -> list[Scene]:
@@ -198,9 +197,9 @@ def test_a_run_that_breaks_off_ends_alone(gravity: float) -> None:
     for i in (1, 2):
         n = block.samples[i]
         assert 1 < n < 301
-        assert np.isfinite(block.angles[i, :n]).all()
+        assert np.isfinite(block.quantities["angles"][i, :n]).all()
         for name in _NAMES:
-            assert np.isnan(getattr(block, name)[i, n:]).all(), name
+            assert np.isnan(block.quantities[name][i, n:]).all(), name
         assert block.integrations[i].time_reached == pytest.approx(3.0 * (n - 1) / 300)
         single = solve("lagrange/taylor", scenes[i], {"tolerance": _EPS}).trajectory
         assert abs(len(single.time) - n) <= 1
@@ -209,12 +208,9 @@ def test_a_run_that_breaks_off_ends_alone(gravity: float) -> None:
 def test_every_row_has_the_status_that_the_run_alone_would_have() -> None:
     scenes = _towards_the_singularity(3)
     block = solve_many(scenes, _EPS)
-    assert block.kinetic_energy is not None
-    assert block.potential_energy is not None
-    assert block.work is not None
-    errors = energy_balance(block.kinetic_energy, block.potential_energy, block.work)
-    drifts = energy_drifts(scenes, block.kinetic_energy, block.work, errors)
-    angles = np.abs(block.angles).max(axis=(1, 2), initial=0.0, where=np.isfinite(block.angles))
+    kinetic, potential, work = (block.quantities[name] for name in ("kinetic_energy", "potential_energy", "work"))
+    drifts = energy_drifts(scenes, kinetic, work, energy_balance(kinetic, potential, work))
+    angles = np.abs(found := block.quantities["angles"]).max(axis=(1, 2), initial=0.0, where=np.isfinite(found))
     well = clearly_ok(scenes, "lagrange/taylor", block.integrations, block.samples, drifts, angles)
     for i, scene in enumerate(scenes):
         run = Solution(scene, "lagrange/taylor", block.trajectory(i), block.integrations[i])

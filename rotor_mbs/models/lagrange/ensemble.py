@@ -9,7 +9,7 @@ bits. Runs in one process and one thread: processes are the parallelism.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -35,6 +35,8 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 # rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
 _HUGE = 1e13
 
+_ENERGIES = ("kinetic_energy", "potential_energy", "work")
+
 # Samples of all runs side by side: what is worked on stays near the processor.
 _AT_ONCE = 4096
 # Samples of a run whose tips and energies are evaluated at once, with the rotor's numbers anew for each of them.
@@ -43,31 +45,17 @@ _OBSERVED_AT_ONCE = 1024
 
 @dataclass
 class Block:
-    """Samples of k runs, NaN after a run broke off; what the scenes do not ask for is None.
+    """Samples of k runs, NaN after a run broke off.
 
-    angles, rates   (k, n, 1 + blades) rad, rad/s
-    tip             (k, n, blades, 3) m
-    kinetic_energy, potential_energy, work   (k, n) J
+    time            (k, n) s
+    quantities      by name, what the scenes ask for: (k, n, ...), units as of a trajectory
     integrations    the engine's report of each run; samples: how many rows of each are finite
-    loads           by quantity, each (k, n, ...)
     """
 
     time: Array
-    angles: Array
-    rates: Array
-    tip: Array | None
-    kinetic_energy: Array | None
-    potential_energy: Array | None
-    work: Array | None
+    quantities: dict[str, Array]
     integrations: list[Integration]
     samples: list[int]
-    loads: dict[str, Array] = field(default_factory=dict)
-
-    @property
-    def quantities(self) -> dict[str, Array]:
-        """Arrays by name, but for the time and those that are None."""
-        names = ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work")
-        return {name: getattr(self, name) for name in names if getattr(self, name) is not None} | self.loads
 
     def trajectory(self, i: int) -> Trajectory:
         """Run i alone, cut where it broke off."""
@@ -84,16 +72,17 @@ class Block:
 
 
 def empty_block(scenes: Sequence[Scene]) -> Block:
-    """Room for their samples, all of which are to be put there."""
+    """Room for their samples, all of which are to be put there; that of loads is made when they are."""
     first, runs = scenes[0], len(scenes)
-    shape = (runs, first.samples)
-    columns = 1 + len(first.blades)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
-    tip = np.empty((*shape, len(first.blades), 3)) if first.wants("tip") else None
-    kinetic, potential, work = (np.empty(shape) if first.wants("energy") else None for _ in range(3))
-    angles, rates = np.empty((*shape, columns)), np.empty((*shape, columns))
-    integrations = [Integration(False)] * runs
-    return Block(time, angles, rates, tip, kinetic, potential, work, integrations, [0] * runs)
+    blades = len(first.blades)
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(("angles", "rates"), (1 + blades,))
+    if first.wants("tip"):
+        shapes["tip"] = (blades, 3)
+    if first.wants("energy"):
+        shapes |= dict.fromkeys(_ENERGIES, ())
+    arrays = {name: np.empty((*time.shape, *shape)) for name, shape in shapes.items()}
+    return Block(time, arrays, [Integration(False)] * runs, [0] * runs)
 
 
 @dataclass(frozen=True)
@@ -140,10 +129,11 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
 def _put_loads(block: Block, scenes: Sequence[Scene]) -> None:
     """Adds the loads of every run by itself, from its angles and rates."""
     for i, (scene, n) in enumerate(zip(scenes, block.samples, strict=True)):
-        found = sampled_loads(scene, block.time[i, :n], block.angles[i, :n], block.rates[i, :n])
+        angles, rates = (block.quantities[name][i, :n] for name in ("angles", "rates"))
+        found = sampled_loads(scene, block.time[i, :n], angles, rates)
         for name, values in found.items():
             shape = (*block.time.shape, *values.shape[1:])
-            block.loads.setdefault(name, np.full(shape, np.nan))[i, :n] = values
+            block.quantities.setdefault(name, np.full(shape, np.nan))[i, :n] = values
 
 
 def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
@@ -302,20 +292,22 @@ class _Group:
         runs, count = len(integrations), len(self.moving)
         states, found = states[:, :runs], found[:, :runs]
         places, scenes = [self.places[i] for i in columns[:runs]], [self.scenes[i] for i in columns[:runs]]
-        block.angles[places] = np.array([scene.initial_angles for scene in scenes])[:, None]
-        block.rates[places] = 0.0
+        angles, rates = block.quantities["angles"], block.quantities["rates"]
+        angles[places] = np.array([scene.initial_angles for scene in scenes])[:, None]
+        rates[places] = 0.0
         for i, column in enumerate(self.moving):
-            block.angles[places, :, column], block.rates[places, :, column] = states[i], states[count + i]
+            angles[places, :, column], rates[places, :, column] = states[i], states[count + i]
         rows = 0
-        if block.tip is not None:
-            tip = block.tip.reshape(*block.time.shape, -1)
+        if "tip" in block.quantities:
+            tip = block.quantities["tip"].reshape(*block.time.shape, -1)
             rows = tip.shape[2]
             tip[places] = found[:rows].transpose(1, 2, 0)
-        if block.kinetic_energy is not None and block.potential_energy is not None and block.work is not None:
-            block.kinetic_energy[places], block.potential_energy[places] = found[rows], found[rows + 1]
+        if "work" in block.quantities:
+            kinetic, potential, work = (block.quantities[name] for name in _ENERGIES)
+            kinetic[places], potential[places] = found[rows], found[rows + 1]
             has_work = len(states) > 2 * count
             for i, place in enumerate(places):
-                block.work[place] = states[2 * count, i] if has_work else constant_work(scenes[i], block.angles[place])
+                work[place] = states[2 * count, i] if has_work else constant_work(scenes[i], angles[place])
         samples = states.shape[2] - np.isnan(states[0]).sum(axis=1)
         for i, integration, n in zip(places, integrations, samples.tolist(), strict=True):
             block.end(i, integration, n)

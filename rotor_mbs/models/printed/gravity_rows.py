@@ -23,10 +23,9 @@ _PHASES = (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)  # (34)-(36), rad
 class GravityRow:
     """One way of writing the row.
 
-    of         (m, c, g, s2, c2, c3, c4, c5, root3) -> N m; None for the sum over the blades
+    of   (m, c, g, s2, c2, c3, c4, c5, root3) -> N m; None for the sum over the blades
     """
 
-    name: str
     of: Callable[..., Any] | None
 
     @property
@@ -58,64 +57,39 @@ def _summed_over_blades(m: float, c: float, d: float, g: float, q2: float, *cosi
     return -(moments[0] + moments[1] + moments[2])
 
 
-def _factor_outside(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return literal.gravity_three(m, c, g, s2, c2, 0, c3, 0, c4, 0, c5, r)[0]
-
-
-def _reversed(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return c * m * g * (c2 / 2 - r / 2 * s2) * c5 + c * m * g * (c2 / 2 + r / 2 * s2) * c4 - c * m * g * c2 * c3
-
-
-def _distributed(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    first = -c * m * g * c2 * c3 + c * m * g * c2 / 2 * c4 + r / 2 * c * m * g * s2 * c4
-    return first + c * m * g * c2 / 2 * c5 - r / 2 * c * m * g * s2 * c5
-
-
-def _root_times_sine(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return -c * m * g * c2 * c3 + c * m * g * (c2 / 2 + r * s2 / 2) * c4 + c * m * g * (c2 / 2 - r * s2 / 2) * c5
-
-
-def _halves_first(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return (
-        -c * m * g * c2 * c3 + c * m * g * (c2 * 0.5 + r * 0.5 * s2) * c4 + c * m * g * (c2 * 0.5 - r * 0.5 * s2) * c5
-    )
-
-
-def _halves_outside(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return -c * m * g * c2 * c3 + c * m * g / 2 * (c2 + r * s2) * c4 + c * m * g / 2 * (c2 - r * s2) * c5
-
-
-def _cosines_first(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return -c * m * g * c3 * c2 + c * m * g * c4 * (c2 / 2 + r / 2 * s2) + c * m * g * c5 * (c2 / 2 - r / 2 * s2)
-
-
-def _gravity_last(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return -c * m * c2 * c3 * g + c * m * (c2 / 2 + r / 2 * s2) * c4 * g + c * m * (c2 / 2 - r / 2 * s2) * c5 * g
-
-
-def _mass_first(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return -m * g * c * c2 * c3 + m * g * c * (c2 / 2 + r / 2 * s2) * c4 + m * g * c * (c2 / 2 - r / 2 * s2) * c5
-
-
-def _gravity_first(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, r: Any) -> Any:
-    return -g * m * c * c2 * c3 + g * m * c * (c2 / 2 + r / 2 * s2) * c4 + g * m * c * (c2 / 2 - r / 2 * s2) * c5
-
-
 DEFAULT_ROW = "multiplied_in"
-GRAVITY_ROWS = {
-    row.name: row
-    for row in (
-        GravityRow(DEFAULT_ROW, literal.rotor_gravity),
-        GravityRow("factor_outside", _factor_outside),
-        GravityRow("reversed", _reversed),
-        GravityRow("distributed", _distributed),
-        GravityRow("root_times_sine", _root_times_sine),
-        GravityRow("halves_first", _halves_first),
-        GravityRow("halves_outside", _halves_outside),
-        GravityRow("cosines_first", _cosines_first),
-        GravityRow("gravity_last", _gravity_last),
-        GravityRow("mass_first", _mass_first),
-        GravityRow("gravity_first", _gravity_first),
-        GravityRow("summed_over_blades", None),
-    )
-}
+_OF_56: dict[str, Callable[..., Any]] = {
+    DEFAULT_ROW: literal.rotor_gravity,
+    "factor_outside": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        literal.gravity_three(m, c, g, s2, c2, 0, c3, 0, c4, 0, c5, r)[0]
+    ),
+    "reversed": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        c * m * g * (c2 / 2 - r / 2 * s2) * c5 + c * m * g * (c2 / 2 + r / 2 * s2) * c4 - c * m * g * c2 * c3
+    ),
+    "distributed": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -c * m * g * c2 * c3 + c * m * g * c2 / 2 * c4 + r / 2 * c * m * g * s2 * c4
+        + c * m * g * c2 / 2 * c5 - r / 2 * c * m * g * s2 * c5
+    ),
+    "root_times_sine": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -c * m * g * c2 * c3 + c * m * g * (c2 / 2 + r * s2 / 2) * c4 + c * m * g * (c2 / 2 - r * s2 / 2) * c5
+    ),
+    "halves_first": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -c * m * g * c2 * c3 + c * m * g * (c2 * 0.5 + r * 0.5 * s2) * c4 + c * m * g * (c2 * 0.5 - r * 0.5 * s2) * c5
+    ),
+    "halves_outside": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -c * m * g * c2 * c3 + c * m * g / 2 * (c2 + r * s2) * c4 + c * m * g / 2 * (c2 - r * s2) * c5
+    ),
+    "cosines_first": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -c * m * g * c3 * c2 + c * m * g * c4 * (c2 / 2 + r / 2 * s2) + c * m * g * c5 * (c2 / 2 - r / 2 * s2)
+    ),
+    "gravity_last": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -c * m * c2 * c3 * g + c * m * (c2 / 2 + r / 2 * s2) * c4 * g + c * m * (c2 / 2 - r / 2 * s2) * c5 * g
+    ),
+    "mass_first": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -m * g * c * c2 * c3 + m * g * c * (c2 / 2 + r / 2 * s2) * c4 + m * g * c * (c2 / 2 - r / 2 * s2) * c5
+    ),
+    "gravity_first": lambda m, c, g, s2, c2, c3, c4, c5, r: (
+        -g * m * c * c2 * c3 + g * m * c * (c2 / 2 + r / 2 * s2) * c4 + g * m * c * (c2 / 2 - r / 2 * s2) * c5
+    ),
+}  # fmt: skip
+GRAVITY_ROWS = {name: GravityRow(of) for name, of in _OF_56.items()} | {"summed_over_blades": GravityRow(None)}
