@@ -137,8 +137,9 @@ class System:
         rows_between: keep rows between samples too. before_interval is called with each interval first.
         Raises KeyboardInterrupt if interrupted.
         """
-        self._mbs.systemData.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
-        settings = _settings(scheme, *self._sizes())
+        data = self._mbs.systemData
+        data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
+        settings = _settings(scheme, data.ODE2Size(), data.AEsize())
         trials = self._limit_trials(scheme) if scheme.trial_steps else []
         total = Integration(True, "", 0.0, 0, 0)
         for interval in intervals:
@@ -153,7 +154,7 @@ class System:
             _count(total, scheme, interval, solver.it, failure)
             if failure:
                 break
-            self._keep_state()
+            data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
             settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, interval.end - interval.start)
         return total
 
@@ -168,11 +169,6 @@ class System:
                 self._initial_values[name] = np.array(values, dtype=float, ndmin=1)
             solver.FinalizeSolver(self._mbs, settings)
 
-    def _sizes(self) -> tuple[int, int]:
-        """Number of coordinates, and of constraints."""
-        data = self._mbs.systemData
-        return data.ODE2Size(), data.AEsize()
-
     def _solve(self, solver: Any, settings: Any) -> str:
         """Why the engine says it failed; empty where it says it did not."""
         try:
@@ -186,10 +182,6 @@ class System:
                 return out_of_time()
             reason = _one_line(str(exc))
         return reason or _one_line(solver.GetErrorString()) or "the engine gave no reason"
-
-    def _keep_state(self) -> None:
-        data = self._mbs.systemData
-        data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
 
     def _limit_trials(self, scheme: Scheme) -> list[float]:
         trials: list[float] = []

@@ -85,15 +85,10 @@ def extrapolated(runs: list[Trajectory], tolerance: float) -> Trajectory:
         _eliminated(middle.angles, fine.angles, 4.0) - _eliminated(coarse.angles, middle.angles, 4.0)
     ).max(axis=1)
     largest = np.maximum(np.abs(fine.angles).max(axis=1), 1.0)
-    arrays = {name: _to_zero(*arrays) for name, arrays in _in_all(runs).items() if name not in _DISTANCES}
+    names = {"angles", "rates", *fine.quantities} - _DISTANCES
+    arrays = {name: _to_zero(*(getattr(run, name) for run in runs)) for name in names}
     arrays["angle_uncertainty"] = SAFETY * np.maximum.accumulate(distance + (tolerance + _ROUNDING) * largest)
     return fine.replace(**arrays)
-
-
-def _in_all(runs: list[Trajectory]) -> dict[str, list[Array]]:
-    """By name, a quantity's arrays in all runs; without time."""
-    found = {name: [run.get(name) for run in runs] for name in ("angles", "rates", *runs[-1].quantities)}
-    return {name: [one for one in arrays if one is not None] for name, arrays in found.items()}
 
 
 def _to_zero(coarse: Array, middle: Array, fine: Array) -> Array:

@@ -23,8 +23,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.trajectory import Array
 
-# rad, m: the smallest step and how often it is doubled. Each doubling takes one order of the step out of the error.
-_STEP, _DOUBLINGS = 1e-3, 5
+# rad, m: each doubling of the step takes one order of it out of the error.
+_STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 
 
 def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
@@ -55,7 +55,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array) -> Linearizat
     if left > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(found.K).max():
         raise MethodRefusal(f"exudyn_chain: not at rest: {left:g} N of the forces are not taken by the joints")
     N = _free_directions(found.C)
-    geometric = _extrapolated_array(lambda step: _geometric_stiffness(system, multipliers, N, step))
+    geometric = _limit([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS])
     joint = _joint_angles(state) @ N
     mass = N.T @ found.M @ N
 
@@ -78,12 +78,7 @@ def _at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: flo
 
 
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
-    rows = [linearized(_STEP * 2.0**k) for k in range(_DOUBLINGS + 1)]
-    return Linearized(*(_limit(list(matrices)) for matrices in zip(*rows, strict=True)))
-
-
-def _extrapolated_array(quotient: Callable[[float], Array]) -> Array:
-    return _limit([quotient(_STEP * 2.0**k) for k in range(_DOUBLINGS + 1)])
+    return Linearized(*(_limit(list(matrices)) for matrices in zip(*map(linearized, _STEPS), strict=True)))
 
 
 def _limit(values: list[Array]) -> Array:
@@ -104,11 +99,11 @@ def _free_directions(C: Array) -> Array:
 def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
     """(n, free): difference quotients of C λ along each column of N."""
     start = system.coordinates
-    here = system.linearized(_STEP).C @ multipliers
+    here = system.linearized(_STEPS[0]).C @ multipliers
     columns = []
     for direction in N.T:
         system.coordinates = start + step * direction
-        columns.append((system.linearized(_STEP).C @ multipliers - here) / step)
+        columns.append((system.linearized(_STEPS[0]).C @ multipliers - here) / step)
     system.coordinates = start
     return np.array(columns).T
 

@@ -18,7 +18,7 @@ from rotor_mbs.models.printed.entries import (
     right_entries,
     right_formulas,
 )
-from rotor_mbs.models.printed.matrices import CORRECTED, Errata
+from rotor_mbs.models.printed.matrices import Errata
 
 # Lengths, mass and gravity are drawn of order one: rounding is some 1e-16, a wrong formula some 1e-1.
 TOLERANCE = 1e-12
@@ -49,7 +49,10 @@ def check_errata(seed: int = 2020, states: int = 5) -> list[EntryCheck]:
     drawn = random_states(seed, states)
     printed = [printed_entries(state.names) for state in drawn]
     right = [right_entries(state) for state in drawn]
-    derived = {subset: [derived_entries(state, _only(subset)) for state in drawn] for subset in _subsets()}
+    derived = {
+        subset: [derived_entries(state, Errata(*(name in subset for name in NAMES))) for state in drawn]
+        for subset in _subsets()
+    }
     printed_text, right_text = printed_entries(SYMBOLS), right_formulas()
     checks = []
     for key in sorted(right[0], key=_place):
@@ -87,10 +90,6 @@ def _explanation(
 def _subsets() -> list[tuple[str, ...]]:
     """Every choice of errata, the fewest first."""
     return [subset for size in range(len(NAMES) + 1) for subset in combinations(NAMES, size)]
-
-
-def _only(subset: tuple[str, ...]) -> Errata:
-    return Errata(*(name in subset for name in NAMES)) if subset else CORRECTED
 
 
 def _difference(key: Key, first: Sequence[Entries], second: Sequence[Entries]) -> float:
