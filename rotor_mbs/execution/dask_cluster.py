@@ -23,7 +23,6 @@ from rotor_mbs.execution.provenance import fingerprint, versions
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 _CONNECT_S = 3.0
-_NO_WORKERS_S = 30.0
 _OTHER_CODE = "a worker has other versions or other code; allowed: workers with the same"
 # Of the package: all that decides a number of a sweep.
 _CODE = ("scenario", "solution", "methods", "models", "execution", "store", "studies")
@@ -82,12 +81,12 @@ def _open_cluster(address: str) -> Cluster:
 
 
 class Cluster:
-    """A TaskPool of a dask client's workers. A scheduler that is gone, or has none for a while, is a StoreError."""
+    """A TaskPool of a dask client's workers. A scheduler that is gone, or has none for patience_s, is a StoreError."""
 
     shares_disk = False
 
-    def __init__(self, client: Any) -> None:
-        self._client, self.workers = client, sum(client.nthreads().values())
+    def __init__(self, client: Any, patience_s: float = 30.0) -> None:
+        self._client, self.workers, self._patience_s = client, sum(client.nthreads().values()), patience_s
         self._executor = client.get_executor(pure=False)  # two equal calls are two runs
         self._waiting: set[Future[Any]] = set()
         threading.Thread(target=self._watch, daemon=True).start()
@@ -115,12 +114,12 @@ class Cluster:
     def _watch(self) -> None:
         """A cluster whose last worker is gone would be waited for without end."""
         without_since = time.monotonic()
-        while time.monotonic() - without_since < _NO_WORKERS_S:
-            time.sleep(1.0)
+        while time.monotonic() - without_since < self._patience_s:
+            time.sleep(min(self._patience_s / 2.0, 1.0))
             with suppress(Exception):  # the scheduler is gone, which ends the futures, too; or this client is closed
                 if self._client.nthreads():
                     without_since = time.monotonic()
-        error = StoreError(f"--engine dask: no workers for {_NO_WORKERS_S:g} s; what is stored is kept")
+        error = StoreError(f"--engine dask: no workers for {self._patience_s:g} s; what is stored is kept")
         for future in list(self._waiting):
             with suppress(Exception):  # one that has just ended
                 future.set_exception(error)

@@ -81,7 +81,7 @@ def _alive(mark: str) -> list[str]:
 
 
 def _kill_once(folder: Path, name: str, chance: random.Random) -> None:
-    words, output = COMMANDS[name]
+    words, _ = COMMANDS[name]
     mark, number = uuid.UUID(int=chance.getrandbits(128)).hex, chance.choice(SIGNALS)
     with _start(folder, words, mark) as process:
         try:
@@ -99,18 +99,19 @@ def _kill_once(folder: Path, name: str, chance: random.Random) -> None:
     assert not left, (name, number, left)
     if number != signal.SIGKILL:
         assert not list(folder.glob(".*.tmp")), (name, number)
-    foreign = [path.name for path in folder.iterdir() if not _is_known(path.name, output)]
+    foreign = [path.name for path in folder.iterdir() if not _is_known(path.name)]
     assert not foreign, (name, number, foreign)
 
 
-def _is_known(name: str, output: str) -> bool:
+def _is_known(name: str) -> bool:
     given = ("a.toml", "b.toml", "s.toml", "whole.h5", "log")
     made = [output for _, output in COMMANDS.values() if output]
     pages = [f"{Path(one).stem}-report" for one in made]
     digests = [f"{Path(one).stem}.sha256" for one in made]
-    parts = re.fullmatch(rf"{re.escape(output)}(\.full\.h5)?(\.parts)?", name) if output else None
+    # Finished parts stay until the next call of the same command.
+    parts = any(re.fullmatch(rf"{re.escape(one)}(\.full\.h5)?(\.parts)?", name) for one in made)
     temporary = re.fullmatch(r"\..*\.[0-9]+\.tmp", name)  # of a killed process, until the next call
-    return name in (*given, *made, *pages, *digests) or bool(parts or temporary)
+    return name in (*given, *made, *pages, *digests) or parts or bool(temporary)
 
 
 def _same_arrays(one: Path, other: Path) -> bool:

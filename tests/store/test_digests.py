@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from support.checking import failed, judged, results_file
 
+import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
 from rotor_mbs.scenario.sweep import load_sweep
@@ -233,3 +235,7 @@ def test_a_changed_number_of_a_finished_sweep_is_found(
         with pytest.raises(StoreError, match="runs 0 changed"):
             StoredSweep(copy)
         assert main(["report", str(copy), "-o", str(tmp_path / "report")]) == 2
+        data = rm.SweepData(copy, {})
+        for read in (partial(data.column, "time"), partial(data.at, "angles", 0), data.to_xarray):
+            with pytest.raises(StoreError, match="runs 0 changed"):
+                read()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -250,3 +251,14 @@ def test_pages_and_csv_are_written(tmp_path: Path) -> None:
     first = index.read_text()
     assert first.count('href="bench-paper-fig09.html"') == 2  # in the table, and under the small picture
     assert first.index('id="fastest"') < first.index('id="scenes"')
+
+
+def test_names_of_curves_and_scenes_are_escaped_in_the_pages(tmp_path: Path) -> None:
+    evil = '<meta http-equiv="refresh" content="0">'
+    curves = [replace(FAST, name=f"lagrange/{evil}"), replace(SLOW, scene=f"paper/{evil}"), SLOW]
+    write_records(tmp_path / "a.h5", curves)
+    index = write_report(tmp_path / "a.h5", tmp_path / "out")
+    pages = [page.read_text() for page in index.parent.glob("*.html")]
+    assert len(pages) == 3
+    assert not any(evil in page for page in pages)
+    assert sum("&lt;meta http-equiv=" in page for page in pages) == 3

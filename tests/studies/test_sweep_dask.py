@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -15,9 +16,9 @@ import pytest
 from support.sweeps import stored_runs
 
 from rotor_mbs.cli import main
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.execution import dask_cluster
-from rotor_mbs.execution.pool import SerialPool
+from rotor_mbs.execution.pool import SerialPool, run_in
 
 pytest.importorskip("distributed")
 
@@ -114,3 +115,26 @@ def test_a_scheduler_that_dies_ends_in_one_line(
     assert sweep.returncode == 1, errors
     assert b"Traceback" not in errors
     assert errors.strip().splitlines()[-1].startswith(b"--engine dask: the scheduler is gone; what is stored is kept")
+
+
+class _WithoutWorkers:
+    """A client of a cluster that has just lost its last worker: nothing ever ends there."""
+
+    status = "running"
+
+    def nthreads(self) -> dict[str, int]:
+        return {}
+
+    def get_executor(self, *, pure: bool) -> _WithoutWorkers:
+        assert not pure
+        return self
+
+    def submit(self, *_: object) -> Future[int]:
+        return Future()
+
+
+def test_a_cluster_without_workers_ends_in_one_line() -> None:
+    pool = dask_cluster.Cluster(_WithoutWorkers(), patience_s=0.2)
+    (end,) = run_in(pool, abs, [-3], 60.0)
+    assert isinstance(end.error, StoreError)  # which ends a sweep
+    assert str(end.error) == "--engine dask: no workers for 0.2 s; what is stored is kept"
