@@ -139,6 +139,13 @@ def test_a_runaway_does_not_flatten_the_rest() -> None:
     assert picture.axes[0].get_ylim()[1] < 5.0
 
 
+def test_a_jolt_that_passes_is_shown_whole() -> None:
+    rates = 1e-3 * np.sin(TIME)[:, None]
+    rates[100:130, 0] = 1.6  # a step of a pitch command
+    assert not figures.is_cut(rates)
+    assert figures.motion(figures.Motion(TIME, None, rates)).axes[0].get_ylim()[1] >= 1.6
+
+
 def test_rounding_is_not_blown_up_into_a_motion() -> None:
     rates = 1e-13 * np.sin(TIME)[:, None]
     low, high = figures.motion(figures.Motion(TIME, rates, None)).axes[0].get_ylim()
@@ -180,6 +187,16 @@ def test_a_picture_has_every_point_label_and_colour_of_its_axes() -> None:
         drawn.cumsum(axis=0) + np.array([x, y]), wanted * (1, -1) + np.array([0.0, height]), atol=0.11
     )
     assert marks.count("M") == len(wanted)
+
+
+def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot([0.0, 1.0], [0.0, 3e-4])
+    picture.axes[0].set_ylabel("pitch angle (rad)")
+    text = svg.drawing(picture, "a", "b", "c").replace(numbers.SPACE, " ")
+    assert ">pitch angle (10⁻⁴ rad)<" in text
+    assert ">3.0<" in text
+    assert "1e" not in text
 
 
 def test_no_tick_stands_outside_its_axes() -> None:

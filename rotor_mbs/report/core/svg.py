@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rotor_mbs.report.core.canvas import Panels, hex_colour, is_map, style
 from rotor_mbs.report.core.elements import MARKS, LegendEntry, Picture
 from rotor_mbs.report.core.looks import INK, PAPER, class_of
+from rotor_mbs.report.core.numbers import SPACE, power
 
 Array = NDArray[np.float64]
 _DASHES = {"--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
@@ -110,18 +111,15 @@ class _Page:
                     yield _words(
                         (x, bottom + 12.0) if is_x else (left - 4.0, y + 3.4), label, "middle" if is_x else "end"
                     )
-            offset = axis.get_major_formatter().get_offset() if len(places) else ""
-            if offset and (x_shown or not is_x):
-                yield _words((right, bottom + 24.0) if is_x else (left, top - 4.0), offset, "end" if is_x else "start")
         if lines:
             yield f'<path class="grid" d="{"".join(lines)}"/>'
         yield f'<path class="axis" d="M{_short(left)} {_short(top)}V{_short(bottom)}H{_short(right)}"/>'
-        if axes.get_xlabel() and x_shown:
-            yield _words((0.5 * (left + right), bottom + 26.0), axes.get_xlabel(), "middle")
-        if axes.get_ylabel():
+        if x_shown and (label := _label(axes.xaxis)):
+            yield _words((0.5 * (left + right), bottom + 26.0), label, "middle")
+        if label := _label(axes.yaxis):
             x, y = _short(left - 46.0), _short(0.5 * (top + bottom))
             turned = f'transform="translate({x} {y})rotate(-90)" text-anchor="middle"'
-            yield f"<text {turned}>{escape(axes.get_ylabel())}</text>"
+            yield f"<text {turned}>{escape(label)}</text>"
         for place, x in (("left", left), ("center", 0.5 * (left + right))):
             if axes.get_title(loc=place):
                 yield _words((x, top - 6.0), axes.get_title(loc=place), _ANCHORS[place])
@@ -232,6 +230,15 @@ def _ticks(axis: Any) -> tuple[Array, Sequence[str]]:
     at, margin = scale.transform(places), 1e-6 * (high - low)
     places = places[(at >= low - margin) & (at <= high + margin)]
     return places, axis.get_major_formatter().format_ticks(places) if len(places) else []
+
+
+def _label(axis: Any) -> str:
+    """The axis' label, with what its tick labels leave out: "angle (10⁻³ rad)" where they are to be times 1e-3."""
+    label, offset = str(axis.get_label_text()), str(axis.get_major_formatter().get_offset())
+    factor = re.fullmatch(r"1e([-−]?\d+)", offset)
+    if factor and "(" in label:
+        return label.replace("(", f"({power(int(factor[1].replace('−', '-')))}{SPACE}", 1)
+    return f"{label} {offset}".strip()
 
 
 def _text(place: Array, words: str, text: Any) -> str:

@@ -111,13 +111,13 @@ def short_sentences(facts: Finding) -> list[str]:
         most = f", up to {prefixed(facts.energy.gain, 'J')}" if facts.energy.scene else ""
         rises = facts.energy.rises
         found.append(f"As printed they make energy from nothing in {rises.count} of {rises.of} scenes{most}.")
-    known = {label_of(one.method): one.angle_error for one in facts.agreement if one.angle_error is not None}
+    known = {one.method: one.angle_error for one in facts.agreement if one.angle_error is not None}
     if known:
-        count = len({one.method.partition("/")[0] for one in facts.agreement})
+        count = len({method.partition("/")[0] for method in known})
         models = "The corrected model agrees" if count == 1 else f"{count} independent corrected models agree"
         ranked = sorted(known.items(), key=lambda item: item[1])
         shown = ranked if len(ranked) <= _NAMED else [ranked[0], ranked[-1]]
-        each = ", ".join(f"{with_unit(error, 'rad')} ({label})" for label, error in shown)
+        each = ", ".join(f"{with_unit(error, 'rad')} ({label_of(method)})" for method, error in shown)
         found.append(f"{models} with a quad-precision reference to {each}, up to each scene's horizon.")
     return found
 

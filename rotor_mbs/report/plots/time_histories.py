@@ -20,6 +20,7 @@ LOWEST = 1e-18
 _HIGHEST = 1e4
 # Values larger than this many times the 90 % quantile are cut off.
 _RUNAWAY = 8.0
+_STILL = 10.0  # times what it is in the last samples, at most, where it has not passed
 # A range (rad, rad/s; of energies, of their scale) that is rounding error.
 _ROUNDING = 1e-9
 _BINS = 130  # intervals of a curve that is drawn: one in some four pixels of a page
@@ -164,9 +165,10 @@ def thin(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def is_cut(values: Array) -> bool:
-    """Whether the largest of these values (n, curves) would be left out by `draw_lines`."""
+    """Whether the largest of these values (n, curves) are left out: of a divergence, not of a jolt that passes."""
     largest = np.abs(values).max(axis=1)
-    return bool(largest.max() > _RUNAWAY * float(np.quantile(largest, 0.9)) > 0.0)
+    usual = float(np.quantile(largest, 0.9))
+    return bool(min(largest.max(), _STILL * largest[-5:].max()) > _RUNAWAY * usual > 0.0)
 
 
 def _peaks(time: Array, values: Array) -> tuple[Array, Array]:
