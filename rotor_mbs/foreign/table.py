@@ -44,7 +44,10 @@ def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | 
     Arrays that are no numbers, are single numbers, or have more dimensions are left out. An array (k, n) beside others
     of length n is turned, as MATLAB's are where they are stored by HDF5.
     """
-    found = {name: np.squeeze(np.asarray(values)) for name, values in arrays.items()}
+    try:
+        found = {name: np.squeeze(_plain(values)) for name, values in arrays.items()}
+    except ValueError as exc:
+        raise InputError(f"{source}: rows of different lengths; allowed: arrays (n,) and (n, columns)") from exc
     found = {name: values for name, values in found.items() if values.dtype.kind in "fiu" and values.ndim in (1, 2)}
     rows = max((values.size for values in found.values() if values.ndim == 1), default=0)
     columns: dict[str, DataColumn] = {}
@@ -60,6 +63,11 @@ def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | 
     if not columns:
         raise InputError(f"{source}: no columns of numbers in it; allowed: a time and angles, as columns or arrays")
     return DataTable(source, columns)
+
+
+def _plain(values: Any) -> NDArray[Any]:
+    """NaN where a value is masked."""
+    return np.asarray(np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else values)
 
 
 def named_unit(name: str) -> tuple[str, str]:

@@ -118,7 +118,9 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     worst = max(one.error_per_growth for one in verdict.channels)
     if not verdict.agrees:
         ends = monotonic() + _SEARCH_S
-        likely, note = likely_causes(CauseSearch(scene, _aligned(data, cut), exact, tolerance, worst, ends))
+        search = CauseSearch(scene, _aligned(data, cut), exact, tolerance, worst, ends)
+        with np.errstate(over="ignore", invalid="ignore"):  # data may be of any size
+            likely, note = likely_causes(search)
         start = "" if likely else _other_start(scene, cut, _states(at_rows)[0, cut.columns])
         notes = (*verdict.notes, *(line for line in (note, start) if line))
         verdict = replace(verdict, likely=tuple(likely), notes=notes)

@@ -131,10 +131,10 @@ def _states(run: Trajectory) -> Array:
 def causes_in_the_data(search: CauseSearch) -> list[str]:
     """What fits, in words; the first kind of mistake that explains every channel.
 
-    Where the rows that were compared agree, and are too few, only another unit of time is tried.
+    Where the rows that were compared agree, another unit of time is tried if many came after the scene's end.
     """
     if search.worst <= search.tolerance:
-        return _other_time(search)
+        return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else []
     inside = search.rows(search.data.time)
     time, values = search.data.time[inside], search.data.values[inside]
     ways = [_units_and_zeros, _exchanged] if len(time) >= FEWEST else []
@@ -269,7 +269,7 @@ def _scatter(search: CauseSearch, time: Array, values: Array) -> list[str]:
     wrong = np.abs(errors / search.carried(time)[:, search.data.columns]).max(axis=0) > search.tolerance
     centred = errors[:, wrong] - errors[:, wrong].mean(axis=0)
     sizes = (centred**2).mean(axis=0)
-    if not wrong.any() or (sizes == 0.0).any():
+    if not wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
         return []
     common = np.abs((centred[1:] * centred[:-1]).mean(axis=0)) / sizes
     half = len(time) // 2

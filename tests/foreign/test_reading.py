@@ -189,6 +189,22 @@ def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str, capsys:
 
 
 @pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({}, "no columns of numbers"),
+        ({"time": TIME, "rotor": np.ma.masked_less(ANGLES[:, 0], -1.0)}, "column 'rotor' is nan in row"),
+        ({"time": TIME, "angles": [[1.0, 2.0], [3.0]]}, "rows of different lengths"),
+        ({"time": TIME[1:], "rotor": ANGLES[:, 0]}, "columns of different lengths"),
+        ({"time": TIME, "angles": ANGLES.astype(complex)}, "no column for an angle or a rate"),
+        ({"time": 3.0, "rotor": 2.0}, "no columns of numbers"),
+    ],
+)
+def test_wrong_arrays_are_refused(arrays: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load_data(arrays, SCENE)
+
+
+@pytest.mark.parametrize(
     ("mapping", "message"),
     [
         ('rotr = "a"', "rotr: no such channel; allowed: rotor"),

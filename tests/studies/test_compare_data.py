@@ -230,6 +230,19 @@ def test_data_that_leave_out_a_part_are_not_ok(cut: slice, message: str) -> None
     assert message in found.message
 
 
+def test_a_start_alone_is_no_other_unit_of_time() -> None:
+    """Within 1e-9 s nothing has moved, whatever the unit."""
+    scene = rm.scene("paper/fig03")
+    found = rm.compare_data({"t": np.linspace(0.0, 1e-9, 100), "rotor": np.full(100, scene.initial_angles[0])}, scene)
+    assert (found.status, found.likely) == ("inaccurate", ())
+
+
+def test_numbers_without_sense_are_inaccurate() -> None:
+    run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
+    found = rm.compare_data({"time": run.time, "rotor": 1e300 * run.angles[:, 0]}, run.scene)
+    assert (found.status, found.likely) == ("inaccurate", ("too large by a factor: rotor by 1e+300",))
+
+
 def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
     alone = rm.compare_data({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene)
