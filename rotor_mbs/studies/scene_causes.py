@@ -204,22 +204,36 @@ def _fitted(search: CauseSearch, changed: Callable[[float], Motion]) -> tuple[fl
 
 def _parameters(scene: Scene) -> Iterator[Parameter]:
     """Every number, or list of numbers, that is not zero, and the zeros of the angles."""
-    for key, unit, changed in _scene_parameters(scene):
-        yield key, unit, lambda size, changed=changed: partial(states_at, changed(size))  # type: ignore[misc]
+    for one in scene_fields("rotor", "start"):
+        key, value = one.metadata["key"], getattr(scene, one.name)
+        if one.metadata["part"] == "start":
+            for i in scene.moving_coordinates:
+                yield f"{key}[{i}]", one.metadata["unit"], _runs(_moved_entry, scene, one.name, i)
+        elif one.name != "blades" and _scaled(value, 2.0) != value:
+            yield key, "", _runs(_scaled_field, scene, one.name)
     blades = range(len(scene.blades))
     for chosen in [list(blades), *([i] for i in blades if len(blades) > 1)]:
-        label = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
-        yield f"azimuth of {label}", "rad", partial(_azimuth_moved, scene, chosen)
-        yield f"zero of the pitch of {label}", "rad", partial(_pitch_moved, scene, chosen)
+        alone = len(chosen) == 1 < len(blades)
+        for field in fields(Blade):
+            value = getattr(scene.blades[chosen[0]], field.name)
+            entries = range(len(value)) if isinstance(value, tuple) else [-1]
+            for i in entries if field.name != "tip" else []:
+                if value[i] if i >= 0 else value:
+                    path = f"blade{chosen * alone or ''}.{field.name}{[i] if i >= 0 else ''}"
+                    yield path, "", _runs(_scaled_blades, scene, chosen, field.name, i)
+        which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
+        yield f"azimuth of {which}", "rad", partial(_azimuth_moved, scene, chosen)
+        yield f"zero of the pitch of {which}", "rad", _runs(_pitch_turned, scene, chosen)
+
+
+def _runs(changed: Callable[..., Scene], *chosen: Any) -> Callable[[float], Motion]:
+    """The motion of a scene by the change of its parameter, the last argument of `changed`."""
+    return lambda change: partial(states_at, changed(*chosen, change))
 
 
 def _azimuth_moved(scene: Scene, chosen: Sequence[int], change: float) -> Motion:
     azimuths = [phase + change * (i in chosen) for i, phase in enumerate(scene.phases)]
     return partial(states_at, scene, equations=at_azimuths(scene, azimuths))
-
-
-def _pitch_moved(scene: Scene, chosen: Sequence[int], change: float) -> Motion:
-    return partial(states_at, _pitch_turned(scene, chosen, change))
 
 
 def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
@@ -238,53 +252,27 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
     return replace(scene, blades=tuple(blades))
 
 
-def _scene_parameters(scene: Scene) -> Iterator[tuple[str, str, Callable[[float], Scene]]]:
-    """(key, unit or "" for a share, change -> scene) of the numbers in the scene."""
-    for one in scene_fields("rotor", "start"):
-        key, value = one.metadata["key"], getattr(scene, one.name)
-        if one.name == "blades":
-            yield from _blade_parameters(scene)
-        elif one.metadata["part"] == "start":
-            for i in scene.moving_coordinates:
-                yield f"{key}[{i}]", one.metadata["unit"], partial(_start_moved, scene, one.name, i)
-        elif _scaled(value, 2.0) != value:
-            yield key, "", partial(_field_scaled, scene, one.name)
-
-
-def _start_moved(scene: Scene, name: str, i: int, change: float) -> Scene:
-    changed: dict[str, Any] = {name: _entry_moved(getattr(scene, name), i, change)}
+def _moved_entry(scene: Scene, name: str, i: int, change: float) -> Scene:
+    values = list(getattr(scene, name))
+    values[i] += change
+    changed: dict[str, Any] = {name: tuple(values)}
     return replace(scene, **changed)
 
 
-def _field_scaled(scene: Scene, name: str, change: float) -> Scene:
+def _scaled_field(scene: Scene, name: str, change: float) -> Scene:
     changed: dict[str, Any] = {name: _scaled(getattr(scene, name), 1.0 + change)}
     return replace(scene, **changed)
 
 
-def _blade_parameters(scene: Scene) -> Iterator[tuple[str, str, Callable[[float], Scene]]]:
-    """The parameters of all blades alike, then those of each blade."""
-    each = [(f"[{i}]", (i,)) for i in range(len(scene.blades))] if len(scene.blades) > 1 else []
-    for label, chosen in [("", tuple(range(len(scene.blades)))), *each]:
-        for one in fields(Blade):
-            value = getattr(scene.blades[chosen[0]], one.name)
-            for i in range(len(value)) if isinstance(value, tuple) else [-1]:
-                if one.name != "tip" and (value[i] if isinstance(value, tuple) else value):
-                    entry = f"[{i}]" if i >= 0 else ""
-                    yield f"blade{label}.{one.name}{entry}", "", partial(_blades_scaled, scene, chosen, one.name, i)
-
-
-def _blades_scaled(scene: Scene, chosen: Sequence[int], name: str, i: int, change: float) -> Scene:
+def _scaled_blades(scene: Scene, chosen: Sequence[int], name: str, i: int, change: float) -> Scene:
     """i: the entry; -1 where it is a number."""
     blades = list(scene.blades)
     for b in chosen:
-        old = getattr(blades[b], name)
-        changed: dict[str, Any] = {name: _entry_moved(old, i, old[i] * change) if i >= 0 else old * (1.0 + change)}
+        old, factor = getattr(blades[b], name), 1.0 + change
+        new = old * factor if i < 0 else (*old[:i], old[i] * factor, *old[i + 1 :])
+        changed: dict[str, Any] = {name: new}
         blades[b] = replace(blades[b], **changed)
     return replace(scene, blades=tuple(blades))
-
-
-def _entry_moved(values: tuple[float, ...], i: int, change: float) -> tuple[float, ...]:
-    return (*values[:i], values[i] + change, *values[i + 1 :])
 
 
 def _scaled(value: Any, factor: float) -> Any:
