@@ -143,7 +143,8 @@ class Method:
         for ladder in self.ladders:
             for rung in () if ladder.variant else ladder.rungs(interval):
                 varied = {name: float(str(value)) for name, value in ladder.fill(rung.setting).items()}
-                lower = {name: value for name, value in varied.items() if value < float(str(settings[name]))}
+                # By more than the rounding of a rung that was told to three digits.
+                lower = {name: value for name, value in varied.items() if value < 0.99 * float(str(settings[name]))}
                 if next(iter(varied)) in lower:
                     return dict(lower)
         return {}

@@ -143,3 +143,10 @@ def test_reading_a_built_in_method_imports_no_plug_in_and_no_engine(tmp_path: Pa
         "print(sorted({'exudyn', 'heyoka', 'scipy', 'h5py', 'made_up'} & set(sys.modules)))\n"
     )
     assert run(tmp_path, "-c", code).stdout.strip() == "[]"
+
+
+def test_the_next_finer_rung_is_not_the_one_that_was_told_in_three_digits() -> None:
+    method, interval = find_method("exudyn_tree/rk67"), 1.0 / 150.0
+    told = float(f"{method.finer({'step': 6.7e-4}, interval)['step']:.3g}")
+    assert told == 4.17e-4
+    assert method.finer({"step": told}, interval) == {"step": pytest.approx(interval / 32.0)}
