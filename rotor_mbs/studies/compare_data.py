@@ -106,19 +106,20 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     inside = data.time <= scene.duration * (1.0 + _ROUNDING)
     cut = replace(data, time=data.time[inside], values=data.values[inside])
     exact = _reference(scene, cut.time)
-    place: NDArray[np.int64] = np.searchsorted(exact.trajectory.time, cut.time)
-    rows = int((place < len(exact.trajectory.time)).sum())
-    if not rows:
+    run = exact.trajectory
+    place: NDArray[np.int64] = np.searchsorted(run.time, cut.time)
+    place = place[place < len(run.time)]
+    if not len(place):
         raise InputError(f"{data.source}: no row within the {scene.duration:g} s of {scene.name}; allowed: times in s")
-    place = place[:rows]
-    carried = carried_errors(exact.trajectory, exact.growth, exact.units)[place][:, data.columns]
-    at_rows = _rows_of(exact.trajectory, place)
+    carried = carried_errors(run, exact.growth, exact.units)[place][:, data.columns]
+    at_rows = Trajectory(run.time[place], run.angles[place], run.rates[place], error_growth=run.error_growth[place])
     cut = _with_whole_turns(cut, at_rows)
     verdict = _verdict(scene, data, cut, at_rows, exact, carried, tolerance)
     worst = max(one.error_per_growth for one in verdict.channels)
     if not verdict.agrees:
         ends = monotonic() + _SEARCH_S
-        search = CauseSearch(scene, _aligned(data, cut), exact, tolerance, worst, ends)
+        whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
+        search = CauseSearch(scene, whole, exact, tolerance, worst, ends)
         with np.errstate(over="ignore", invalid="ignore"):  # data may be of any size
             likely, note = likely_causes(search)
         start = "" if likely else _other_start(scene, cut, _states(at_rows)[0, cut.columns])
@@ -127,24 +128,12 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     return DataStudy(scene, cut, _states(at_rows)[:, cut.columns], carried, verdict)
 
 
-def _aligned(data: ForeignData, cut: ForeignData) -> ForeignData:
-    """All rows, with the whole turns that were added to the rows within the duration."""
-    return replace(data, values=data.values + (cut.values[0] - data.values[0]))
-
-
 def _reference(scene: Scene, time: Array) -> TimedReference:
     """At the times of the data and at the scene's samples, which make growth and horizon the same for all data."""
     end = max(scene.duration, float(time[-1])) if len(time) else scene.duration
     times = np.union1d(np.append(time, end), np.linspace(0.0, scene.duration, scene.samples))
     whole = replace(scene, duration=end, samples=len(times), outputs=("angles", "rates"))
     return reference_at(whole, times)
-
-
-def _rows_of(trajectory: Trajectory, place: NDArray[np.int64]) -> Trajectory:
-    return Trajectory(
-        trajectory.time[place], trajectory.angles[place], trajectory.rates[place],
-        error_growth=trajectory.error_growth[place],
-    )  # fmt: skip
 
 
 def _states(trajectory: Trajectory) -> Array:

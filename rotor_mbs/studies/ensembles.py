@@ -88,7 +88,8 @@ def ensemble(
         angles = tuple(float(angle) for angle in np.array(scene.initial_angles) + offset)
         run = solve(method, replace(base, initial_angles=angles), settings or {})
         rows.append(_at_the_end(run.trajectory, complete=len(run.time) == 2))
-    names = [*scene.coordinate_labels, "rotor rate", "kinetic energy", *_tip_names(scene)]
+    tips = [f"tip {blade + 1} along the shaft" for blade in range(len(scene.blades))]
+    names = [*scene.coordinate_labels, "rotor rate", "kinetic energy", *tips]
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
@@ -96,7 +97,3 @@ def _at_the_end(run: Trajectory, *, complete: bool) -> Array:
     """Angles, rate of the rotor, kinetic energy, offset of every tip along the shaft."""
     row = np.array([*run.angles[-1], run.rates[-1, 0], run.kinetic_energy[-1], *run.tip[-1, :, 1]])
     return row if complete else np.full_like(row, np.nan)
-
-
-def _tip_names(scene: Scene) -> list[str]:
-    return [f"tip {blade + 1} along the shaft" for blade in range(len(scene.blades))]
