@@ -96,3 +96,8 @@ def positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], flo
         return value
 
     return read
+
+
+COUNT = positive(int, "a whole number from 1 to 1e9")
+SECONDS = positive(float, "seconds, more than 0, at most 1e9")
+POSITIVE = positive(float, "a number more than 0, at most 1e9")

@@ -10,7 +10,18 @@ from pathlib import Path
 from typing import NoReturn, TypeAlias
 
 import rotor_mbs
-from rotor_mbs.cli.argument_values import REPRODUCED, default_results, file, part, path, positive, setting, span
+from rotor_mbs.cli.argument_values import (
+    COUNT,
+    POSITIVE,
+    REPRODUCED,
+    SECONDS,
+    default_results,
+    file,
+    part,
+    path,
+    setting,
+    span,
+)  # fmt: skip
 from rotor_mbs.errors import nearest
 
 _SCENE, _SCENES = "a name (paper/fig05) or a TOML file", "a name (paper/fig05), a folder (paper), a TOML file"
@@ -92,13 +103,9 @@ def _add_list_and_show(commands: _Commands) -> None:
 
 def _add_runs(commands: _Commands) -> None:
     reproduce = _command(
-        commands,
-        "reproduce",
-        "every scene of the paper by every model, and the report",
-        "runs:reproduce",
-        "",
-        "-o out -j 4",
-    )
+        commands, "reproduce", "every scene of the paper by every model, and the report", "runs:reproduce",
+        "", "-o out -j 4",
+    )  # fmt: skip
     reproduce.add_argument("-o", "--output", type=path, default=REPRODUCED, metavar="DIR", help=_default("DIR"))
     _add_pool_options(reproduce)
 
@@ -109,7 +116,7 @@ def _add_runs(commands: _Commands) -> None:
     run.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     _add_methods(run)
     _add_settings(run)
-    run.add_argument("-o", "--output", type=file, default=Path("results.h5"), metavar="FILE", help=_default("FILE"))
+    _add_output(run, "results.h5")
     _add_pool_options(run)
 
 
@@ -124,13 +131,10 @@ def _add_compare(commands: _Commands) -> None:
     )  # fmt: skip
     compare.add_argument("--scene", required=True, metavar="SCENE", help=_SCENE)
     compare.add_argument(
-        "--columns",
-        type=Path,
-        metavar="MAP.toml",
-        help="column, unit, sign, zero of each channel (default: guessed)",
+        "--columns", type=Path, metavar="MAP.toml", help="column, unit, sign, zero of each channel (default: guessed)"
     )
     compare.add_argument(
-        "--tolerance", type=positive(float, "a number more than 0"), default=1e-6, metavar="X",
+        "--tolerance", type=POSITIVE, default=1e-6, metavar="X",
         help="rad per unit of error growth that still agree (default: %(default)g)",
     )  # fmt: skip
     compare.add_argument(
@@ -147,26 +151,23 @@ def _add_bench(commands: _Commands) -> None:
     bench.add_argument("scenes", nargs="*", metavar="SCENE", help=_SCENES)
     _add_methods(bench)
     _add_settings(bench)
-    bench.add_argument("-o", "--output", type=file, default=Path("bench.h5"), metavar="FILE", help=_default("FILE"))
+    _add_output(bench, "bench.h5")
     bench.add_argument("--growth", action="store_true", help="also how cost grows with blades and with duration")
     bench.add_argument(
-        "--repeats", type=positive(int, "a whole number from 1 to 1e9"), default=20, metavar="N",
+        "--repeats", type=COUNT, default=20, metavar="N",
         help="timed runs of each point (default: %(default)s; 5 at most for runs over 0.5 s)",
     )  # fmt: skip
     bench.add_argument(
-        "--budget", type=positive(float, "seconds, more than 0, at most 1e9"), default=_DEFAULT_BUDGET_S,
+        "--budget", type=SECONDS, default=_DEFAULT_BUDGET_S,
         metavar="SECONDS", help="for each scene (default: %(default)g)",
     )  # fmt: skip
 
 
 def _add_reference(commands: _Commands) -> None:
     reference = _command(
-        commands,
-        "reference",
-        "quad precision references, computed anew, as they are frozen",
-        "runs:reference",
+        commands, "reference", "quad precision references, computed anew, as they are frozen", "runs:reference",
         "paper/fig08 -o reference.h5",
-    )
+    )  # fmt: skip
     reference.add_argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
     reference.add_argument("-o", "--output", type=file, required=True, metavar="FILE")
     _add_pool_options(reference)
@@ -190,7 +191,7 @@ def _add_check(commands: _Commands) -> None:
         help="also fail where a verdict on this earlier results file passed by more, or its run is gone",
     )  # fmt: skip
     check.add_argument(
-        "--shrink", type=positive(float, "a number, more than 0"), default=10.0, metavar="FACTOR",
+        "--shrink", type=POSITIVE, default=10.0, metavar="FACTOR",
         help="with --against: by how much a margin may shrink (default: %(default)g)",
     )  # fmt: skip
     check.add_argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML")
@@ -213,9 +214,7 @@ def _add_stability(commands: _Commands) -> None:
     )  # fmt: skip
     stability.add_argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)")
     _add_settings(stability)
-    stability.add_argument(
-        "-o", "--output", type=file, default=Path("stability.h5"), metavar="FILE", help=_default("FILE")
-    )
+    _add_output(stability, "stability.h5")
     stability.add_argument("--report", type=path, metavar="DIR", help=f"its pages {_PAGES}")
     _add_pool_options(stability, timeout_s=_SUITE_TIMEOUT_S)
 
@@ -234,7 +233,7 @@ def _add_modes(commands: _Commands) -> None:
         "--stiffness", type=span, default=(), metavar="FROM:TO:COUNT",
         help="N m/rad of every bearing: the stability chart over speed and stiffness",
     )  # fmt: skip
-    modes.add_argument("-o", "--output", type=file, default=Path("modes.h5"), metavar="FILE", help=_default("FILE"))
+    _add_output(modes, "modes.h5")
     modes.add_argument("--report", type=path, metavar="DIR", help=f"its pages {_PAGES}")
     modes.add_argument("--json", action="store_true", help="the table as JSON, for a script")
     _add_pool_options(modes, timeout_s=_CHART_TIMEOUT_S)
@@ -245,17 +244,13 @@ def _add_claims(commands: _Commands) -> None:
         commands, "claims", "the paper's claims in words as shares of many runs, its numbers under other conditions",
         "claims:claims", "--runs 20",
     )  # fmt: skip
-    claims.add_argument("-o", "--output", type=file, default=Path("claims.h5"), metavar="FILE", help=_default("FILE"))
+    _add_output(claims, "claims.h5")
     claims.add_argument(
-        "--runs", type=positive(int, "a whole number from 1 to 1e9"), default=100, metavar="N",
+        "--runs", type=COUNT, default=100, metavar="N",
         help="starts moved by up to 1e-15 rad, for each scene, method and duration (default: %(default)s)",
     )  # fmt: skip
     claims.add_argument(
-        "--seed",
-        type=positive(int, "a whole number from 1 to 1e9"),
-        default=2020,
-        metavar="N",
-        help="of the moved starts (default: %(default)s)",
+        "--seed", type=COUNT, default=2020, metavar="N", help="of the moved starts (default: %(default)s)"
     )
     _add_jobs(claims)
 
@@ -267,12 +262,9 @@ def _add_report(commands: _Commands) -> None:
     report.add_argument("--open", action="store_true", help="show the index in the browser")
 
     figures = _command(
-        commands,
-        "figures",
-        "the paper's figures as files for a manuscript, from a results file",
-        "reports:figures",
+        commands, "figures", "the paper's figures as files for a manuscript, from a results file", "reports:figures",
         "--format svg --figure 11",
-    )
+    )  # fmt: skip
     _add_results(figures)
     figures.add_argument("-o", "--output", type=path, default=Path("figures"), metavar="DIR", help=_default("DIR"))
     figures.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
@@ -289,7 +281,7 @@ def _add_report(commands: _Commands) -> None:
         help="FILE.gif, FILE.webp, or FILE.mp4 where ffmpeg is installed (default: the scene's name with .webp)",
     )  # fmt: skip
     animate.add_argument(
-        "--offset", type=positive(float, "a number more than 0, at most 1e9"), metavar="TIMES",
+        "--offset", type=POSITIVE, metavar="TIMES",
         help="how many times the tip's distance from its pitch axis is drawn (default: to a tenth of the blade)",
     )  # fmt: skip
 
@@ -365,6 +357,10 @@ def _late(target: str) -> Callable[[argparse.Namespace], int]:
     return call
 
 
+def _add_output(parser: argparse.ArgumentParser, name: str) -> None:
+    parser.add_argument("-o", "--output", type=file, default=Path(name), metavar="FILE", help=_default("FILE"))
+
+
 def _add_methods(parser: argparse.ArgumentParser, text: str = "model/integrator") -> None:
     parser.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{text}; may be repeated")
 
@@ -378,7 +374,7 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
 
 def _add_jobs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "-j", "--jobs", type=positive(int, "a whole number from 1 to 1e9"), default=cores(), metavar="N",
+        "-j", "--jobs", type=COUNT, default=cores(), metavar="N",
         help="parallel processes (default: the cores, %(default)s)",
     )  # fmt: skip
 
@@ -386,7 +382,7 @@ def _add_jobs(parser: argparse.ArgumentParser) -> None:
 def _add_pool_options(parser: argparse.ArgumentParser, timeout_s: float = _DEFAULT_TIMEOUT_S) -> None:
     _add_jobs(parser)
     parser.add_argument(
-        "--timeout", type=positive(float, "seconds, more than 0, at most 1e9"), default=timeout_s, metavar="SECONDS",
+        "--timeout", type=SECONDS, default=timeout_s, metavar="SECONDS",
         help="a run longer than this is ended and recorded as timed_out (default: %(default)g)",
     )  # fmt: skip
 

@@ -16,14 +16,7 @@ from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.studies.check import (
-    check_default_set,
-    check_file,
-    check_speed,
-    default_set,
-    judge_file,
-    judged_runs,
-)
+from rotor_mbs.studies.check import check_default_set, check_file, check_speed, default_set, judge_file, judged_runs
 
 _STANDARD_OUTPUT = Path("-")
 

@@ -28,7 +28,7 @@ Curves = Sequence[Record]
 
 def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
     """By file name, the pages on the curves of `results`, and CSV; `main`: the file of the one over all scenes."""
-    grouped, made_with = by_scene(read_records(results.path, "bench")), versions(results)
+    grouped, made_with = by_scene(read_records(results.path, "bench")), versions(results.attributes)
     scaling = {name: curves for name, curves in grouped.items() if name.startswith(f"{COST_SCALING}/")}
     scenes = {name: grouped[name] for name in natural_order(grouped) if name not in scaling}
     files = dict(zip(scenes, page_names(f"bench/{name}" for name in scenes).values(), strict=True))

@@ -10,15 +10,7 @@ from itertools import chain
 
 import numpy as np
 
-from rotor_mbs.analysis.work_precision import (
-    TARGETS_RAD,
-    Reach,
-    cost_exponent,
-    fastest,
-    left_out,
-    reaches,
-    succeeded,
-)
+from rotor_mbs.analysis.work_precision import TARGETS_RAD, Reach, cost_exponent, fastest, left_out, reaches, succeeded
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit

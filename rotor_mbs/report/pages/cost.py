@@ -5,15 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, fastest, own_points, succeeded
-from rotor_mbs.report.core.elements import (
-    LegendEntry,
-    PageTable,
-    Picture,
-    Row,
-    Section,
-    line_entry,
-    mark_entry,
-)
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, line_entry, mark_entry
 from rotor_mbs.report.core.looks import label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, prefixed
 from rotor_mbs.report.core.svg import picture

@@ -45,7 +45,7 @@ def index_page(
         "numbers": Section(tables=[claim_tables.number_table(claims), *trials], notes=general),
         "claims": Section(tables=[claim_tables.claim_table(claims, shares)], notes=notes),
         "errata": Section(tables=[_errata_table(errata)]),
-        "versions": versions(results),
+        "versions": versions(results.attributes),
         "is_paper": bool(claims),
     }
 
@@ -55,9 +55,9 @@ def _has_all(claims: Sequence[Claim], shares: ClaimShares | None) -> bool:
     return shares is not None and {claim.published.id for claim in claims} >= set(shares.claims)
 
 
-def versions(results: OpenResults) -> list[tuple[str, str]]:
+def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
     """(what, version) of the programs and the computer that made a file."""
-    return [(name, str(results.attributes[name])) for name in _VERSIONS if results.attributes.get(name)]
+    return [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
 
 
 def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:

@@ -7,15 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.stability import (
-    OUTCOMES,
-    TARGET,
-    SuiteRun,
-    advice_lines,
-    is_number,
-    reached_by,
-    suite_runs,
-)
+from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, is_number, reached_by, suite_runs
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
@@ -129,16 +121,12 @@ def _limits(records: Sequence[Record]) -> Section:
 
 def _conservation(records: Sequence[Record]) -> Section:
     rows = [
-        [r.scene, method_cell(r.method), *(_shown(r.attributes.get(name)) for name in _CONSERVED)]
+        [r.scene, method_cell(r.method), *(number(r.attributes.get(name)) for name in _CONSERVED)]
         for r in records
         if r.kind == "conservation"
     ]
     head = ["Scene", "Method", *_CONSERVED.values()]
     return Section(tables=[PageTable("", head, rows, tuple(range(2, len(head))))])
-
-
-def _shown(value: float | None) -> str:
-    return number(value)
 
 
 def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[Record]) -> dict[str, object]:
@@ -186,7 +174,7 @@ def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
             outcome = TableCell(f"{symbol} {text}", note=cell.message)
         else:  # the tone brings its own symbol
             outcome = TableCell(text, "bad", note=cell.message)
-        numbers = [_shown(x) for x in (cell.angle_error, cell.energy_drift, cell.run_time_s or None, cell.step)]
+        numbers = [number(x) for x in (cell.angle_error, cell.energy_drift, cell.run_time_s or None, cell.step)]
         rows.append([method_cell(cell.method), outcome, *numbers, f"{cell.time_reached:.4g}"])
     head = (
         "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 1e-6 rad (s)",

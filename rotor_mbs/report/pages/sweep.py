@@ -14,6 +14,7 @@ from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Sect
 from rotor_mbs.report.core.looks import Look, with_capital
 from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.report.plots import sweep as plots
 from rotor_mbs.scenario.scene_file import parse_scene
@@ -38,11 +39,7 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         "parameters": Section(tables=[_parameter_table(sweep)]),
         "distributions": Section(_distributions(sweep, statuses == STATUSES.index("ok"))),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
-        "versions": [
-            (name, str(sweep.attributes[name]))
-            for name in ("rotor_mbs", "python", "heyoka", "exudyn", "numpy", "h5py", "platform", "cpu")
-            if name in sweep.attributes
-        ],
+        "versions": versions(sweep.attributes),
     }
 
 
