@@ -52,11 +52,11 @@ EQUIVALENT = {
     r"timetable\.integration_intervals .*end - start scaled": "rounded to a whole number of intervals",
     r"mjcf\.model .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
     r"mjcf\.model .*0\.0 -> 1\.0": "the centre of mass of a hub that has no mass",
-    r"loads\._line .*(start - t0|slope \* \(start)": "a segment starts at a row of the one table there is: zero",
-    r"loads\.intervals .*(0\.5 \* \(start \+ end\)|right side of start \+ end) scaled": (
+    r"timetable\._line .*(start - t0|slope \* \(start)": "a segment starts at a row of the one table there is: zero",
+    r"timetable\.intervals .*(0\.5 \* \(start \+ end\)|right side of start \+ end) scaled": (
         "any instant inside the interval determines its segment"
     ),
-    r"loads\.steps_and_rows .*steps / rows scaled": "whole numbers: rounded up to the same",
+    r"timetable\.steps_and_rows .*steps / rows scaled": "whole numbers: rounded up to the same",
     r"literal\.fixed_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:48: .* q2 \+ phase)": (
         "the cosine multiplies c, which is 0 where this function is used"
     ),
@@ -85,7 +85,7 @@ UNSEEN = {
     r"energy\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
         "a tolerance in matching times: any between round-off and the distance of two rows does as well"
     ),
-    r"loads\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
+    r"timetable\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
 }
 EXPLAINED = {**EQUIVALENT, **UNSEEN}
 

@@ -133,7 +133,7 @@ _TARGETS = (
     Target(
         "mujoco", f"{_J}.mjcf", ("moving", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
     ),
-    Target("mujoco", f"{_J}.loads", ("at", "loads_of", "segments", "_line", "intervals", "steps_and_rows"), 1e-3),
+    Target("mujoco", f"{_J}.timetable", ("at", "loads_of", "segments", "_line", "intervals", "steps_and_rows"), 1e-3),
     Target(
         "mujoco",
         f"{_J}.solver",
@@ -208,7 +208,7 @@ _TESTS = {
         f"{_MUJOCO}point_masses_have_no_inertia_that_the_scene_does_not_give",
         f"{_MUJOCO}an_inertia_at_the_limit_of_the_triangle_inequality",
     ),
-    f"{_J}.loads": (
+    f"{_J}.timetable": (
         f"{_MUJOCO}kinks_are_stops_of_the_engine_and_samples_are_met",
         f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
     ),
