@@ -217,14 +217,22 @@ def copy_group(source: Any, target: Any) -> None:
         if item.is_scale:
             copied.make_scale(name)
     for name, item in datasets.items():
-        for axis, dimension in enumerate(item.dims):
-            if len(dimension):
-                # By the name that the scale itself tells: the library would look for its path through the whole file.
-                target[name].dims[axis].attach_scale(target[dimension.keys()[0]])
+        for axis, dimension in enumerate(dimensions_of(item)):
+            if dimension:
+                target[name].dims[axis].attach_scale(target[dimension])
     target.attrs.update(source.attrs)
     for name, item in members(source):
         if is_group(item):
             copy_group(item, new_group(target, name))
+
+
+def dimensions_of(dataset: Any) -> list[str]:
+    """The names of its scales; "" where a dimension has none.
+
+    By the attribute of the scale: the library would look for its path through the whole file, and its own way to the
+    name ends the process where that is damaged.
+    """
+    return [plain(dimension[0].attrs["NAME"]) if len(dimension) else "" for dimension in dataset.dims]
 
 
 def is_group(item: Any) -> bool:

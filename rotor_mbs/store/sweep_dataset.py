@@ -167,7 +167,7 @@ class StoredSweep:
                 raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
             runs, marked, statuses = _stored_runs(file)
             for name, item in file.items():
-                dimensions = tuple(dim.keys()[0] if len(dim) else name for dim in item.dims)
+                dimensions = tuple(one or name for one in hdf5.dimensions_of(item))
                 self.columns[name] = Column(dimensions, str(item.attrs["units"]), str(item.attrs["long_name"]))
         self.keys: list[str] = self.attributes["parameter_keys"]
         self.damaged_runs = runs.first + np.flatnonzero((marked != MISSING) & (statuses == MISSING))
