@@ -11,6 +11,7 @@ from support.references import reference as frozen_reference
 from support.references import scene as shipped_scene
 from support.scenes import PAPER, paper
 
+from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.catalogue import reference_folder
@@ -93,3 +94,16 @@ def test_a_third_tolerance_lies_within_the_uncertainty(name: str, tolerance: flo
     pytest.importorskip("heyoka")
     off = np.abs(_propagated(name, tolerance) - _propagated(name, 1e-33)).astype(float).max(axis=1)
     assert (off <= frozen_reference(name).angle_uncertainty).all()
+
+
+def _limited(duration: float) -> tuple[bool, list[float]]:
+    run = solve("reference", paper("fig11", duration=duration, samples=3), {}, time_limit_s=0.2)
+    growth = run.trajectory.error_growth
+    assert growth is not None
+    return run.integration.out_of_time, growth.tolist()
+
+
+def test_a_reference_that_its_time_limit_ends_is_ended() -> None:
+    """Its error growth over the rest, some 1e8 steps, would take hours."""
+    (end,) = run_tasks(_limited, [1e6], 1, 60.0)
+    assert end.value == (True, [1.0])

@@ -52,7 +52,12 @@ class ReferenceSolver:
             result.quantities |= quad_loads(self._scene, result.time, best)
         difference = np.abs((best - check)[:, : len(self._scene.moving_coordinates)]).astype(float).max(axis=1)
         result.angle_uncertainty = uncertainty(difference, result.angles, _QUAD_EPSILON)
-        result.error_growth = error_growth(self._scene)[:rows]
+        # Over what was reached: the rest of a run that its time limit ended may take for ever.
+        if rows > 1:
+            reached = replace(self._scene, duration=float(result.time[-1]), samples=rows)
+            result.error_growth = _largest_growth(reached, _transition_matrices(reached, result.time))
+        else:
+            result.error_growth = np.ones(rows)
         return result
 
 
