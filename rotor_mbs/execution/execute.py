@@ -154,7 +154,7 @@ def in_pool(perform: Perform, workers: int, timeout_s: float) -> JobRunner:
         limited = [replace(job, time_limit_s=timeout_s) for job in jobs]
         if not workers:
             return (Finished(job, perform(job)) for job in limited)
-        # What ends itself at its time limit needs a moment to write what it has.
+        # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
         return run_tasks(perform, limited, workers, 1.2 * timeout_s + 10.0)
 
     return run_jobs
