@@ -56,7 +56,6 @@ EQUIVALENT = {
     r"timetable\.intervals .*(0\.5 \* \(start \+ end\)|right side of start \+ end) scaled": (
         "any instant inside the interval determines its segment"
     ),
-    r"timetable\.steps_and_rows .*steps / rows scaled": "whole numbers: rounded up to the same",
     r"literal\.fixed_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:48: .* q2 \+ phase)": (
         "the cosine multiplies c, which is 0 where this function is used"
     ),
