@@ -87,3 +87,21 @@ def test_an_interrupt_inside_compiled_code_is_an_interrupt(
     monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
     assert main(["run", "paper/fig03"]) == 130
     assert capsys.readouterr().err.startswith("interrupted; ")
+
+
+class _InterruptedAtItsEnd:
+    def __del__(self) -> None:
+        raise KeyboardInterrupt
+
+
+def test_an_interrupt_where_python_ignores_exceptions_comes_again(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(_: object) -> list[object]:
+        _InterruptedAtItsEnd()
+        time.sleep(1.0)
+        return []
+
+    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
+    assert main(["run", "paper/fig03"]) == 130
+    assert capsys.readouterr().err.startswith("interrupted; ")
