@@ -150,9 +150,12 @@ def largest_seen(verdicts: Sequence[Verdict]) -> list[Verdict]:
 
 
 def margins(verdicts: Sequence[Verdict]) -> TextTable:
-    """For every check, method and bound: the largest value that was seen, the bound, their ratio, and where."""
+    """For every check, method and bound: the largest value that was seen, the bound, their ratio, and where.
+
+    Without the verdicts on the bounds themselves: of those nothing is seen.
+    """
     rows = []
-    for one in largest_seen(verdicts):
+    for one in largest_seen([one for one in verdicts if one.check != "bound"]):
         ratio = f"{one.margin:.3g}" if math.isfinite(one.margin) else "-"
         texts = (one.check, one.method, f"{one.value:.2e}", f"{one.bound:.2e}", ratio, f"{one.scene} {one.channel}")
         rows.append(tuple(map(printable, texts)))

@@ -122,6 +122,8 @@ def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
     elsewhere = Condition(of=of("range", scene="paper/fig12"), relation=">", bound=0.5)
     with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t))])) as results:
         assert claims(results.scenes, [claim(elsewhere), claim(holds, elsewhere)]) == []
+        number_elsewhere = number("max", 1.0).model_copy(update={"of": of("max", scene="paper/fig12")})
+        assert claims(results.scenes, [number_elsewhere]) == []
         # One that fails decides, whatever the others would say.
         assert [one.printed.holds for one in claims(results.scenes, [claim(fails, elsewhere)])] == [False]
 

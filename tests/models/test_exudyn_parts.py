@@ -152,6 +152,15 @@ def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None
     assert said.out == said.err == ""
 
 
+@pytest.mark.parametrize("name", [n for n in METHODS if "chain" in n])
+def test_a_solve_that_fails_is_counted_to_the_last_step_that_it_took(name) -> None:
+    """The kink of the torque comes after it, and makes another interval, which is not begun."""
+    kinked = replace(SINGULAR, rotor_torque=((0.0, 0.0), (0.5, 0.0), (1.0, 1.0)))
+    found = solve(name, kinked, {"step": 1e-3}).integration
+    assert found.time_reached < 0.1
+    assert found.time_reached == pytest.approx(1e-3 * found.steps, rel=1e-9)
+
+
 def test_a_failed_solve_leaves_the_next_alone() -> None:
     good = replace(FIG11, duration=0.1, samples=11)
     before = solve(CHAIN, good, {}).trajectory
@@ -171,6 +180,8 @@ def test_counts_of_steps_and_evaluations() -> None:
     scene = replace(FIG11, duration=0.1, samples=11)
     rk44 = solve("exudyn_tree/rk44", scene, {"step": 3e-3}).integration
     assert (rk44.steps, rk44.rhs_evaluations) == (40, 160)  # four steps of at most 3 ms in each 10 ms
+    rk67 = solve("exudyn_tree/rk67", scene, {"step": 3e-3}).integration
+    assert (rk67.steps, rk67.rhs_evaluations, rk67.time_reached) == (40, 280, 0.1)
     alpha = solve(CHAIN, scene, {"step": 1e-3}).integration
     assert alpha.steps == 100
     assert alpha.rhs_evaluations >= 200

@@ -94,6 +94,7 @@ def test_margins_are_a_table_of_seen_bound_and_ratio(good: Path, capsys: pytest.
     seen, bound, ratio, scene, channel = rows["agreement", METHOD]
     assert float(ratio) == pytest.approx(float(bound) / float(seen), rel=0.02)
     assert (scene.split("/")[0], channel) == ("check", "angles")
+    assert verdict_formats.margins(check.judge_bounds(load_bounds())).rows == []
 
 
 @pytest.mark.parametrize(

@@ -52,8 +52,10 @@ EQUIVALENT = {
     r"timetable\.integration_intervals .*end - start scaled": "rounded to a whole number of intervals",
     r"mjcf\.model .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
     r"mjcf\.model .*0\.0 -> 1\.0": "the centre of mass of a hub that has no mass",
-    r"timetable\._line .*(start - t0|slope \* \(start)": "a segment starts at a row of the one table there is: zero",
-    r"timetable\.intervals .*(0\.5 \* \(start \+ end\)|right side of start \+ end) scaled": (
+    r"mujoco.timetable\._line .*(start - t0|slope \* \(start)": (
+        "a segment starts at a row of the one table there is: zero"
+    ),
+    r"mujoco.timetable\.intervals .*(0\.5 \* \(start \+ end\)|right side of start \+ end) scaled": (
         "any instant inside the interval determines its segment"
     ),
     r"literal\.fixed_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:48: .* q2 \+ phase)": (
@@ -77,6 +79,17 @@ EQUIVALENT = {
         "without pitch inertia the products of inertia that would be divided are zero, too"
     ),
     r"judgement\.allowed_of .*and, or in angle is None": "a method has a bound for both or for neither",
+    r"ode_solvers\.right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
+    r"ode_solvers\.scipy_integrator .*reached > done: always": "no rows are added to the rows",
+    r"ode_solvers\.__init__ .*0\.0 -> |taylor\.build_system .*work_is_integrated\(scene\): always": (
+        "the work of constant torques is integrated, too, where it is known from the angles"
+    ),
+    r"samples\.loads_at(_start)? .*0\.0 -> ": "a constant load is the same at any time",
+    r"taylor\.equation_numbers .*0\.0 -> ": "takes a place that the next line fills",
+    r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\._OLD_JACOBIAN_FROM |adapter\._settings .*constraints": (
+        "decides how long a run takes, not what comes out"
+    ),
+    r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
 }
 # Then what is not the original and is not seen all the same.
@@ -84,14 +97,24 @@ UNSEEN = {
     r"energy\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
         "a tolerance in matching times: any between round-off and the distance of two rows does as well"
     ),
-    r"timetable\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
+    r"mujoco.timetable\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
+    r"ode_solvers\.ode45_integrator .*end - start|adapter\._schedule .*(0\.1 / |1\.0 - )": (
+        "keeps rounding from putting a sample past the end of its interval, in runs of thousands of intervals"
+    ),
+    r"ode45\._after_success .*0\.2 -> ": "where steps begin to grow fivefold at most, they grow as much by either rule",
+    r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
+    r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",
+    r"adapter\._count .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps: reported, judged by nothing",
+    r"adapter\._schedule .*1 -> 2": "a scheme that chooses its own steps makes the first one of the interval anyway",
+    r"adapter\._schedule .*(step is None|every_step)": "rows at every step or at every sample carry the work as well",
+    r"(ode_solvers|taylor)\..*deadline\.is_over": "the time limit of a run, which a run within it does not show",
 }
 EXPLAINED = {**EQUIVALENT, **UNSEEN}
 
 
 def _run(*arguments: str) -> list[dict[str, str]]:
     script = Path(__file__).parents[1] / "support" / "mutation.py"
-    done = subprocess.run([sys.executable, script, *arguments], capture_output=True, text=True, timeout=3000)
+    done = subprocess.run([sys.executable, script, *arguments], capture_output=True, text=True, timeout=6 * 3600)
     assert done.returncode == 0, done.stderr
     rows: list[dict[str, str]] = json.loads(done.stdout)
     return rows
@@ -103,8 +126,9 @@ def _unexplained(rows: list[dict[str, str]]) -> list[str]:
 
 
 def test_a_sample_of_mutants_is_noticed() -> None:
-    rows = _run("--every", "120")
-    assert len(rows) > 15
+    """Of the groups whose verdicts take a second; the others take part in the whole run."""
+    rows = _run("lagrange", "printed", "multibody", "chain", "mujoco", "rules", "ode45", "--every", "180")
+    assert len(rows) >= 14
     assert _unexplained(rows) == []
 
 
@@ -113,7 +137,7 @@ def test_every_mutant_is_noticed_or_explained() -> None:
     rows = _run()
     count = Counter((row["group"], row["noticed"] == "survived") for row in rows)
     print(f"{len(rows)} mutants: {dict(count)}")
-    assert len(rows) > 2000
+    assert len(rows) > 3500
     assert _unexplained(rows) == []
     survivors = [row["mutant"] for row in rows if row["noticed"] == "survived"]
     idle = [pattern for pattern in EXPLAINED if not any(re.search(pattern, name) for name in survivors)]

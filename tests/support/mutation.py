@@ -1,6 +1,6 @@
 """The mutation run: one change to the source at a time, and `check`'s own verdicts must notice.
 
-    python tests/support/mutation.py [GROUP...] [--every N] [--jobs N]
+    python tests/support/mutation.py [GROUP...] [--only PATTERN] [--every N] [--jobs N]
 
 Each mutant lives in a process of its own, forked from one that has the engines loaded: there the package is imported
 anew with one function's text changed, a small set of scenes is computed and judged as `check` does it, and the first
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import atexit
 import contextlib
 import copy
 import functools
@@ -24,6 +25,7 @@ import json
 import os
 import re
 import resource
+import shutil
 import sys
 import tempfile
 import time
@@ -35,10 +37,15 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-_CPU_LIMIT_S, _RUN_LIMIT_S = 15, 5.0  # of a mutant, whatever else the machine does, and of each run in it
+_CPU_LIMIT_S, _RUN_LIMIT_S = 25, 120.0  # of a mutant, whatever else the machine does; of each run by the clock
 # What is not imported anew for a mutant: what knows neither its module nor anything that does.
-_KEPT = {"rules": ("rotor_mbs.errors", "rotor_mbs.scenario")}
 _KEPT_ELSE = ("rotor_mbs.errors", "rotor_mbs.scenario", "rotor_mbs.solution")
+_KEPT = {
+    "rules": _KEPT_ELSE[:2],
+    "analysis": (*_KEPT_ELSE, "rotor_mbs.methods", "rotor_mbs.models", "rotor_mbs.execution", "rotor_mbs.store"),
+}
+# Here whole numbers count, arguments of calls, and conditions; elsewhere the terms of equations.
+_PROGRAMS = ("ode45", "schemes", "adapter", "integration", "reference", "analysis")
 
 
 @dataclass(frozen=True)
@@ -67,7 +74,7 @@ class Mutant:
 
 
 _M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
-_J = "rotor_mbs.models.mujoco"
+_J, _A = "rotor_mbs.models.mujoco", "rotor_mbs.analysis"
 _TARGETS = (
     Target(
         "lagrange", f"{_L}.closed_form", ("accelerations", "power", "rest_energy", "energies", "_kinetic", "point_path")
@@ -190,6 +197,26 @@ _TARGETS = (
         ),
         0.5,
     ),
+    # A thousandth: step rules and tableau; of a tableau's fractions any.
+    Target("ode45", "rotor_mbs.models.ode45", ("*",), 1e-3),
+    Target("schemes", f"{_M}.schemes", ("*",), 0.5),
+    Target(
+        "schemes", f"{_M}.methods", ("step", "_scheme", "_build_tree", "_build_chain", "__init__", "integrate"), 0.5
+    ),
+    Target(
+        "schemes", f"{_L}.methods", ("tolerance", "check_tolerance", "relative_tolerance", "absolute_tolerance"), 0.5
+    ),
+    Target("adapter", f"{_M}.adapter", ("*",), 0.5),
+    Target("integration", f"{_L}.ode_solvers", ("*",), 0.5),
+    Target("integration", f"{_L}.samples", ("over_segments", "loads_at", "loads_at_start", "at_constant_rests"), 0.5),
+    Target("integration", f"{_L}.taylor", ("*",), 0.5),
+    Target("reference", f"{_L}.reference", ("*",), 0.5),
+    Target("analysis", f"{_A}.exact", ("exact_rotor_angle", "_stays_at_zero_pitch", "_about_shaft", "_pendulum")),
+    Target("analysis", f"{_A}.kinematics", ("*",)),
+    Target("analysis", f"{_A}.verdicts", ("*",), 0.5),
+    Target("analysis", f"{_A}.run_integrity", ("*",), 0.5),
+    Target("analysis", f"{_A}.trajectory_numbers", ("*",), 0.5),
+    Target("analysis", f"{_A}.claims", ("*",), 0.5),
 )
 
 # An engine that is not installed has no mutants.
@@ -199,6 +226,13 @@ TARGETS = tuple(one for one in _TARGETS if one.group != "mujoco" or importlib.ut
 # What sees the mutants of a module that no verdict can see.
 _PARTS = "models/test_exudyn_parts.py::test_"
 _MUJOCO = "models/test_mujoco.py::test_"
+_PITCH = "models/test_pitch_loads.py::test_"
+_RULES = (
+    "solution/test_unchecked.py::test_a_wrong_motion_without_energy_and_reference_is_unchecked",
+    "solution/test_judgement.py::test_an_open_joint_is_caught",
+    "solution/test_unchecked.py::test_a_start_turns_away_leaves_ten_units_in_its_last_place_open",
+)
+_CHECK = "studies/test_check.py::test_"
 _TESTS = {
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
     f"{_M}.sensor_samples": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
@@ -217,8 +251,45 @@ _TESTS = {
         f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
         f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form",
     ),
-    "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py",),
-    f"{_M}.energy": (f"{_PARTS}cumulative_integral_is_exact_on_uneven_rows", "models/test_exudyn_work.py"),
+    "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py", *_RULES),
+    "rotor_mbs.solution.metrics": _RULES,
+    f"{_M}.energy": (
+        f"{_PARTS}cumulative_integral_is_exact_on_uneven_rows",
+        "models/test_exudyn_work.py",
+        f"{_PITCH}work_of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
+    ),
+    "rotor_mbs.models.ode45": ("models/test_ode45.py",),
+    f"{_M}.schemes": (f"{_PARTS}counts_of_steps_and_evaluations",),
+    f"{_M}.methods": (
+        f"{_PARTS}samples_the_engine_cannot_tell_apart_are_refused",
+        "models/test_loads.py::test_multipliers_of_rotation_vectors_are_refused",
+        "models/test_extrapolation.py::test_steps_are_those_of_all_runs_and_fit_each_other",
+    ),
+    f"{_M}.adapter": (
+        f"{_PARTS}counts_of_steps_and_evaluations",
+        f"{_PARTS}a_solve_that_fails_is_counted_to_the_last_step_that_it_took",
+        f"{_PARTS}samples_stand_exactly_at_their_times",
+        f"{_PARTS}ctrl_c_inside_a_solve_is_an_interrupt",
+        "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization",
+    ),
+    f"{_L}.ode_solvers": ("models/test_segments.py",),
+    f"{_L}.taylor": (
+        "models/test_segments.py::test_the_order_of_taylors_series_is_that_of_its_tolerance",
+        "models/test_lagrange.py::test_error_growth_is_that_of_neighbouring_runs",
+    ),
+    f"{_L}.samples": (
+        f"{_PITCH}work_of_a_constant_torque_and_of_a_constant_rest_angle[lagrange/dop853]",
+        f"{_PITCH}work_and_energy_of_a_step_of_the_command[lagrange/dop853]",
+        "models/test_segments.py",
+    ),
+    f"{_L}.reference": (
+        "models/test_lagrange.py::test_the_fallback_reference_states_its_uncertainty",
+        "studies/test_compare_data.py::test_the_reference_at_the_times_of_the_data_is_the_frozen_one",
+    ),
+    f"{_A}.exact": ("analysis/test_exact.py",),
+    f"{_A}.verdicts": (f"{_CHECK}a_tampered_run_fails", f"{_CHECK}a_touched_reference_in_the_file_fails"),
+    f"{_A}.trajectory_numbers": ("analysis/test_analysis.py",),
+    f"{_A}.claims": ("analysis/test_analysis.py",),
 }
 
 
@@ -243,17 +314,19 @@ def _source(module: str) -> str:
     return (ROOT / (module.replace(".", "/") + ".py")).read_text()
 
 
-Scope = ast.FunctionDef | ast.Assign
+Scope = ast.FunctionDef | ast.Assign | ast.AnnAssign
 
 
 def _scopes(tree: ast.Module) -> Iterator[tuple[str, Scope]]:
-    """Functions, methods and the module's constants."""
-    for node in ast.walk(tree):
+    """Functions, methods, the module's constants and its classes' defaults; of nested functions the outer one."""
+    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    for node in [*tree.body, *(inner for one in classes for inner in one.body)]:
         if isinstance(node, ast.FunctionDef):
             yield node.name, node
-    for node in tree.body:
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
             yield node.targets[0].id, node
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None:
+            yield node.target.id, node
 
 
 Change = Callable[[Any], Any]
@@ -310,7 +383,7 @@ def _changes(node: ast.AST, parents: Sequence[ast.AST], scope: Scope, target: Ta
         yield f"without {ast.unparse(node)[:60]}", lambda _: ast.Pass()
     elif isinstance(node, ast.Constant) and not isinstance(parents[-1], (ast.BinOp, ast.UnaryOp)):
         yield from _constant(node, parents, target)
-    if target.group == "rules":
+    if target.group in ("rules", *_PROGRAMS):
         yield from _logic(node, text)
 
 
@@ -382,8 +455,14 @@ def _constant(node: ast.Constant, parents: Sequence[ast.AST], target: Target) ->
     value, within = node.value, parents[-1]
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return
+    of_a_program = target.group in _PROGRAMS
     is_number = isinstance(within, (ast.Tuple, ast.List, ast.Return, ast.Assign, ast.IfExp, ast.Dict))
+    if of_a_program:
+        is_number |= isinstance(within, (ast.Call, ast.keyword, ast.Compare)) and getattr(within, "arg", "") != "axis"
     if not is_number and not (target.group == "rules" and isinstance(within, ast.Compare)):
+        return
+    if isinstance(value, int) and of_a_program:
+        yield f"{value} -> {value + 1}", lambda _: ast.Constant(value + 1)
         return
     if isinstance(value, int) and target.group != "printed":
         return
@@ -427,11 +506,13 @@ def _verdicts_of(group: str) -> Iterator[list[Any]]:
     from rotor_mbs.scenario.accuracy_bounds import load_bounds
     from rotor_mbs.studies import check, check_probes
 
-    if group in ("lagrange", "printed", "rules"):
-        kind = "rules" if group == "rules" else "printed"
-        probe = next(probe for probe in check_probes.probes() if probe.study == kind)
-        for one in check_probes.measure(probe):
-            yield [check.judge_measured(one, load_bounds())]
+    if group in ("schemes", "ode45"):
+        yield check.judge_defaults(load_bounds())
+    kinds = {"rules": ("rules",), "reference": ("reference",), "lagrange": ("printed",), "printed": ("printed",)}
+    for probe in check_probes.probes():
+        if probe.study in kinds.get(group, ()) and probe.scene.name != "paper/fig11":
+            for one in check_probes.measure(probe):
+                yield [check.judge_measured(one, load_bounds())]
     batches = {
         "lagrange": [(("check/held",), "lagrange/dop853"), (("check/general",), "lagrange/dop853"),
                      (("check/pitch-loads",), "lagrange/dop853")],
@@ -445,13 +526,36 @@ def _verdicts_of(group: str) -> Iterator[list[Any]]:
                   (("check/pitch-loads",), "exudyn_chain/generalized_alpha")],
         "mujoco": [(("check/held",), "mujoco/rk4"), (("check/general",), "mujoco/rk4"),
                    (("check/pitch-loads",), "mujoco/rk4")],
-        "rules": [],
+        "ode45": [(("check/held", "check/general"), "lagrange/ode45"), (("paper/fig05",), "printed/ode45")],
+        "schemes": [(("check/loads",), "exudyn_tree/rk67"), *[(("check/held",), method) for method in (
+            "exudyn_tree/rk44", "exudyn_tree/dopri5", "exudyn_tree/generalized_alpha",
+            "exudyn_chain/generalized_alpha", "exudyn_chain/newmark_index2", "lagrange/dop853")]],
+        "adapter": [(("check/held", "check/loads"), "exudyn_tree/rk67"), (("check/pitch-loads",), "exudyn_tree/dopri5"),
+                    (("check/held", "check/loads"), "exudyn_chain/generalized_alpha")],
+        "integration": [(("check/held", "check/general", "check/pitch-loads"), method) for method in (
+            "lagrange/taylor", "lagrange/dop853", "lagrange/ode45")],
     }  # fmt: skip
     from support.checking import judged, results_file
 
-    for scenes, method in batches[group]:
+    if group == "analysis":
+        yield judged(_good_file())
+    for scenes, method in batches.get(group, ()):
         with tempfile.TemporaryDirectory() as folder:
             yield judged(results_file(Path(folder) / "mutant.h5", scenes, [method], _RUN_LIMIT_S))
+
+
+@functools.cache
+def _good_file() -> Path:
+    """Runs of every kind of verdict; made once, before the first mutant."""
+    from support.checking import results_file
+
+    path = Path(tempfile.mkdtemp()) / "good.h5"
+    atexit.register(shutil.rmtree, path.parent)
+    results_file(path, ["check/held", "check/general", "check/pitch-loads", "check/loads"],
+                 ["lagrange/dop853", "exudyn_tree/rk67"])  # fmt: skip
+    results_file(path, ["paper/fig03", "paper/fig04b", "paper/fig05", "paper/fig06", "paper/fig15-100kNm"],
+                 ["lagrange/dop853", "printed/ode45"])  # fmt: skip
+    return results_file(path, ["paper/fig11", "paper/fig13b"], ["printed/ode45"])
 
 
 class _Changed(importlib.machinery.SourceFileLoader):
@@ -502,11 +606,22 @@ def _verdict_that_fails(mutant: Mutant) -> str:
     return ""
 
 
+class _FirstFailure:
+    """Which test failed first."""
+
+    name = ""
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self.name = self.name or (report.nodeid if report.failed else "")
+
+    pytest_collectreport = pytest_runtest_logreport  # a module that cannot be imported
+
+
 def _test_that_fails(module: str) -> str:
-    for test in _TESTS.get(module, ()):
-        if pytest.main(["-q", "-p", "no:cacheprovider", str(ROOT / "tests" / test)]) == pytest.ExitCode.TESTS_FAILED:
-            return f"test: {test}"
-    return ""
+    tests, first = [str(ROOT / "tests" / test) for test in _TESTS.get(module, ())], _FirstFailure()
+    if tests:
+        pytest.main(["-q", "-x", "-p", "no:cacheprovider", *tests], [first])
+    return f"test: {first.name}" if first.name else ""
 
 
 def _in_a_child(mutant: Mutant) -> tuple[int, int]:
@@ -524,6 +639,8 @@ def _in_a_child(mutant: Mutant) -> tuple[int, int]:
 
 def prove_control(target: Target) -> None:
     """Raises SystemExit where a module with its own text, imported anew like a mutant, does not pass every verdict."""
+    if target.group == "analysis":
+        _good_file()
     unchanged = Mutant(target.group, target.module, "*", "unchanged", lambda: _source(target.module))
     process = os.fork()
     if not process:
@@ -547,44 +664,36 @@ def run(chosen: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
             yield mutant, answer.read() or "did not end, or took its process with it"
 
 
-def all_mutants(groups: Sequence[str] = (), every: int = 1) -> list[Mutant]:
+def all_mutants(groups: Sequence[str] = (), every: int = 1, only: str = "") -> list[Mutant]:
     found = [mutant for target in TARGETS if not groups or target.group in groups for mutant in mutants(target)]
-    return found[::every]
+    return [mutant for mutant in found if re.search(only, mutant.name)][::every]
 
 
 def warm_up() -> None:
-    """Loads the engines, and proves that without a change every verdict passes."""
+    """Loads the engines and what else is not imported anew."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
-    importlib.import_module("rotor_mbs.models.exudyn.adapter")
-    if importlib.util.find_spec("mujoco"):
-        importlib.import_module("mujoco")
     for name in (
-        "scipy.integrate",
-        "scipy.special",
-        "h5py",
-        "rotor_mbs.scenario.schema",
-        "rotor_mbs.scenario.scene_file",
-    ):
-        importlib.import_module(name)
-    for group in dict.fromkeys(target.group for target in TARGETS):
-        with contextlib.redirect_stderr(io.StringIO()):
-            failed = [v for verdicts in _verdicts_of(group) for v in verdicts if not v.passed]
-        if failed:
-            raise SystemExit(f"without a change, already: {failed[0]}")
+        "rotor_mbs.models.exudyn.adapter", "mujoco", "heyoka", "scipy.integrate", "scipy.special", "h5py",
+        "rotor_mbs.scenario.schema", "rotor_mbs.scenario.scene_file",
+    ):  # fmt: skip
+        if importlib.util.find_spec(name):
+            importlib.import_module(name)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Mutants of the models and rules, and which verdict notices each.")
-    parser.add_argument("groups", nargs="*", metavar="GROUP", help="lagrange, printed, multibody, chain, mujoco, rules")
+    parser.add_argument("groups", nargs="*", metavar="GROUP", help="such as lagrange, rules, ode45")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th mutant alone")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="at a time (default: %(default)s)")
+    parser.add_argument("--only", default="", metavar="PATTERN", help="those alone whose name has it")
     arguments = parser.parse_args()
-    warm_up()
-    for target in {target.group: target for target in TARGETS}.values():
-        prove_control(target)
     start = time.monotonic()
+    warm_up()
+    chosen = all_mutants(arguments.groups, arguments.every, arguments.only)
+    for group in dict.fromkeys(mutant.group for mutant in chosen):
+        prove_control(next(target for target in TARGETS if target.group == group))
     rows = []
-    for mutant, noticed in run(all_mutants(arguments.groups, arguments.every), arguments.jobs):
+    for mutant, noticed in run(chosen, arguments.jobs):
         rows.append({"mutant": mutant.name, "group": mutant.group, "noticed": noticed})
         if noticed == "survived":
             print(f"survived: {mutant.name}", file=sys.stderr, flush=True)

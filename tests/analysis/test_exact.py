@@ -1,0 +1,56 @@
+"""Exact solutions against Lagrange's equations typed anew, and where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support import other_code
+from support.scenes import paper
+
+from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.scenario.scene import Scene
+
+ONE, THREE = paper("fig03", hub_inertia=1e6), paper("fig05", hub_inertia=1e6)
+TURNING: dict[str, Any] = {"initial_rates": (0.5, 0.0, 0.0, 0.0)}
+KNOWN = {
+    "pendulum": ONE,
+    "rest": THREE,
+    "uniform rotation": replace(THREE, **TURNING),
+    "constant torque": replace(THREE, **TURNING, rotor_torque=((0.0, 1e5),)),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_exact_solutions_are_those_of_the_equations(name: str) -> None:
+    time = np.linspace(0.0, 5.0, 51)
+    found = exact_rotor_angle(KNOWN[name], time)
+    assert found is not None
+    assert found[0] == name
+    # DOP853 at a relative tolerance of 1e-11 over some hundred steps.
+    assert found[1] == pytest.approx(other_code.trajectory(KNOWN[name], time)[0][:, 0], abs=1e-8)
+
+
+_BLADE = THREE.blades[0]
+UNKNOWN = {
+    "a pitch that starts": replace(THREE, initial_angles=(0.5, 0.0, 0.1, 0.0)),
+    "a pitch that moves": replace(THREE, initial_rates=(0.0, 0.0, 0.1, 0.0)),
+    "a torque on a pitch": replace(THREE, pitch_torque=((), ((0.0, 1.0),), ())),
+    "a damped rotor": replace(THREE, shaft_damping=1.0),
+    "a blade heavier than the others": replace(THREE, blades=(*THREE.blades[:2], replace(_BLADE, mass=1.0))),
+    "a torque over time": replace(THREE, rotor_torque=((0.0, 0.0), (1.0, 5.0))),
+    "a centre of mass off the plane": replace(THREE, blades=(replace(_BLADE, centre_of_mass=(0.1, 0.1, 15.0)),) * 3),
+    "products of inertia": replace(THREE, blades=(replace(_BLADE, inertia=(9.0, 9.0, 9.0, 1.0, 0.0, 0.0)),) * 3),
+    "and others": replace(THREE, blades=(replace(_BLADE, inertia=(9.0, 9.0, 9.0, 0.0, 0.0, 1.0)),) * 3),
+    "a driven pendulum": replace(ONE, rotor_torque=((0.0, 5.0),)),
+    "a thrown pendulum": replace(ONE, initial_rates=(0.1, 0.0)),
+    "a pendulum without gravity": replace(ONE, gravity=0.0),
+    "a pendulum turns away": replace(ONE, initial_angles=(20.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("scene", UNKNOWN.values(), ids=UNKNOWN)
+def test_elsewhere_no_exact_solution_is_claimed(scene: Scene) -> None:
+    assert exact_rotor_angle(scene, np.linspace(0.0, 1.0, 3)) is None

@@ -1,0 +1,132 @@
+"""Integrators over the segments of the loads: what is counted, where a run ends, the unit that its work counts in."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from support.scenes import ARM, MASS, OFFSET, paper
+
+from rotor_mbs.methods import time_limit
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
+from rotor_mbs.models.lagrange.parameters import LoadSegment
+from rotor_mbs.models.lagrange.samples import Advance, over_segments
+
+TIMES = np.linspace(0.0, 3.0, 7)
+SEGMENTS = [LoadSegment(start, start + 1.0, ()) for start in (0.0, 1.0, 2.0)]
+
+
+def advanced(message: str = "", evaluations: int | None = 5) -> tuple[Any, Any]:
+    """A run of which every segment takes two steps and ends one higher; `message`: why the second one fails."""
+
+    def advance(segment: LoadSegment, state: Any, times: Any) -> Advance:
+        failed = message if segment.start == 1.0 else ""
+        rows = (state + times[:, None] - segment.start)[: 1 if failed else None]
+        return Advance(rows, state + 1.0, 2, evaluations, failed)
+
+    return over_segments(TIMES, SEGMENTS, np.zeros(1), advance)
+
+
+def test_a_run_has_the_steps_and_evaluations_of_all_its_segments() -> None:
+    states, found = advanced()
+    assert states[:, 0].tolist() == TIMES.tolist()
+    assert (found.success, found.time_reached, found.steps, found.rhs_evaluations) == (True, 3.0, 6, 15)
+    assert advanced(evaluations=None)[1].rhs_evaluations is None
+
+
+def test_a_run_ends_in_the_segment_that_fails() -> None:
+    states, found = advanced("no step is short enough")
+    assert (found.success, found.out_of_time, found.time_reached, found.steps) == (False, False, 1.5, 4)
+    assert len(states) == 4
+    assert advanced(time_limit.message())[1].out_of_time
+
+
+INTEGRATORS = {
+    "DOP853": scipy_integrator("DOP853", 1e-9, 1e-12),
+    "Radau": scipy_integrator("Radau", 1e-6, 1e-9),
+    "ode45": ode45_integrator(1e-9, 1e-12),
+}
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_every_evaluation_is_counted(name: str) -> None:
+    calls = []
+
+    def decay(time: float, state: Any) -> list[float]:
+        calls.append(time)
+        return [-state[0]]
+
+    found = INTEGRATORS[name](decay, 1.0, 3.0, np.ones(1), np.array([1.5, 2.0, 3.0]))
+    # Radau's differences of the right-hand side for its Jacobian are no steps of it; SciPy does not count them.
+    assert found.evaluations == len(calls) or (name == "Radau" and found.evaluations < len(calls))
+    assert found.states[:, 0] == pytest.approx(np.exp(-np.array([0.5, 1.0, 2.0])), rel=1e-5)
+    assert found.end[0] == pytest.approx(math.exp(-2.0), rel=1e-5)
+    assert not found.message
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_a_motion_that_ends_is_a_run_that_says_why(name: str) -> None:
+    """1 / (1 - t) at t = 1."""
+    found = INTEGRATORS[name](lambda _, y: [y[0] * y[0]], 0.0, 2.0, np.ones(1), np.array([0.5, 1.5]))
+    assert len(found.states) == 1
+    assert "step size" in found.message
+
+
+def test_a_start_that_is_no_number_is_a_run_without_steps() -> None:
+    found = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.array([np.nan]), np.array([1.0]))
+    assert (found.steps, found.evaluations, len(found.states)) == (0, 0, 0)
+    assert found.message.startswith("SciPy: ")
+
+
+def test_a_time_limit_ends_a_run_between_two_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time_limit, "is_over", lambda: True)
+    found = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.ones(1), np.array([1.0]))
+    assert found.message == time_limit.message()
+
+
+def test_a_solver_at_chosen_times_has_those() -> None:
+    """A rotor that turns uniformly."""
+    times = np.array([0.0, 0.3, 1.7])
+    scene = paper("fig06", gravity=0.0, initial_rates=(0.5, 0.0, 0.0, 0.0))
+    solver = OdeSolver(scene, INTEGRATORS["DOP853"], times)
+    assert solver.integrate().success
+    found = solver.observe()
+    assert found.time.tolist() == times.tolist()
+    assert found.angles[:, 0] == pytest.approx(scene.initial_angles[0] + 0.5 * times, abs=1e-9)
+
+
+@pytest.mark.parametrize("tolerance", [None, 1e-13, 1e-9])
+def test_the_order_of_taylors_series_is_that_of_its_tolerance(tolerance: float | None) -> None:
+    """⌈1 - ln(tol) / 2⌉: A. Jorba, M. Zou, Exp. Math. 14 (2005). At round-off neither errors nor steps show it."""
+    pytest.importorskip("heyoka")
+    method = find_method("lagrange/taylor")
+    solver: Any = method.build(
+        paper("fig03"), method.settings.of(method.name, {"tolerance": tolerance} if tolerance else {})
+    )
+    expected = math.ceil(1.0 - 0.5 * math.log(tolerance or np.finfo(float).eps))
+    assert solver._propagation._integrator.order == expected
+
+
+def _work_unit(weight: float, kinetic: float, torque: float) -> float:
+    """Of a scene with these energies (J) and torque (N m)."""
+    arm = math.hypot(OFFSET, ARM)
+    return work_unit(
+        paper(
+            "fig03",
+            gravity=weight / (MASS * arm),
+            initial_rates=(math.sqrt(2.0 * kinetic / MASS) / arm, 0.0),
+            rotor_torque=((0.0, torque),) if torque else (),
+        )
+    )
+
+
+def test_the_unit_of_work_is_of_the_size_of_the_energies() -> None:
+    """The power of two below their sum, and 1 where there is none that counts."""
+    for part in ((1.2e6, 0.0, 0.0), (0.0, 1.2e6, 0.0), (0.0, 0.0, 1.2e6), (4e5, 4e5, 4e5)):
+        assert _work_unit(*part) == 2.0**20
+    assert _work_unit(9e5, 9e5, 9e5) == 2.0**21
+    assert _work_unit(0.0, 0.0, 0.0) == _work_unit(0.0, 0.0, 0.7) == _work_unit(0.0, 0.0, 1.5) == 1.0
+    assert _work_unit(0.0, 0.0, 2.5) == 2.0
