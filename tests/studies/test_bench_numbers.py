@@ -194,8 +194,8 @@ def test_the_overview_names_the_fastest_and_the_next_and_says_so_in_words() -> N
     rows = overview_table(scenes, {"a": "a.html", "b": "b.html"}).rows
     seen = [[(cell.text.replace("\N{NO-BREAK SPACE}", " "), cell.note) for cell in row] for row in rows]
     assert [row[0].href for row in rows] == ["a.html", "b.html"]
-    assert seen[0][2] == ("closed form, Taylor: 2.0 ms", "then Exudyn tree, RK67, 5.0 times as long")
-    assert seen[1][2] == ("Exudyn tree, RK67: 10 ms", "then closed form, Taylor, 2.0 times as long")
+    assert seen[0][2] == ("closed form, Taylor (lagrange/taylor): 2.0 ms", "then Exudyn tree, RK67, 5.0 times as long")
+    assert seen[1][2] == ("Exudyn tree, RK67 (exudyn_tree/rk67): 10 ms", "then closed form, Taylor, 2.0 times as long")
     assert seen[0][3][1] == "no other gets there"
     words = [sentence.replace("\N{NO-BREAK SPACE}", " ") for sentence in overview(scenes)]
     assert len(words) == 3
