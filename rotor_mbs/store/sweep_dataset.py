@@ -84,7 +84,8 @@ def _stored_runs(file: Any) -> tuple[RunColumns, NDArray[np.int8], NDArray[np.in
     row = np.dtype([(name, file[name].dtype, file[name].shape[1:]) for name in names])
     offsets = {name: file[name].id.get_offset() for name in names}
     path, marked = Path(file.filename), hdf5.values_of(file["status"])
-    runs = RunColumns(path, path.stat().st_ino, int(file["run"][0]), offsets, row)
+    first = int(file["run"][0]) if len(marked) else 0  # of a part without runs
+    runs = RunColumns(path, path.stat().st_ino, first, offsets, row)
     return runs, marked, runs.stored(marked)
 
 

@@ -186,6 +186,12 @@ def test_a_sweep_that_stored_nothing_leaves_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_part_without_runs_has_nothing_missing(tmp_path: Path) -> None:
+    sweep, methods, _, facts = _layout()
+    with open_sweep(tmp_path / "s.h5", sweep, methods, range(3, 3), facts) as (_, statuses):
+        assert not len(statuses)
+
+
 def test_lost_runs_say_why(tmp_path: Path) -> None:
     layout, path = _layout(), tmp_path / "s.h5"
     with _opened(path, layout) as (runs, _missing):
