@@ -26,9 +26,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             with _ended_in_order():
                 status = _run(words)
             sys.stdout.flush()
-        except (KeyboardInterrupt, SystemError) as exc:
-            # Inside compiled code of a library an interrupt may become a SystemError that it is the cause of.
-            if not isinstance(exc, KeyboardInterrupt) and not isinstance(exc.__cause__, KeyboardInterrupt):
+        except (KeyboardInterrupt, SystemError, ImportError) as exc:
+            if not _is_interrupt(exc):
                 raise
             show("interrupted; what was finished is kept, the same command goes on from there", sys.stderr)
             return EXIT_INTERRUPTED
@@ -42,18 +41,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
 
 
+def _is_interrupt(error: BaseException) -> bool:
+    """Inside compiled code of a library, or while it loads, an interrupt becomes the cause of another error."""
+    found: BaseException | None = error
+    while found is not None and not isinstance(found, KeyboardInterrupt):
+        found = found.__cause__ or found.__context__
+    return found is not None
+
+
 def _run(words: Sequence[str]) -> int:
     from rotor_mbs.cli.arguments import parse
 
     arguments: Namespace = parse(words)
     try:
         return int(arguments.command(arguments))
-    except (InputError, MethodRefusal, StoreError) as exc:
-        show(str(exc), sys.stderr)
-        return EXIT_BAD_INPUT
     except RotorError as exc:
+        if _is_interrupt(exc):
+            raise KeyboardInterrupt from exc
         show(str(exc), sys.stderr)
-        return EXIT_FAILED
+        return EXIT_BAD_INPUT if isinstance(exc, InputError | MethodRefusal | StoreError) else EXIT_FAILED
     except MemoryError as exc:
         show(f"not enough memory: {exc}" if str(exc) else "not enough memory", sys.stderr)
         return EXIT_FAILED

@@ -9,6 +9,7 @@ import pytest
 
 from rotor_mbs.cli import main
 from rotor_mbs.cli.terminal import ProgressLine, coloured, has_colour
+from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Outcome, Result
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -76,13 +77,14 @@ def test_an_estimate_counts_what_comes_after_the_cases() -> None:
         assert "pages 5/10" in screen.getvalue()
 
 
+@pytest.mark.parametrize("error", [SystemError, ImportError, MethodRefusal])
 def test_an_interrupt_inside_compiled_code_is_an_interrupt(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    error: type[Exception], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """h5py's locks make a SystemError of it."""
+    """h5py's locks make a SystemError of it, loading an engine an ImportError, which may be taken for a lack."""
 
     def interrupted(_: object) -> None:
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+        raise error("initialization failed") from KeyboardInterrupt()
 
     monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
     assert main(["run", "paper/fig03"]) == 130
