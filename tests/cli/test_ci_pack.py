@@ -32,10 +32,10 @@ def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def loosened(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same run at a longer step: its error grows by orders of magnitude and stays below the bounds."""
+    """The same run at a longer step: its energy drift grows thirtyfold and stays below its bound."""
     path = tmp_path_factory.mktemp("loosened") / "results.h5"
     scene = shipped(SCENE)
-    run_scenes([scene], {SCENE: [METHOD]}, path, workers=0, timeout_s=60.0, settings={"step": 0.004})
+    run_scenes([scene], {SCENE: [METHOD]}, path, workers=0, timeout_s=60.0, settings={"step": 0.006})
     return path
 
 
