@@ -51,9 +51,11 @@ def compare_ensembles(
     second: str,
     sizes: tuple[int, int],
     settings: Mapping[str, object],
+    samples: int = 2,
 ) -> Iterator[ChannelDistance]:
-    """Two methods on starts of their own; settings: of the second method, in place of its defaults."""
-    yield from compare_samples(ensemble(scene, first, sizes[0], 1), ensemble(scene, second, sizes[1], 2, settings))
+    """Two methods on starts of their own; settings, samples: of the second method, in place of its defaults."""
+    other = ensemble(scene, second, sizes[1], 2, settings, samples)
+    yield from compare_samples(ensemble(scene, first, sizes[0], 1), other)
 
 
 def compare_samples(one: Mapping[str, Array], other: Mapping[str, Array]) -> Iterator[ChannelDistance]:
@@ -79,15 +81,19 @@ def ensemble(
     count: int,
     seed: int,
     settings: Mapping[str, object] | None = None,
+    samples: int = 2,
 ) -> dict[str, Array]:
-    """By channel, (count,) values at the end of runs from starts around the scene's; NaN of a run that broke off."""
+    """By channel, (count,) values at the end of runs from starts around the scene's; NaN of a run that broke off.
+
+    samples   of a run: an adaptive method of Exudyn tries the interval between two as its first step
+    """
     random = np.random.default_rng(seed)
-    base = replace(scene, samples=2, outputs=("angles", "rates", "tip", "energy"))
+    base = replace(scene, samples=samples, outputs=("angles", "rates", "tip", "energy"))
     rows = []
     for offset in random.uniform(-SPREAD, SPREAD, (count, len(scene.initial_angles))):
         angles = tuple(float(angle) for angle in np.array(scene.initial_angles) + offset)
         run = solve(method, replace(base, initial_angles=angles), settings or {})
-        rows.append(_at_the_end(run.trajectory, complete=len(run.time) == 2))
+        rows.append(_at_the_end(run.trajectory, complete=len(run.time) == samples))
     tips = [f"tip {blade + 1} along the shaft" for blade in range(len(scene.blades))]
     names = [*scene.coordinate_labels, "rotor rate", "kinetic energy", *tips]
     return dict(zip(names, np.array(rows).T, strict=True))
