@@ -27,6 +27,7 @@ _DASHES = {"--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
 _ANCHORS = {"left": "start", "right": "end", "center": "middle"}
 _EDGE = 3.0  # points around the axes in which markers and wide lines may stand out
 _FONT = 9.5
+_LETTER = 5.3  # points, the mean width of a letter
 _SHADES = 16  # of a map
 
 
@@ -117,9 +118,13 @@ class _Page:
         if x_shown and (label := _label(axes.xaxis)):
             yield _words((0.5 * (left + right), bottom + 26.0), label, "middle")
         if label := _label(axes.yaxis):
-            x, y = _short(left - 46.0), _short(0.5 * (top + bottom))
-            turned = f'transform="translate({x} {y})rotate(-90)" text-anchor="middle"'
-            yield f"<text {turned}>{escape(label)}</text>"
+            name, bracket, unit = label.partition(" (")
+            # In two lines where the panel is not as high as the label is long.
+            lines = [name, f"({unit}"] if bracket and _LETTER * len(label) > bottom - top else [label]
+            for i, line in enumerate(lines):
+                x, y = left - 46.0 + 5.0 * (2 * i + 1 - len(lines)), 0.5 * (top + bottom)
+                turned = f'transform="translate({_short(x)} {_short(y)})rotate(-90)" text-anchor="middle"'
+                yield f"<text {turned}>{escape(line)}</text>"
         for place, x in (("left", left), ("center", 0.5 * (left + right))):
             if axes.get_title(loc=place):
                 yield _words((x, top - 6.0), axes.get_title(loc=place), _ANCHORS[place])
@@ -233,12 +238,14 @@ def _ticks(axis: Any) -> tuple[Array, Sequence[str]]:
 
 
 def _label(axis: Any) -> str:
-    """The axis' label, with what its tick labels leave out: "angle (10⁻³ rad)" where they are to be times 1e-3."""
-    label, offset = str(axis.get_label_text()), str(axis.get_major_formatter().get_offset())
-    factor = re.fullmatch(r"1e([-−]?\d+)", offset)
-    if factor and "(" in label:
-        return label.replace("(", f"({power(int(factor[1].replace('−', '-')))}{SPACE}", 1)
-    return f"{label} {offset}".strip()
+    """The axis' label, with what its tick labels leave out: "rate − 0.3 (10⁻³ rad/s)" for 0.3 and times 1e-3."""
+    label, offset = str(axis.get_label_text()), str(axis.get_major_formatter().get_offset()).replace("−", "-")
+    found = re.fullmatch(r"(?:1e(-?\d+))?([-+].+)?", offset)
+    if found is None or "(" not in label:
+        return f"{label} {offset}".strip()
+    name, unit = label.split("(", 1)
+    shift = f"{'−' if float(found[2]) > 0.0 else '+'} {abs(float(found[2])):g} " if found[2] else ""
+    return f"{name}{shift}({power(int(found[1])) + SPACE if found[1] else ''}{unit}"
 
 
 def _text(place: Array, words: str, text: Any) -> str:

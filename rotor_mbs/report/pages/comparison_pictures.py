@@ -93,8 +93,9 @@ def _parting_text(runs: Sequence[StoredRun], parted: float | None, largest: floa
     if len(runs) < 2:
         return f"{with_capital(label_of(runs[0].method))}: angles over time."
     if parted is None:
-        return f"Printed and corrected model never differ visibly: by {with_unit(largest, 'rad')} at most."
-    return f"The models part visibly {at_time(parted)}; their angles differ by up to {with_unit(largest, 'rad')}."
+        return f"Printed and corrected model never differ by {VISIBLE:g} rad: by {with_unit(largest, 'rad')} at most."
+    most = with_unit(largest, "rad")
+    return f"The models are {VISIBLE:g} rad apart {at_time(parted)}; their angles differ by up to {most}."
 
 
 def _published_texts(claims: Sequence[Claim], shown: Sequence[int]) -> list[str]:

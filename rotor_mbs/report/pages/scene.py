@@ -136,17 +136,16 @@ def _lead(drawn: DrawnRuns) -> list[str]:
         gain = metric(printed, "energy_gain_J")
         energy = "" if gain is None else f"; its energy rises by up to {prefixed(gain, 'J')}"
         parted = _parted(drawn)
-        when = "" if parted is None else f"visibly {comparison_pictures.at_time(parted)}, and "
-        found.append(
-            f"The printed model departs from the reference {when}by up to {with_unit(departure, 'rad')}{energy}."
-        )
+        most = f"by up to {with_unit(departure, 'rad')}{energy}."
+        if parted is not None:
+            most = f"{comparison_pictures.at_time(parted)} by {comparison_pictures.VISIBLE:g} rad, in the end {most}"
+        found.append(f"The printed model departs from the reference {most}")
     runs = [run for run in run_selection.corrected_runs(drawn.scene).values() if run.status == "ok"]
-    errors = [error for run in runs if (error := metric(run, "angle_error_max")) is not None]
+    errors = {label_of(run.method): error for run in runs if (error := metric(run, "angle_error_max")) is not None}
     if errors and drawn.horizon is not None:
-        found.append(
-            f"Up to the horizon, {with_unit(drawn.horizon, 's', 3)}, the corrected models agree with the reference to "
-            f"within {with_unit(max(errors), 'rad')}."
-        )
+        each = ", ".join(f"{label} {with_unit(error, 'rad')}" for label, error in errors.items())
+        horizon = with_unit(drawn.horizon, "s", 3)
+        found.append(f"Corrected models are off the reference, up to the horizon at {horizon}, by: {each}.")
     return found
 
 

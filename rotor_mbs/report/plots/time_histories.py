@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
+from rotor_mbs.report.core.numbers import power
 
 Array = NDArray[Any]
 
@@ -146,7 +148,12 @@ def error_over_step(series: Sequence[tuple[Array, Array, Look]], target: float) 
             steps, shown, color=look.colour, linestyle=look.line, marker=look.marker, markersize=4.2,
             markerfacecolor="white",
         )  # fmt: skip
+    every_step = np.concatenate([steps for steps, _, _ in series])
+    low, high = math.floor(math.log10(every_step.min())), math.ceil(math.log10(every_step.max()))
+    decades = range(low, max(high, low + 1) + 1)
     axes.set_xscale("log")
+    axes.set_xticks([10.0**e for e in decades], [power(e) for e in decades])
+    axes.set_xticks([], minor=True)
     canvas.log_axis(axes, min(known), max(known))
     axes.axhline(target, color=GREY, linewidth=0.8, linestyle=":")
     axes.set_ylabel("largest angle error (rad)")
