@@ -50,6 +50,19 @@ def test_row_sums_are_the_nodes():
     assert [sum(row) for row in A] == C
 
 
+def test_stages_are_evaluated_at_their_nodes():
+    asked = []
+
+    def slope(t, _):
+        asked.append(t)
+        return [math.cos(t)]
+
+    ode45(slope, 1.0, [0.0])
+    for stages in np.reshape(asked[1:], (-1, 6)):  # of each step, the second to the seventh
+        step = (stages[4] - stages[0]) / float(1 - NODES[1])
+        np.testing.assert_allclose(stages, stages[4] - step + step * np.array(NODES[1:], float), rtol=1e-13)
+
+
 @pytest.mark.parametrize(("column", "order", "density"), TREES)
 def test_order_conditions_hold_exactly(column, order, density):
     assert weighted(B, column) == Fraction(1, density)
