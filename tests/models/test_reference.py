@@ -13,9 +13,11 @@ from support.scenes import PAPER, general, paper
 
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange.reference import reference_at
 from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
+from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.store.read import open_results
 
 FROZEN = reference_folder() / "paper.h5"
@@ -107,3 +109,17 @@ def test_a_reference_that_its_time_limit_ends_is_ended() -> None:
     """Springs keep the errors from growing to where that breaks off: over the rest it would take hours."""
     (end,) = run_tasks(_limited, [1e6], 1, 60.0)
     assert end.value == (True, [1.0])
+
+
+def test_amplification_of_a_stiff_oscillation_is_one() -> None:
+    """An undamped spring of 1000 rad/s turns (angle, rate/ω) in a circle: no error of it grows, in either channel."""
+    text = (
+        'title = "s"\nblades = 1\ngravity = 0\nduration = 0.1\nsamples = 6\noutputs = ["angles", "rates"]\n'
+        "[blade]\nmass = 10\ncentre_of_mass = [0, 0, 1]\ninertia = [2, 2, 1, 0, 0, 0]\n"
+        "[bearing]\nstiffness = 1e6\n[initial]\nangles = [0, 0.01]\nrates = [0, 0]\n"
+    )
+    scene = parse_scene(text, "s")
+    found = reference_at(scene, np.linspace(0.0, 0.1, 6))
+    np.testing.assert_allclose(found.units, [1.0, 1.0, 1.0, 1000.0])
+    np.testing.assert_allclose(found.growth[:, [1, 3]], 1.0, rtol=1e-9)
+    np.testing.assert_allclose(found.growth[:, 0], np.hypot(1.0, found.trajectory.time), rtol=1e-9)
