@@ -15,7 +15,9 @@ from support.sweeps import made_sweep
 from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
 from rotor_mbs.cli.sweep import draw
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.plots.sweep import map_figure, spread_figure
+from rotor_mbs.report.core.elements import Section
+from rotor_mbs.report.pages.sweep import sweep_page
+from rotor_mbs.report.plots.sweep import map_figure, response, spread_figure
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
@@ -136,3 +138,22 @@ def test_a_map_needs_two_axes_and_a_pitch_that_can_grow(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match="1 axes; allowed: a grid of two"):
         stability_map(StoredSweep(output), 1.0)
+
+
+def test_a_sweep_without_a_picture_of_its_own_shows_the_pitch_over_what_was_varied(tmp_path: Path) -> None:
+    _, output = _run(
+        tmp_path,
+        'title = "t"\nscene = "paper/fig08"\nsamples = 11\noutputs = []\nmethods = ["lagrange/dop853"]\n'
+        'change = { "initial.angles[1]" = 0.2 }\n[[axis]]\nkey = "bearing.stiffness"\nvalues = [1e2, 1e4, 1e6]\n',
+    )
+    sweep = StoredSweep(output)
+    page = sweep_page(sweep)
+    section = page["picture"]
+    assert isinstance(section, Section)
+    (shown,) = section.pictures
+    assert "bearing stiffness" in shown.caption
+    stiffness, pitch = sweep.column("bearing_stiffness"), sweep.column("pitch_max")
+    (axes,) = response(stiffness, pitch, "k (N m/rad)", "largest pitch (rad)", logarithmic=True).axes
+    (points,) = axes.get_lines()
+    np.testing.assert_array_equal(points.get_xydata(), np.column_stack([stiffness, pitch]))
+    assert (axes.get_xscale(), axes.get_ylabel()) == ("log", "largest pitch (rad)")

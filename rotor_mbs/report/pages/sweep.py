@@ -24,17 +24,19 @@ from rotor_mbs.store.sweep_dataset import StoredSweep
 
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
+_RESPONSE, _MOST_RESPONSES = "pitch_max", 3
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 
 def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     """What the template needs."""
-    shown, lines = _asked_picture(sweep)
+    asked, lines = _asked_picture(sweep)
     statuses = sweep.column("status")
+    shown = [asked] if asked else _responses(sweep, statuses == STATUSES.index("ok"))
     return {
         "title": sweep.attributes["title"],
         "summary": [with_capital(sweep.attributes["summary"].rstrip(".")) + ".", *lines],
-        "picture": Section([shown] if shown else [], tables=[_status_table(statuses)] if shown else []),
+        "picture": Section(shown, tables=[_status_table(statuses)] if shown else []),
         "statuses": Section(tables=[] if shown else [_status_table(statuses)]),
         "parameters": Section(tables=[_parameter_table(sweep)]),
         "distributions": Section(_distributions(sweep, statuses == STATUSES.index("ok"))),
@@ -123,6 +125,24 @@ def _parameter_table(sweep: StoredSweep) -> PageTable:
         limits = [with_unit(float(value), unit, 4) for value in (np.nanmin(values), np.nanmax(values))]
         rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
     return PageTable("Varied parameters", ("Parameter", "Key", "From", "To", "Values"), rows, (2, 3, 4))
+
+
+def _responses(sweep: StoredSweep, ok: object) -> list[Picture]:
+    """The largest pitch of each run that ended well, over each of the first parameters that were varied."""
+    values = sweep.column(_RESPONSE)[np.asarray(ok)] if _RESPONSE in sweep.columns else np.empty(0)
+    found = []
+    for key in sweep.keys[:_MOST_RESPONSES]:
+        name = parameter_name(key)
+        parameter = sweep.column(name)[np.asarray(ok)]
+        if len(values) < 2 or not np.isfinite(values).all() or not np.ptp(parameter):
+            continue
+        label, unit = field_name(key), sweep.columns[name].units
+        logarithmic = parameter.min() > 0.0 and parameter.max() > _SPAN * parameter.min()
+        caption = f"The largest pitch of each run over the {label}"
+        x_label = label if unit == "1" else f"{label} ({unit})"
+        panels = plots.response(parameter, values, x_label, "largest pitch (rad)", logarithmic=logarithmic)
+        found.append(picture(panels, f"over-{name}", caption, caption))
+    return found
 
 
 def _distributions(sweep: StoredSweep, ok: object) -> list[Picture]:

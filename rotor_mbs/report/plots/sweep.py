@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from rotor_mbs.report.core.numbers import power
 _INK, _ACCENT = "#0072b2", "#d55e00"  # Okabe-Ito blue and vermillion
 Array = NDArray[np.float64]
 _MOST_POINTS = 200  # of a distribution
+_MOST_RUNS = 1000  # that have a point
 _MOST_GROWTH = 1e4  # the colours end there: the pitch has turned many times
 
 
@@ -31,6 +34,18 @@ def spread_panels(spread: Spread) -> Panels:
               label=f"growth {spread.exponent:.2f} ± {spread.uncertainty:.2f} per s")  # fmt: skip
     log_axis(axes, float(spread.low[seen].min()), float(spread.high.max()))
     axes.set_ylabel("separation of the angles (rad)")
+    return panel
+
+
+def response(parameter: Array, values: Array, x_label: str, y_label: str, *, logarithmic: bool) -> Panels:
+    """A number of each run over a parameter that was varied, a point per run."""
+    panel = panels((3.0,), x_label)
+    axes = panel.axes[0]
+    shown = np.linspace(0, len(values) - 1, min(len(values), _MOST_RUNS)).round().astype(int)
+    axes.plot(parameter[shown], values[shown], color=_INK, marker="o", markersize=3.5, linestyle="none")
+    if logarithmic:
+        _decades(axes, float(parameter.min()), float(parameter.max()))
+    axes.set_ylabel(y_label)
     return panel
 
 
@@ -73,14 +88,19 @@ def distribution(values: Array, label: str, *, logarithmic: bool) -> Panels:
         known = known[np.linspace(0, len(known) - 1, _MOST_POINTS).round().astype(int)]
     axes.plot(known, np.linspace(0.0, 100.0, len(known)), color=_INK)
     if logarithmic:
-        axes.set_xscale("log")
-        low, high = np.floor(np.log10(known[0])), np.ceil(np.log10(known[-1]))
-        exponents = np.arange(low, max(high, low + 1) + 1, max(1, np.ceil((high - low) / 6)))
-        axes.set_xticks(10.0**exponents, [power(int(e)) for e in exponents])
-        axes.set_xticks([], minor=True)
+        _decades(axes, known[0], known[-1])
     axes.set_ylim(0.0, 101.0)
     axes.set_ylabel("share of runs (%)")
     return panel
+
+
+def _decades(axes: Any, smallest: float, largest: float) -> None:
+    """A horizontal log axis with at most seven labels."""
+    axes.set_xscale("log")
+    low, high = np.floor(np.log10(smallest)), np.ceil(np.log10(largest))
+    exponents = np.arange(low, max(high, low + 1) + 1, max(1, np.ceil((high - low) / 6)))
+    axes.set_xticks(10.0**exponents, [power(int(e)) for e in exponents])
+    axes.set_xticks([], minor=True)
 
 
 def _titled(panel: Panels, title: str) -> str:
