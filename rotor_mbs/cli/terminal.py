@@ -63,7 +63,7 @@ class _RenewedLine:
         self._stream = sys.stderr if stream is None else stream
         self._is_terminal = self._stream.isatty()
         self._start = time.monotonic()
-        self._text = ""
+        self._text = "starting"
         self._lock = threading.Lock()
         self._ended = threading.Event()
 
@@ -79,10 +79,11 @@ class _RenewedLine:
                 self._print("\r\x1b[K", end="")
 
     def _renew(self) -> None:
-        while not self._ended.wait(1.0):
+        while not self._ended.is_set():
             with self._lock:
                 if self._text and not self._ended.is_set():
                     self._print_over(self._text)
+            self._ended.wait(1.0)
 
     def _show(self, text: str, *, keep: bool = False) -> None:
         """keep: it stays on the terminal, whole."""
