@@ -10,8 +10,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.magnitudes import MagnitudeError, unrepresentable
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_value
 
@@ -33,13 +31,9 @@ def parse_scene(text: str, name: str) -> Scene:
 
 def _scene(text: str, tables: dict[str, Any], name: str, source: str) -> Scene:
     from rotor_mbs.scenario.schema import SceneTable  # late, with pydantic: 0.2 s
-    from rotor_mbs.scenario.validation import located, validate_file
+    from rotor_mbs.scenario.validation import validate_file
 
-    scene = validate_file(SceneTable, tables, text, source).to_scene(name, text)
-    problems = unrepresentable(scene)
-    if problems:
-        raise InputError(located(problems, text, source))
-    return scene
+    return validate_file(SceneTable, tables, text, source).to_scene(name, text)
 
 
 def new_scene_text() -> str:
@@ -52,11 +46,7 @@ def validated_scene(tables: Mapping[str, Any], name: str) -> Scene:
     from rotor_mbs.scenario.schema import SceneTable
     from rotor_mbs.scenario.validation import validate
 
-    scene = validate(SceneTable, tables).to_scene(name, "")
-    problems = unrepresentable(scene)
-    if problems:
-        raise MagnitudeError(problems)
-    return scene
+    return validate(SceneTable, tables).to_scene(name, "")
 
 
 def scene_tables(scene: Scene) -> dict[str, Any]:

@@ -16,7 +16,18 @@ from rotor_mbs.scenario import scene
 from rotor_mbs.scenario.accuracy_bounds import CHECKS
 from rotor_mbs.scenario.time_table import Table as TimeTable
 from rotor_mbs.scenario.time_table import is_one_table
-from rotor_mbs.scenario.validation import Line, NotNegative, Number, PerBlade, Table, Text, Vector, invalid
+from rotor_mbs.scenario.validation import (
+    Line,
+    NotNegative,
+    NotNegativeSize,
+    Number,
+    PerBlade,
+    Size,
+    Table,
+    Text,
+    Vector,
+    invalid,
+)
 
 MAX_BLADES = 10_000
 MAX_SAMPLES = 10_000_000
@@ -115,9 +126,9 @@ def _blades_named(indices: Sequence[int]) -> str:
 class BladeTable(Table):
     """[blade] for all blades, or one of the [[blade]] tables."""
 
-    mass: Number = Field(gt=0, description="a number above 0 (kg)")
+    mass: Size = Field(gt=0, description="a number above 0 (kg)")
     centre_of_mass: Vector = Field(description="three numbers x, y, z (m, blade frame)")
-    inertia: list[Number] = Field(
+    inertia: list[Size] = Field(
         [0.0] * 6,
         min_length=6,
         max_length=6,
@@ -152,13 +163,13 @@ class BladeTable(Table):
 class HubTable(Table):
     """[hub]"""
 
-    inertia: NotNegative = Field(description="a number of at least 0 (kg m² about the shaft)")
+    inertia: NotNegativeSize = Field(description="a number of at least 0 (kg m² about the shaft)")
 
 
 class ShaftTable(Table):
     """[shaft]"""
 
-    damping: NotNegative = Field(description="a number of at least 0 (N m s/rad)")
+    damping: NotNegativeSize = Field(description="a number of at least 0 (N m s/rad)")
 
 
 def _as_rows(value: object) -> object:
@@ -180,7 +191,7 @@ def _as_tables(value: object) -> object:
     return [_as_rows(entry) for entry in value]
 
 
-_Row = Annotated[list[Number], Field(min_length=2, max_length=2)]
+_Row = Annotated[list[Size], Field(min_length=2, max_length=2)]
 Rows = Annotated[list[_Row], Field(min_length=1), BeforeValidator(_as_rows), AfterValidator(_goes_forward)]
 Tables = Annotated[list[Rows], BeforeValidator(_as_tables)]
 _ROWS = "rows [t, {}] with t from 0 s upwards, at most two rows with one t"
@@ -268,8 +279,8 @@ class SceneTable(Table):
     title: Line = Field(description="a text of 1 to 200 characters on one line")
     figures: list[Line] = Field([], description='texts, such as ["5", "7a"]')
     blades: int = Field(ge=1, le=MAX_BLADES, description=f"a whole number from 1 to {MAX_BLADES}")
-    gravity: NotNegative = Field(description="a number of at least 0 (m/s², along -z)")
-    duration: Number = Field(gt=0, description="a number above 0 (s)")
+    gravity: NotNegativeSize = Field(description="a number of at least 0 (m/s², along -z)")
+    duration: Size = Field(gt=0, description="a number above 0 (s)")
     outputs: Outputs = Field(
         list(scene.DEFAULT_OUTPUTS), min_length=1, validate_default=True, description=OUTPUTS_ALLOWED
     )

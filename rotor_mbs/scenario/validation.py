@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -22,6 +22,9 @@ from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError, find_l
 
 MAX_NUMBER = 1e300
 MAX_TEXT = 200  # characters
+# Of what a rotor is and what acts on it, but for zero: inertias, moments and accelerations, products of up to four such
+# numbers, are then between 1e-100 and 1e100, and the product of any three of these is a normal double.
+SMALLEST, LARGEST = 1e-25, 1e25
 _MAX_PROBLEMS = 100  # lines for one file; nobody reads more, and a file of 1 MiB can have 300 000
 _UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")  # Unicode categories: controls, direction marks, line ends
 _WRONG_KINDS = {
@@ -68,17 +71,12 @@ def validate_file(model: type[M], tables: Mapping[str, Any], text: str, source: 
     try:
         return validate(model, tables)
     except TableError as error:
-        shown = located(error.problems, text, source)
+        lines = find_lines(text)
+        found = sorted((line_of(lines, problem.path), problem.message) for problem in error.problems)
+        shown = [f"{source}:{line}: {message}" for line, message in found]
         if error.left_out:
             shown.append(f"{source}: {error.left_out} more errors")
     raise InputError(shown)
-
-
-def located(problems: Sequence[KeyProblem], text: str, source: str) -> list[str]:
-    """A line `source:line: message` for each error in a file's text, in the order of the lines."""
-    lines = find_lines(text)
-    found = sorted((line_of(lines, problem.path), problem.message) for problem in problems)
-    return [f"{source}:{line}: {message}" for line, message in found]
 
 
 def invalid(wrong: str, allowed: str | None = None) -> PydanticCustomError:
@@ -97,6 +95,12 @@ def _double(value: object) -> float:
     if not abs(value) <= MAX_NUMBER:  # so written that NaN fails, too
         raise invalid("{shown} is out of range", f"finite numbers, |x| <= {MAX_NUMBER:g}")
     return float(value)
+
+
+def _of_a_rotor(value: float) -> float:
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        raise invalid("{shown} is out of range", f"0, or sizes from {SMALLEST:g} to {LARGEST:g}")
+    return value
 
 
 def _not_blank(value: str) -> str:
@@ -120,8 +124,10 @@ def _as_list(value: object) -> object:
 
 Number = Annotated[float, BeforeValidator(_double)]
 NotNegative = Annotated[Number, Field(ge=0)]
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-PerBlade = Annotated[list[NotNegative], BeforeValidator(_as_list)]
+Size = Annotated[Number, AfterValidator(_of_a_rotor)]
+NotNegativeSize = Annotated[Size, Field(ge=0)]
+Vector = Annotated[list[Size], Field(min_length=3, max_length=3)]
+PerBlade = Annotated[list[NotNegativeSize], BeforeValidator(_as_list)]
 Text = Annotated[str, AfterValidator(_not_blank)]
 Line = Annotated[Text, AfterValidator(_one_line)]
 

@@ -15,7 +15,6 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import error_growth
-from rotor_mbs.scenario.magnitudes import MagnitudeError
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
@@ -80,14 +79,7 @@ def perform(chunk: Chunk) -> Rows | NDArray[np.int8]:
 
 def rows_of(chunk: Chunk) -> Rows:
     """(runs, ...) columns of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
-    try:
-        scenes = _scenes(chunk)
-    except MagnitudeError as error:
-        parts = chunk.split()
-        if not parts:
-            return lost_rows(1, chunk.row, "solver_failed", str(error))
-        found = [rows_of(part) for part in parts]
-        return {name: np.concatenate([rows[name] for rows in found]) for name in chunk.row.names or ()}
+    scenes = _scenes(chunk)
     if chunk.method == ENSEMBLE_METHOD and _has_all_of(scenes[0].outputs):
         rows = _ensemble(chunk, scenes)
     else:
@@ -137,8 +129,6 @@ def _has_all_of(outputs: Sequence[str]) -> bool:
 def _scenes(chunk: Chunk) -> list[Scene]:
     try:
         return [chunk.variants.scene(values) for values in chunk.values.tolist()]
-    except MagnitudeError:
-        raise
     except TableError as error:
         keys = ", ".join(chunk.variants.keys)
         last = chunk.first + len(chunk.values) - 1
