@@ -197,15 +197,18 @@ def span(seconds: float) -> str:
 
 def print_summary(report: RunReport, output: Path) -> int:
     """The runs in a few lines; the exit status: 1 where a run that should succeed did not, or was not computed."""
-    lost = report.not_computed
-    print_not_computed(lost)
-    counts = {"failed": len(report.failures), "printed broke off": len(report.broken_off), "not computed": len(lost)}
+    is_lost = print_not_computed(report.made)
+    counts = {
+        "failed": len(report.failures),
+        "printed broke off": len(report.broken_off),
+        "not computed": len(report.not_computed),
+    }
     parts = [f"{len(report.made) - sum(counts.values())} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
     print(f"{output}: {made}, {report.kept} there already")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
-    return 1 if report.failures or lost or report.stored_failures else 0
+    return 1 if report.failures or is_lost or report.stored_failures else 0
 
 
 def print_doubts(scenes: Sequence[Scene]) -> None:
@@ -217,7 +220,9 @@ def print_doubts(scenes: Sequence[Scene]) -> None:
             print(f"warning: {scene.name}: {doubt}", file=sys.stderr)
 
 
-def print_not_computed(lost: Sequence[Outcome]) -> None:
-    """The cases whose process died or could not start, a line each."""
+def print_not_computed(made: Sequence[Outcome]) -> bool:
+    """A line for each case whose process died or could not start; whether there are any."""
+    lost = [one for one in made if not one.is_computed]
     for one in lost:
         print(f"{one.case.label}: not computed ({one.result.message}); the same command tries again", file=sys.stderr)
+    return bool(lost)

@@ -1,63 +1,48 @@
 """The main job: every scene of the paper by the default methods and with each erratum alone; the errata checked.
 
-And error against run time of all methods on one scene, at a few settings each.
+And error against run time of all methods on one scene, at a few settings each, in seconds: a bench takes one process on
+one core and rounds over all points; here each curve is a case beside the runs, and a point is run once. Its errors are
+those of a bench, its times are good to a factor.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict
+import os
+from dataclasses import replace
 from pathlib import Path
 
 from rotor_mbs.analysis.claim_records import shipped_claims
-from rotor_mbs.analysis.errata import CheckedEntry, errata_fingerprint, write_errata
-from rotor_mbs.execution.case import RUN
+from rotor_mbs.analysis.errata import ERRATA, errata_record
+from rotor_mbs.analysis.run_selection import PRINTED
+from rotor_mbs.errors import RotorError
+from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Result, ignore_progress
-from rotor_mbs.execution.provenance import numerics_fingerprint
-from rotor_mbs.methods.catalogue import default_methods, errata_methods
+from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
+from rotor_mbs.methods.catalogue import default_methods, errata_methods, ladders
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.read import open_results
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.store.layout import KEY_ATTRIBUTE
+from rotor_mbs.store.records import write_records
 from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.studies.run import RunReport, able_methods, perform_run, run_scenes
-from rotor_mbs.studies.short_ladders import ladder_cases, perform_ladder
+from rotor_mbs.studies.bench import BENCH, SOURCES, Measured, curve_record, facts_of, points_of, store_curve
+from rotor_mbs.studies.bench_worker import PointTimer, prepared_scene
+from rotor_mbs.studies.run import RunReport, able_methods, perform_run, reference_case, run_scenes
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
+_LONGEST_S = 0.4  # a run longer than this is the last of its curve
 
 
 def reproduce(output: Path, *, workers: int, timeout_s: float, on_progress: OnProgress = ignore_progress) -> RunReport:
     """Into the results file `output`; what it has already is kept. Raises InputError, StoreError."""
-    scenes = find_scenes(["paper"])
+    scenes, benched = find_scenes(["paper"]), find_scenes([BENCHED])[0]
     names = (*default_methods(), *errata_methods().values())
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
-    # Before the runs: the whole file is written anew with each merge, and now it is small.
-    _complete_errata(output)
-    _complete_claims(output)
+    _complete_claims(output)  # before the runs: the whole file is written anew with each merge, and now it is small
     return run_scenes(
         scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress,
-        beside=ladder_cases(find_scenes([BENCHED])[0]), perform=perform,
+        beside=[errata_case(benched), *ladder_cases(benched)], perform=perform,
     )  # fmt: skip
-
-
-def perform(job: Job) -> Result:
-    """A run, or a curve of error against run time, in a worker process. Raises StoreError."""
-    return perform_run(job) if job.case.study == RUN else perform_ladder(job)
-
-
-def _complete_errata(output: Path) -> None:
-    """The check of every printed entry, unless the file has that of the same code already."""
-    from rotor_mbs.models.printed.errata import check_errata
-
-    if output.exists():
-        with open_results(output) as results:
-            if errata_fingerprint(results) == numerics_fingerprint():
-                return
-    checks = [
-        CheckedEntry(**{**asdict(check), "explained_by": ", ".join(check.explained_by)}) for check in check_errata()
-    ]
-    part = output.with_name(f"{output.name}.errata.h5")
-    write_errata(part, checks, numerics_fingerprint())
-    ResultsStore(output).merge([part])
-    part.unlink()
 
 
 def _complete_claims(output: Path) -> None:
@@ -65,3 +50,64 @@ def _complete_claims(output: Path) -> None:
     shipped, results = shipped_claims(), ResultsStore(output)
     if shipped.exists() and not ResultsStore(shipped).stored_keys() <= results.stored_keys():
         results.merge([shipped])
+
+
+def perform(job: Job) -> Result:
+    """A run, or what is computed beside the runs, in a worker process. Raises StoreError."""
+    return {RUN: perform_run, BENCH: perform_ladder, ERRATA: perform_errata}[job.case.study](job)
+
+
+def errata_case(scene: Scene) -> Case:
+    """The check of every printed entry, at random states: of `scene` nothing counts."""
+    return Case(replace(scene, name="random states"), PRINTED, study=ERRATA, sources=("analysis/errata.py",))
+
+
+def perform_errata(job: Job) -> Result:
+    """Checks every printed entry and stores the outcome, in a worker process."""
+    from rotor_mbs.models.printed.errata import check_errata
+
+    write_records(job.part, [errata_record(check_errata(), {KEY_ATTRIBUTE: job.case.key})])
+    return Result("ok")
+
+
+def ladder_cases(scene: Scene) -> list[Case]:
+    """A short curve of each method on `scene`, judged by its reference."""
+    chosen = [ladder.short for ladder in ladders() if not ladder.variant]
+    able, _ = able_methods(scene, [ladder.method for ladder in chosen])
+    reference = reference_case(scene).key
+    sources = (*SOURCES, "studies/reproduce.py")
+    return [
+        Case(scene, one.method, {}, BENCH, {"curve": one.curve, "values": list(one.values)}, reference, sources)
+        for one in chosen
+        if one.method in able
+    ]
+
+
+def perform_ladder(job: Job) -> Result:
+    """Runs, judges and stores one curve, in a worker process."""
+    assert job.reference is not None  # every case of a ladder has a reference
+    case = job.case
+    short, reference = prepared_scene(case.scene, job.reference)
+    ladder = next(one.short for one in ladders() if one.curve == case.options["curve"])
+    points = points_of(ladder, short.duration / (short.samples - 1))
+    timer = PointTimer(dict.fromkeys(points, (short, reference)))
+    found, longest = Measured(), 0.0
+    for point in points:
+        if longest > _LONGEST_S:
+            found.timings.left_out[point] = f"not run: the setting before took {longest:.2g} s"
+            continue
+        try:
+            prepared = timer.prepare(point)
+            found.prepared[point], found.timings.times[point] = prepared, [prepared.run_s]
+            found.judged[point] = timer.judge(point)
+            longest = prepared.run_s
+        except OF_THE_MACHINE:
+            raise
+        except RotorError as exc:
+            found.fail(point, str(exc))
+        except Exception as exc:
+            found.fail(point, one_line(exc))
+    shared = facts_of(case, short, reference) | {
+        "budget_s": _LONGEST_S, "load_before": os.getloadavg()[0], "pinned_core": -1, "is_short": True,
+    }  # fmt: skip
+    return store_curve(job, curve_record(case, ladder, found.rows(points), shared))

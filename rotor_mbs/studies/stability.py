@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from rotor_mbs.analysis.stability import SuiteRun, suite_runs
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
+from rotor_mbs.execution.execute import OnProgress, Outcome, execute, ignore_progress, in_pool
 from rotor_mbs.methods.catalogue import find_method, method_names, settings_for
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.layout import KEY_ATTRIBUTE
-from rotor_mbs.store.records import read_records, write_records
+from rotor_mbs.store.records import read_records
 from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.studies.conservation import DRIFT, SYMMETRY, conservation_record
 from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
-from rotor_mbs.studies.step_limits import LIMIT, STEPS, has_limit, ladder_record, limit_record
+from rotor_mbs.studies.stability_records import DRIFT, LIMIT, STEPS, SYMMETRY, has_limit, perform_record
 
 SUITE = ("stiff", "extreme")
 
@@ -28,16 +26,16 @@ _RECORD_LIMIT_S = 40.0
 # Scenes on which conservation is looked at: one without gravity, one regular with it.
 _SYMMETRY_SCENES = ("extreme/zero-gravity", "extreme/light-1e-2")
 _DRIFT_CASE = ("extreme/zero-gravity", "lagrange/taylor")
-_SOURCES = ("studies/step_limits.py", "studies/conservation.py", "analysis/exact.py")
+_SOURCES = ("studies/stability_records.py", "analysis/exact.py")
 
 
 @dataclass(frozen=True)
 class SuiteReport:
-    """runs: all runs of the file, as they stand on the map; not_computed: cases whose process died."""
+    """runs: all runs of the file, as they stand on the map; made: what this call computed, or tried to."""
 
     scenes: int
     runs: list[SuiteRun]
-    not_computed: list[Outcome]
+    made: list[Outcome]
 
 
 def run_suite(
@@ -61,15 +59,15 @@ def run_suite(
     patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in methods.items()}
     every = dict.fromkeys(method for able in methods.values() for method in able)
     chosen_settings = settings_for(list(every), settings or {})
-    lost = []
+    made: list[Outcome] = []
     for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (methods, timeout_s)):
         own = {k: v for able in chosen.values() for method in able for k, v in chosen_settings[method].items()}
         report = run_scenes(
             scenes, chosen, output, workers=workers, timeout_s=limit_s, settings=own, on_progress=on_progress
         )
-        lost += report.not_computed
-    lost += complete_records(scenes, methods, output, workers, on_progress)
-    return SuiteReport(len(scenes), suite_runs(output), lost)
+        made += report.made
+    made += complete_records(scenes, methods, output, workers, on_progress)
+    return SuiteReport(len(scenes), suite_runs(output), made)
 
 
 def complete_records(
@@ -79,8 +77,7 @@ def complete_records(
     workers: int,
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
-    """Step ladders, step limits and conservation of these scenes, where the runs in `output` call for them; those whose
-    process died."""
+    """Step ladders, step limits and conservation of these scenes, where the runs in `output` call for them."""
     cases = [*_step_cases(scenes, suite_runs(output)), *_conservation_cases(scenes, methods)]
     store = ResultsStore(output)
     made = execute(cases, in_pool(perform_record, workers, _RECORD_LIMIT_S), store, on_progress)
@@ -89,17 +86,7 @@ def complete_records(
     stale = {record.key for record in records if record.scene in names} - wanted
     if stale:
         store.merge((), without=stale)
-    return [outcome for outcome in made if not outcome.is_computed]
-
-
-def perform_record(job: Job) -> Result:
-    """Computes and stores one record, in a worker process."""
-    case = job.case
-    compute = {STEPS: ladder_record, LIMIT: limit_record, SYMMETRY: conservation_record, DRIFT: conservation_record}
-    record = compute[case.study](job)
-    attributes = {**record.attributes, "scene_hash": case.scene_hash, KEY_ATTRIBUTE: case.key}
-    write_records(job.part, [replace(record, attributes=attributes)])
-    return Result("ok")
+    return made
 
 
 def _step_cases(scenes: Sequence[Scene], found: Sequence[SuiteRun]) -> list[Case]:

@@ -12,13 +12,15 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import claims, rounds_to
-from rotor_mbs.analysis.errata import CheckedEntry, effects, entries, write_errata
+from rotor_mbs.analysis.errata import effects, entries, errata_record
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, errata, published
 from rotor_mbs.analysis.trajectory_numbers import STATISTICS, measure
+from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import open_results
+from rotor_mbs.store.records import write_records
 
 FIG11 = paper("fig11", samples=501)
 PRINTED, REFERENCE, TAYLOR = "printed/ode45", "reference", "lagrange/taylor"
@@ -192,7 +194,7 @@ def test_errata_are_read_in_order_and_effects_by_name(tmp_path: Path) -> None:
         CheckedEntry("(8)", "row 2 column 4", "c c3", "0", 1.0, False, "E1"),
         CheckedEntry("(9)", "row 1 column 1", "x", "x", 0.0, True, ""),
     ]
-    write_errata(tmp_path / "e.h5", checks, "f")
+    write_records(tmp_path / "e.h5", [errata_record(checks, {})])
     with open_results(tmp_path / "e.h5") as results:
         assert entries(results) == checks
     runs = [Made(FIG11, REFERENCE, rotor(np.zeros_like)), Made(FIG11, "printed_e2/ode45", rotor(lambda t: 0.01 * t))]

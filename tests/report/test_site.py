@@ -12,7 +12,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
-from rotor_mbs.analysis.errata import CheckedEntry
+from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.files import Site
 from rotor_mbs.report.pages.formulas import formula, matrices

@@ -11,7 +11,8 @@ import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis.errata import CheckedEntry, entries, write_errata
+from rotor_mbs.analysis.errata import entries, errata_record
+from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import Record, read_records, write_records
@@ -61,9 +62,9 @@ def test_runs_and_records_are_kept_side_by_side(tmp_path: Path) -> None:
     scene = paper("fig05")
     store(tmp_path / "runs.h5", [Made(scene, "lagrange/taylor", rotor(np.sin), attributes={"run_hash": "run"})])
     write_records(tmp_path / "record.h5", [ladder("paper/fig05", "lagrange/taylor", "record")])
-    write_errata(tmp_path / "errata.h5", CHECKS, "f")
+    write_records(tmp_path / "errata.h5", [errata_record(CHECKS, {"run_hash": "errata"})])
     merge(tmp_path / "all.h5", [tmp_path / f"{name}.h5" for name in ("runs", "record", "errata")], {})
-    assert ResultsStore(tmp_path / "all.h5").stored_keys() == {"run", "record"}
+    assert ResultsStore(tmp_path / "all.h5").stored_keys() == {"run", "record", "errata"}
     with open_results(tmp_path / "all.h5") as results:
         assert entries(results) == CHECKS
         assert list(results.scenes) == ["paper/fig05"]
@@ -91,7 +92,7 @@ def test_files_of_earlier_versions_are_read_and_merged(tmp_path: Path) -> None:
 def test_records_open_in_xarray(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     write_records(tmp_path / "a.h5", [ladder("stiff/x", "exudyn_tree/rk44", "k")])
-    write_errata(tmp_path / "b.h5", CHECKS, "f")
+    write_records(tmp_path / "b.h5", [errata_record(CHECKS, {})])
     merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
     with xarray.open_datatree(tmp_path / "all.h5", engine="h5netcdf") as tree:
         assert tree["stability/steps/stiff/x/exudyn_tree/rk44/step"].dims == ("row",)

@@ -17,9 +17,8 @@ from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.store.read import open_results
-from rotor_mbs.studies.reproduce import BENCHED
+from rotor_mbs.studies.reproduce import BENCHED, ladder_cases
 from rotor_mbs.studies.run import store_time_out
-from rotor_mbs.studies.short_ladders import ladder_cases
 
 METHODS = {"printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"}
 

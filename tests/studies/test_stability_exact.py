@@ -16,8 +16,17 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import horizon_samples, metrics_of
-from rotor_mbs.studies.conservation import SYMMETRY, conservation_record, drift_record
-from rotor_mbs.studies.step_limits import LIMIT, STEPS, ladder_record, largest_stable_step, limit_record, step_for
+from rotor_mbs.studies.stability_records import (
+    LIMIT,
+    STEPS,
+    SYMMETRY,
+    conservation_record,
+    drift_record,
+    ladder_record,
+    largest_stable_step,
+    limit_record,
+    step_for,
+)
 
 LIGHT = ("light-1e-2", "light-1e-4", "light-1e-6", "light-1e-8", "light-1e-4-hub", "light-1e-8-hub", "feather")
 

@@ -26,13 +26,13 @@ NAMES = ("E1", "E2", "E3")
 
 
 @dataclass(frozen=True, slots=True)
-class EntryCheck:
+class CheckedEntry:
     """One printed entry against its derivative.
 
     printed, right   formulas; a term that is not there is 0
     difference       the largest of |printed - right| / max(1, |printed|, |right|) over the states
     explained_by     the fewest errata with which the paper's derivation gives what is printed, where without any it
-                     gives what is right; empty where the entry agrees, and where nothing explains it
+                     gives what is right, as "E1, E2"; "" where the entry agrees, and where nothing explains it
     """
 
     equation: str
@@ -41,10 +41,10 @@ class EntryCheck:
     right: str
     difference: float
     agrees: bool
-    explained_by: tuple[str, ...]
+    explained_by: str
 
 
-def check_errata(seed: int = 2020, states: int = 5) -> list[EntryCheck]:
+def check_errata(seed: int = 2020, states: int = 5) -> list[CheckedEntry]:
     """Every entry of (8), (9), (16)-(19), (25), (29), (30), (32), (39)-(56), in the order of the equations."""
     drawn = random_states(seed, states)
     printed = [printed_entries(state.names) for state in drawn]
@@ -59,13 +59,13 @@ def check_errata(seed: int = 2020, states: int = 5) -> list[EntryCheck]:
         difference = _difference(key, printed, right)
         agrees = difference <= TOLERANCE
         checks.append(
-            EntryCheck(
+            CheckedEntry(
                 *key,
                 printed=str(printed_text.get(key, 0)),
                 right=str(right_text[key]),
                 difference=difference,
                 agrees=agrees,
-                explained_by=() if agrees else _explanation(key, printed, right, derived),
+                explained_by="" if agrees else ", ".join(_explanation(key, printed, right, derived)),
             )
         )
     return checks

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rotor_mbs.analysis.errata import CheckedEntry, Effect, effects
+from rotor_mbs.analysis.errata import Effect, effects
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.methods.catalogue import errata_methods
+from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages.formulas import matrices

@@ -8,7 +8,7 @@ from html import escape
 
 from markupsafe import Markup
 
-from rotor_mbs.analysis.errata import CheckedEntry
+from rotor_mbs.models.printed.errata import CheckedEntry
 
 _TOKEN = re.compile(
     r"(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)(?P<square>[²³]?)"

@@ -1,0 +1,151 @@
+"""Commands that make one study each and print its outcome. Each loads what it computes with, and not the others'."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rotor_mbs.cli.argument_values import pages_beside
+from rotor_mbs.cli.arguments import cores
+from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
+from rotor_mbs.errors import InputError
+from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.scenario.catalogue import find_scenes, only_scene
+
+
+def bench(arguments: argparse.Namespace) -> int:
+    """Error against run time, and its pages. 0 also where points failed: they are what is measured."""
+    from rotor_mbs.analysis.run_tables import bench_table
+    from rotor_mbs.store.records import read_records
+    from rotor_mbs.studies.bench import run_bench
+    from rotor_mbs.studies.cost_scaling import run_cost_scaling
+
+    if not arguments.scenes and not arguments.growth:
+        raise InputError("bench: nothing to measure; allowed: SCENE..., or --growth")
+    scenes = find_scenes(arguments.scenes) if arguments.scenes else []
+    methods, output = check_names(arguments.method or ()), arguments.output
+    settings = dict(arguments.set or ())
+    print_doubts(scenes)
+    limits = {"repeats": arguments.repeats, "budget_s": arguments.budget}
+    with ProgressLine() as progress:
+        report = run_bench(scenes, methods, output, workers=cores(), settings=settings, on_progress=progress, **limits)
+        made = [*report.made]
+        if arguments.growth:
+            made += run_cost_scaling(methods, output, on_progress=progress, **limits)
+    _print_lines(report.left_out)
+    names = {scene.name for scene in scenes}
+    print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
+    print(f"{output}: {report.measured} scenes measured, {report.kept} there already")
+    _write_pages(output)
+    return int(print_not_computed(made))
+
+
+def stability(arguments: argparse.Namespace) -> int:
+    """The stiff and extreme suite, what each method is good for, and its pages.
+
+    1 where a claim of the suite fails, see `unreached`, or a case was not computed.
+    """
+    from rotor_mbs.analysis.stability import advice_lines, unreached
+    from rotor_mbs.studies.stability import run_suite
+
+    start = time.monotonic()
+    with ProgressLine() as progress:
+        report = run_suite(
+            arguments.scenes, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
+            settings=dict(arguments.set or ()), on_progress=progress,
+        )  # fmt: skip
+    print(*advice_lines(report.runs), sep="\n")
+    seconds = time.monotonic() - start
+    print(f"{arguments.output}: {report.scenes} scenes, {len(report.runs)} runs, {seconds:.0f} s in all")
+    _write_pages(arguments.output, arguments.report)
+    missing = unreached(report.runs)
+    _print_lines([f"{scene}: no method reaches 1e-6 rad" for scene in missing])
+    return int(print_not_computed(report.made) or bool(missing))
+
+
+def modes(arguments: argparse.Namespace) -> int:
+    """The modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
+    from rotor_mbs.analysis.campbell import mode_rows, modes_summary
+    from rotor_mbs.analysis.mode_records import read_modes
+    from rotor_mbs.studies.modes import modes_of_scenes
+
+    scenes = find_scenes(arguments.scenes)
+    with ProgressLine() as progress:
+        made = modes_of_scenes(
+            scenes, arguments.output, speeds=arguments.speeds, stiffnesses=arguments.stiffness,
+            workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress,
+        )  # fmt: skip
+    is_lost = print_not_computed(made)
+    lost = {one.case.scene.name for one in made if not one.is_computed}
+    found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
+    chosen = [found[scene.name] for scene in scenes if scene.name in found]
+    if arguments.json:
+        print(json.dumps({one.scene: mode_rows(one) for one in chosen}, ensure_ascii=False, indent=1))
+    else:
+        for one in chosen:
+            print(*modes_summary(one), sep="\n")
+        _write_pages(arguments.output, arguments.report)
+    return int(is_lost or not all(one.agrees for one in chosen))
+
+
+def claims(arguments: argparse.Namespace) -> int:
+    """The paper's claims in words tested on many runs. Always 0: the verdicts are what is found out."""
+    from rotor_mbs.analysis.claim_shares import RULE
+    from rotor_mbs.analysis.number_trials import count_of_rows
+    from rotor_mbs.studies.claims import study_claims
+
+    def report(done: int, total: int, what: str) -> None:
+        print(f"[{done:{len(str(total))}d}/{total}] {what}", file=sys.stderr, flush=True)
+
+    study = study_claims(
+        arguments.output, runs=arguments.runs, seed=arguments.seed, workers=arguments.jobs, on_sweep=report
+    )
+    print(study.shares, f"\n{RULE}\n", sep="\n")
+    for duration in sorted({one.duration for one in study.numbers.conditions}):
+        count, of = count_of_rows(study.numbers, duration)
+        print(f"{duration:g} s: {count} of {of} ways of writing the first row of (56) give all published numbers")
+    print(f"{arguments.output}: written")
+    return 0
+
+
+def compare(arguments: argparse.Namespace) -> int:
+    """Data of another program against a scene's reference: a table, its page, the numbers as a results file."""
+    from rotor_mbs.analysis.data_verdict import as_dictionary
+    from rotor_mbs.report.data_comparison import compare_data
+
+    found = compare_data(
+        arguments.data, only_scene(arguments.scene), columns=arguments.columns, tolerance=arguments.tolerance
+    )
+    page, stored = found.to_html(arguments.output), arguments.output / "comparison.h5"
+    found.save(stored)
+    if arguments.json:
+        print(json.dumps(as_dictionary(found.verdict), ensure_ascii=False, indent=1))
+    else:
+        print(found, f"page: {page}, numbers: {stored}", sep="\n")
+    return 0 if found.agrees else 1
+
+
+def export(arguments: argparse.Namespace) -> int:
+    """A scene for another program; the paths that were written, a line each."""
+    from rotor_mbs.studies.export import FORMATS
+    from rotor_mbs.studies.export import export as export_scene
+
+    scene = only_scene(arguments.scene)
+    output = arguments.output or Path(scene.name.rpartition("/")[2] + FORMATS[arguments.to][1])
+    print(*export_scene(scene, arguments.to, output), sep="\n")
+    return 0
+
+
+def _write_pages(results: Path, folder: Path | None = None) -> None:
+    from rotor_mbs.report.build import write_report
+
+    print(f"report: {write_report(results, folder or pages_beside(results))}")
+
+
+def _print_lines(lines: Sequence[str]) -> None:
+    for line in lines:
+        print(line, file=sys.stderr)
