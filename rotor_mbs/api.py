@@ -11,6 +11,7 @@ import shutil
 import tempfile
 import warnings
 import weakref
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from html import escape
@@ -29,9 +30,11 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.solution import Solution, need_xarray
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.store.read import StoredRun, StoredScene, open_results
+from rotor_mbs.store.read import StoredRun, StoredScene, is_sweep, open_results
+from rotor_mbs.store.sweep_columns import MISSING
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
@@ -118,7 +121,7 @@ def run(
     return _with_reference(found, exact)
 
 
-@dataclass
+@dataclass(repr=False)
 class Run(Solution):
     """A scene by one method.
 
@@ -303,8 +306,8 @@ def sweep(
 
     study = sweep_of(scene, parameters, methods=list(methods), **options)
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
-    result = run_sweep(study, path, workers=workers, engine="local" if workers else SerialPool(), timeout_s=timeout)
-    data = SweepData(path, dict(result.statuses))
+    run_sweep(study, path, workers=workers, engine="local" if workers else SerialPool(), timeout_s=timeout)
+    data = SweepData(path)
     if output is None:
         weakref.finalize(data, shutil.rmtree, path.parent, ignore_errors=True)
     return data
@@ -317,11 +320,14 @@ class SweepData:
     Attributes
     ----------
     path : of the file.
-    statuses : how many runs have each status.
+    statuses : how many runs have each status, of those that are stored.
     """
 
     path: Path
-    statuses: dict[str, int]
+
+    @functools.cached_property
+    def statuses(self) -> dict[str, int]:
+        return dict(Counter(STATUSES[code] for code in self._stored.column("status").tolist() if code != MISSING))
 
     def column(self, name: str) -> Any:
         """An array whole, such as "status", "pitch_max" or "angles": one row for each run. Raises StoreError."""
@@ -381,8 +387,8 @@ def modes(scene: Scene, speeds: Sequence[float] = (), stiffnesses: Sequence[floa
     return modes_study(scene, speeds, stiffnesses)
 
 
-def open(path: str | os.PathLike[str]) -> ResultsTree:
-    """The results file at `path`: its scenes and runs by path. Raises StoreError where it is none.
+def open(path: str | os.PathLike[str]) -> ResultsTree | SweepData:
+    """The results file at `path`: its scenes and runs by path, or the dataset of a sweep. Raises StoreError for others.
 
     Examples
     --------
@@ -391,6 +397,8 @@ def open(path: str | os.PathLike[str]) -> ResultsTree:
     >>> tree["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
     (1001, 4)
     """
+    if is_sweep(Path(path)):
+        return SweepData(Path(path))
     with open_results(Path(path)) as results:
         return ResultsTree(Path(path), {name: tuple(scene.runs) for name, scene in results.scenes.items()})
 

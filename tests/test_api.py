@@ -114,6 +114,10 @@ def test_notebooks_show_a_table_and_a_drawing(study: rm.Comparison) -> None:
     assert "<svg" in html
     assert "<svg" in study._repr_html_()
     assert "exudyn_tree/rk67" in repr(study)
+    lines = repr(run).splitlines()
+    assert len(lines) <= 10
+    assert lines[0] == f"{study.scene.name}: {study.scene.title}"
+    assert "angle_error_max" in repr(run)
 
 
 def test_what_was_not_asked_for_is_refused_by_name(tmp_path: Path) -> None:
@@ -142,5 +146,6 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
         single = rm.run(scene.replace(samples=11, **{"bearing.stiffness": stiffness}), "lagrange/dop853")
         np.testing.assert_array_equal(data.column("angles")[i], single.angles)
     np.testing.assert_array_equal(data.at("angles", 7), data.column("angles")[:, 7])
+    assert repr(rm.open(tmp_path / "stiffness.h5")) == f"{tmp_path / 'stiffness.h5'}: 3 runs: 3 ok" == repr(data)
     with pytest.raises(rm.InputError, match=r"bearing\.stifness"):
         rm.sweep(scene, {"bearing.stifness": values})

@@ -90,12 +90,16 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
     """By file name. What comes first is the index."""
     modes, bench, compared = (read_records(opened.path, kind) for kind in ("modes", "bench", "comparison"))
     has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench or compared)
+    data_pages = [
+        (COMPARISON if not i else f"data--{i + 1}.html", f"Data of another program{f': {one.scene}' * (len(compared) > 1)}")
+        for i, one in enumerate(compared)
+    ]
     is_suite = has_runs and is_stability_suite(opened)
     kinds = [
         (has_runs, INDEX, "Stability suite" if is_suite else "Overview"),
         (bool(bench), BENCH, "Error against run time"),
         (bool(modes), MODES, "Modes"),
-        (bool(compared), COMPARISON, "Data of another program"),
+        *((True, file, label) for file, label in data_pages),
         (has_runs and checked, CHECK, "Accuracy check"),
     ]
     there = [(file, label) for has, file, label in kinds if has]
@@ -113,8 +117,8 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
         pages |= bench_pages(opened, names[BENCH], site)
     if modes:
         pages[names[MODES]] = modes_page(list(read_modes(opened.path).values()), site, names[MODES])
-    if compared:
-        pages[names[COMPARISON]] = render("data_comparison", comparison_page(compared[0]), site, names[COMPARISON])
+    for (file, _), record in zip(data_pages, compared, strict=True):
+        pages[names[file]] = render("data_comparison", comparison_page(record), site, names[file])
     if has_runs and checked:
         pages[CHECK] = render("check", check_page(opened.path), site, CHECK)
     return pages

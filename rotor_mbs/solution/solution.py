@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from html import escape
@@ -114,8 +115,7 @@ class Solution:
         facts = {"scene": self.scene.name, "method": self.method, "status": self.status, "message": self.message}
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
-    def _repr_html_(self) -> str:
-        """For a notebook: a table of status and numbers."""
+    def _shown(self) -> dict[str, str]:
         reached = f"{self.time[-1]:g} s of {self.scene.duration:g} s" if len(self.time) else "no sample"
         rows = {
             "method": self.method,
@@ -124,9 +124,18 @@ class Solution:
             "reached": f"{reached}, {len(self.time)} samples",
             "steps": "" if self.integration.steps is None else str(self.integration.steps),
             "run time": f"{float(np.median(self.run_times_s)):.3g} s",
-            **{name: f"{value:.3g}" for name, value in self.metrics.items()},
         }
-        cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items() if v)
+        return {name: text for name, text in rows.items() if text}
+
+    def __repr__(self) -> str:
+        metrics = ", ".join(f"{name} {value:.3g}" for name, value in self.metrics.items())
+        lines = [f"{self.scene.name}: {self.scene.title}", *(f"{name}: {text}" for name, text in self._shown().items())]
+        return "\n  ".join([*lines, *textwrap.wrap(metrics, 110)[:3]])
+
+    def _repr_html_(self) -> str:
+        """For a notebook: a table of status and numbers."""
+        rows = self._shown() | {name: f"{value:.3g}" for name, value in self.metrics.items()}
+        cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table><caption>{escape(self.scene.title)}</caption>{cells}</table>"
 
 

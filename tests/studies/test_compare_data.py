@@ -18,9 +18,10 @@ import rotor_mbs as rm
 from rotor_mbs.analysis.data_verdict import as_dictionary
 from rotor_mbs.cli import main
 from rotor_mbs.models.lagrange import reference
+from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.data_comparison import verdict_of
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.records import read_records
+from rotor_mbs.store.records import read_records, write_records
 from rotor_mbs.testing import assert_agrees
 
 # (scene, format, duration of the short form, s)
@@ -208,6 +209,16 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(tmp_path: Pat
         xarray.testing.assert_equal(data, found.to_xarray())
     (record,) = read_records(tmp_path / "c.h5", "comparison")
     assert as_dictionary(verdict_of(record)) == as_dictionary(found.verdict)
+
+
+def test_every_comparison_of_a_file_has_a_page(tmp_path: Path) -> None:
+    run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
+    record = rm.compare_data({"time": run.time, "angles": run.angles}, run.scene).study.record()
+    write_records(tmp_path / "c.h5", [record, replace(record, scene="own")])
+    index = write_report(tmp_path / "c.h5", tmp_path)
+    pages = [path.read_text() for path in (index, tmp_path / "data--2.html")]
+    assert all(page.count("Data of another program: ") == 2 for page in pages)
+    assert 'href="data--2.html"' in pages[0]
 
 
 def test_a_test_of_another_project() -> None:
