@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
 
@@ -27,3 +30,27 @@ class Linearization:
         """(2n, 2n): d/dt of (δq, δq̇)."""
         n = len(self.stiffness)
         return np.block([[np.zeros((n, n)), np.eye(n)], [-self.stiffness, -self.damping]])
+
+
+def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
+    """`scene` from `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m; pitches at rest."""
+    return replace(
+        scene,
+        initial_angles=tuple(float(angle) for angle in angles),
+        initial_rates=(speed, *(0.0 for _ in scene.blades)),
+        rotor_torque=((0.0, torque),) if torque else (),
+        outputs=("angles",),
+    )
+
+
+def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
+    """Difference quotients with the steps h, 2h, 4h, ... extrapolated to a step of 0 (Richardson).
+
+    ratio   by which a doubled step enlarges the first term of the error, and each further term once more: 2 for
+            one-sided quotients, 4 for central ones
+    """
+    values = list(quotients)
+    for power in range(1, len(values)):
+        pairs = itertools.pairwise(values)
+        values = [(ratio**power * fine - coarse) / (ratio**power - 1.0) for fine, coarse in pairs]
+    return values[0]

@@ -341,11 +341,16 @@ def arrays(scene: Scene, samples: Samples) -> dict[str, Array]:
     return {name: values for name, values in found.items() if values is not None}
 
 
+def sample_times(scene: Scene) -> Array:
+    """(samples,) s, both ends included."""
+    return np.linspace(0.0, scene.duration, scene.samples)
+
+
 def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
     """The scales of a complete run: time in s, and the numbers of coordinates, blades and axes."""
     blades = len(scene.blades)
     return {
-        "time": np.linspace(0.0, scene.duration, scene.samples),
+        "time": sample_times(scene),
         "coordinate": np.arange(1 + blades),
         "blade": np.arange(1, 1 + blades),
         "axis": np.arange(3),

@@ -1,13 +1,20 @@
-"""What a model returns of a run: samples by quantity, and the engine's report. Knows no engine and no file format."""
+"""What a model returns of a run: samples by quantity, and the engine's report; how its rows become samples.
+
+Knows no engine and no file format.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rotor_mbs.solution.quantities import NAMES, Array
+import numpy as np
 
-__all__ = ["Array", "Integration", "Trajectory"]
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.quantities import NAMES, Array, sample_times
+
+__all__ = ["Array", "Integration", "Trajectory", "all_coordinates", "finite_rows", "finite_samples", "sample_times"]
 
 
 class Trajectory:
@@ -83,3 +90,23 @@ class Integration:
     steps: int | None = None
     rhs_evaluations: int | None = None
     out_of_time: bool = False
+
+
+def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, Array]:
+    """(n, 1 + blades) rad and rad/s from those of `scene.moving_coordinates`; a pitch that is fixed keeps its angle."""
+    found = np.tile(np.array(scene.initial_angles, dtype=angles.dtype), (len(angles), 1))
+    turning = np.zeros_like(found)
+    found[:, scene.moving_coordinates], turning[:, scene.moving_coordinates] = angles, rates
+    return found, turning
+
+
+def finite_rows(*tables: Array) -> int:
+    """How many rows from the first are finite in every table."""
+    finite = np.all([np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0)
+    return len(finite) if finite.all() else int(np.argmin(finite))
+
+
+def finite_samples(scene: Scene, arrays: Mapping[str, Array]) -> Trajectory:
+    """The samples of all `arrays` by name, (samples reached, ...), up to the first in which one is not finite."""
+    n = finite_rows(*arrays.values())
+    return Trajectory(sample_times(scene)[:n], **{name: values[:n] for name, values in arrays.items()})

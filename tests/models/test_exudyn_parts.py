@@ -16,7 +16,7 @@ from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import energy, geometry, sensor_samples, timetable
+from rotor_mbs.models.exudyn import energy, geometry, moments, sensor_samples
 
 KINDS = ("node", "object", "marker", "load", "sensor")
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
@@ -84,7 +84,7 @@ def test_the_tree_is_told_nothing_that_is_not_there(scene, absent) -> None:
     from rotor_mbs.models.exudyn import tree
 
     chosen = SCENES[scene]
-    told = next(p for p in tree.parts(chosen, timetable.Loads(chosen)) if p.type == "ObjectKinematicTree")
+    told = next(p for p in tree.parts(chosen, moments.Loads(chosen)) if p.type == "ObjectKinematicTree")
     assert not set(absent) & set(told.parameters)
 
 
@@ -267,19 +267,3 @@ def test_quaternion_and_rotation_vector_are_those_of_the_rotation() -> None:
         assert angle <= pi + 1e-15
         assert 1 + 2 * np.cos(angle) == pytest.approx(np.trace(R), abs=1e-14)
         assert np.abs(R @ axis - axis).max() < 1e-14
-
-
-def test_integration_intervals_meet_samples_and_kinks() -> None:
-    scene = replace(BARE, duration=1.0, samples=11, rotor_torque=((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0)))
-    pieces = timetable.load_segments(scene)
-    assert [(p.start, p.values[0]) for p in pieces] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
-    assert pieces[1].at(timetable.ROTOR, 0.47) == pytest.approx(2.0)
-    parts = timetable.integration_intervals(scene, pieces, every_sample=False)
-    ends = [interval.end for interval in parts]
-    assert np.allclose(ends, [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])
-    assert [interval.sample_intervals for interval in parts] == [3, 1, 1, 1, 3, 2]
-    assert len(timetable.integration_intervals(scene, pieces, every_sample=True)) == 11
-    assert timetable.steps_and_rows(0.01, 0.01 / 15, False) == (15, 1)
-    steps, rows = timetable.steps_and_rows(0.01, 1e-4 / 1.37, True)
-    assert (steps, rows) == (140, 10)
-    assert timetable.steps_and_rows(0.01, 1e-4, True) == (100, 100)

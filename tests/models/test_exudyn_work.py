@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from support.rotors import PAPER, make_scene
 
-from rotor_mbs.models.exudyn import energy, timetable
+from rotor_mbs.models.exudyn import energy
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import segments
 from rotor_mbs.solution.trajectory import Array
 
 # A torque of 0 to 4 N m, then a jump to 10: ∫ over a rate of one is t² / 2, then 8 + 10 (t - 4).
@@ -26,7 +27,7 @@ def work_at_unit_rate(time: Array) -> Array:
     scene = driven()
     angles, rates = np.zeros((len(time), 2)), np.zeros((len(time), 2))
     angles[:, 0], rates[:, 0] = time, 1.0
-    return energy.work(scene, timetable.load_segments(scene), time, angles, rates)
+    return energy.work(scene, segments(scene.load_tables, scene.duration), time, angles, rates)
 
 
 def exact_work(time: Array) -> Array:

@@ -234,17 +234,15 @@ def test_a_planted_error_is_noticed(monkeypatch: pytest.MonkeyPatch, fault: str)
     """The agreement is no accident: without the Coriolis acceleration, or with a lever off by 1e-5, it is lost."""
     (scene, _), right = AGREEING["full inertia"], closed_form_loads.root_load
 
-    def wrong(body, azimuth, pitch, turning, gravity):
+    def wrong(blade, azimuth, pitch, turning, gravity):
         spin, rate, spin_rate, rate_rate = turning
         if fault == "wrong lever":
-            x, y, z = body.centre
-            return right(replace(body, centre=(x, y, z * (1.0 + 1e-5))), azimuth, pitch, turning, gravity)
+            x, y, z = blade.centre_of_mass
+            return right(replace(blade, centre_of_mass=(x, y, z * (1.0 + 1e-5))), azimuth, pitch, turning, gravity)
         # The terms in Ω θ̇: half the difference of the loads at θ̇ and at -θ̇.
-        force, moment = right(body, azimuth, pitch, turning, gravity)
-        back = right(body, azimuth, pitch, (spin, -rate, spin_rate, rate_rate), gravity)
-        return tuple(
-            tuple(0.5 * (a + b) for a, b in zip(*pair, strict=True)) for pair in zip((force, moment), back, strict=True)
-        )
+        there = right(blade, azimuth, pitch, turning, gravity)
+        back = right(blade, azimuth, pitch, (spin, -rate, spin_rate, rate_rate), gravity)
+        return tuple(0.5 * (a + b) for a, b in zip(there, back, strict=True))
 
     monkeypatch.setattr(closed_form_loads, "root_load", wrong)
     exact = loads("lagrange/dop853", scene)

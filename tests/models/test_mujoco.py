@@ -35,7 +35,7 @@ from rotor_mbs.solution.trajectory import Trajectory
 
 pytest.importorskip("mujoco")
 
-from rotor_mbs.models.mujoco import mjcf, timetable
+from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.models.mujoco.adapter import Engine
 from rotor_mbs.models.mujoco.solver import MujocoSolver
 
@@ -222,17 +222,6 @@ def test_zero_pitch_that_is_unstable_stays_zero_in_a_symmetric_start() -> None:
     scene, exact = up_to_horizon("fig05")
     assert not run(scene).angles[:, 1:].any()
     assert angle_error(run(scene), exact).max() < 1e-12
-
-
-def test_kinks_are_stops_of_the_engine_and_samples_are_met() -> None:
-    stops = timetable.intervals(ONE_BLADE)
-    assert [stop.end for stop in stops if not stop.is_sample] == [0.5055]
-    assert [stop.end for stop in stops if stop.is_sample] == np.linspace(0.0, 1.2, 61)[1:].tolist()
-    on_sample = replace(ONE_BLADE, rotor_torque=((0.0, 1.0), (0.1 + 1e-14, 5.0), (0.1 + 1e-14, 2.0)))
-    assert all(stop.is_sample for stop in timetable.intervals(on_sample))
-    first, second = timetable.segments(on_sample)
-    assert first.at(first.end) == pytest.approx([5.0])
-    assert second.at(second.end) == [2.0]
 
 
 def test_steps_and_evaluations_are_counted() -> None:

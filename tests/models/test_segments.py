@@ -12,17 +12,17 @@ from support.scenes import ARM, MASS, OFFSET, paper
 from rotor_mbs.methods import time_limit
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
-from rotor_mbs.models.lagrange.parameters import LoadSegment
 from rotor_mbs.models.lagrange.samples import Advance, over_segments
+from rotor_mbs.scenario.time_table import Segment
 
 TIMES = np.linspace(0.0, 3.0, 7)
-SEGMENTS = [LoadSegment(start, start + 1.0, ()) for start in (0.0, 1.0, 2.0)]
+SEGMENTS = [Segment(start, start + 1.0, ()) for start in (0.0, 1.0, 2.0)]
 
 
 def advanced(message: str = "", evaluations: int | None = 5) -> tuple[Any, Any]:
     """A run of which every segment takes two steps and ends one higher; `message`: why the second one fails."""
 
-    def advance(segment: LoadSegment, state: Any, times: Any) -> Advance:
+    def advance(segment: Segment, state: Any, times: Any) -> Advance:
         failed = message if segment.start == 1.0 else ""
         rows = (state + times[:, None] - segment.start)[: 1 if failed else None]
         return Advance(rows, state + 1.0, 2, evaluations, failed)

@@ -19,8 +19,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
 from rotor_mbs.models.exudyn import adapter, chain, sensor_samples
 from rotor_mbs.models.exudyn.methods import MultibodySolver
+from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.models.exudyn.timetable import Loads
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution import judgement

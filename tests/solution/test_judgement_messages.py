@@ -10,7 +10,7 @@ from support.rotors import FIG08
 from support.scenes import paper
 
 from rotor_mbs.models.exudyn import tree
-from rotor_mbs.models.exudyn.timetable import Loads
+from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution

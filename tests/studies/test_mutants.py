@@ -43,21 +43,15 @@ EQUIVALENT = {
     ),
     r"sensor_samples\.unwrap .*right side of start - wrapped\[0\] lost": "rounded to turns, and less than half of one",
     r"sensor_samples\.unwrap .*scaled": "rounded to whole turns: 1 % of the way between two rows is no half turn",
-    r"timetable\.integration_intervals .*(0\.5 \* \(t0 \+ t1\)|right side of t0 \+ t1) scaled": (
+    r"time_table\.intervals .*(0\.5 \* \(t0 \+ t1\)|right side of t0 \+ t1) scaled": (
         "any instant inside the interval determines its segment"
     ),
-    r"timetable\.integration_intervals .*right side of scene\.samples - 1 scaled": (
+    r"time_table\.intervals .*right side of samples - 1 scaled": (
         "a kink that is off its sample by a millionth of the interval is taken to be on it"
     ),
-    r"timetable\.integration_intervals .*end - start scaled": "rounded to a whole number of intervals",
+    r"time_table\.intervals .*end - start scaled": "rounded to a whole number of intervals",
     r"mjcf\.model .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
     r"mjcf\.model .*0\.0 -> 1\.0": "the centre of mass of a hub that has no mass",
-    r"mujoco.timetable\._line .*(start - t0|slope \* \(start)": (
-        "a segment starts at a row of the one table there is: zero"
-    ),
-    r"mujoco.timetable\.intervals .*(0\.5 \* \(start \+ end\)|right side of start \+ end) scaled": (
-        "any instant inside the interval determines its segment"
-    ),
     r"literal\.fixed_pitch_acceleration .*(c2 -> s2|cos\(q2 \+ phase\): sine and cosine|:48: .* q2 \+ phase)": (
         "the cosine multiplies c, which is 0 where this function is used"
     ),
@@ -97,7 +91,7 @@ UNSEEN = {
     r"energy\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
         "a tolerance in matching times: any between round-off and the distance of two rows does as well"
     ),
-    r"mujoco.timetable\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
+    r"time_table\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
     r"ode_solvers\.ode45_integrator .*end - start|adapter\._schedule .*(0\.1 / |1\.0 - )": (
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands of intervals"
     ),

@@ -88,10 +88,15 @@ _TARGETS = (
             "_rotor_inertia",
             "_coefficients",
             "_cosine_of_turn",
-            "load_segments",
-            "_line",
         ),
     ),
+    # What all but the printed equations share: every group's verdicts see it.
+    Target(
+        "lagrange",
+        "rotor_mbs.scenario.time_table",
+        ("value_at", "constant_value", "values", "at", "segments", "_line", "values_before"),
+    ),
+    Target("multibody", "rotor_mbs.scenario.time_table", ("intervals", "steps_and_rows")),
     Target("lagrange", f"{_L}.samples", ("trajectory", "_put_energies", "constant_work")),
     Target("printed", f"{_P}.literal", ("*",)),
     Target("printed", f"{_P}.matrices", ("*",)),
@@ -115,7 +120,7 @@ _TARGETS = (
     Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
     Target("multibody", f"{_M}.tree", ("_node", "_tree", "_torque", "_tip_sensor")),
     Target("multibody", f"{_M}.energy", ("*",)),
-    Target("multibody", f"{_M}.timetable", ("at", "load_segments", "_line", "pitch_terms", "integration_intervals")),
+    Target("multibody", f"{_M}.moments", ("at", "pitch_terms")),
     Target("multibody", f"{_M}.sensor_samples", ("_fields", "_add_energies")),
     Target("chain", f"{_M}.geometry", ("quaternion", "quaternion_rate"), 1e-2),
     Target(
@@ -138,9 +143,8 @@ _TARGETS = (
     Target("chain", f"{_M}.sensor_samples", ("_joint_motion", "_dot", "unwrap"), 1e-2),
     # A thousandth: of fourth order, this model is bound to 1e-8.
     Target(
-        "mujoco", f"{_J}.mjcf", ("moving", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
+        "mujoco", f"{_J}.mjcf", ("loads_of", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
     ),
-    Target("mujoco", f"{_J}.timetable", ("at", "loads_of", "segments", "_line", "intervals", "steps_and_rows"), 1e-3),
     Target(
         "mujoco",
         f"{_J}.solver",
@@ -236,14 +240,11 @@ _CHECK = "studies/test_check.py::test_"
 _TESTS = {
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
     f"{_M}.sensor_samples": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
-    f"{_M}.timetable": (f"{_PARTS}integration_intervals_meet_samples_and_kinks",),
+    "rotor_mbs.scenario.time_table": ("scenario/test_time_table.py",),
     f"{_M}.tree": ("solution/test_judgement_messages.py",),
     f"{_J}.mjcf": (
         f"{_MUJOCO}point_masses_have_no_inertia_that_the_scene_does_not_give",
         f"{_MUJOCO}an_inertia_at_the_limit_of_the_triangle_inequality",
-    ),
-    f"{_J}.timetable": (
-        f"{_MUJOCO}kinks_are_stops_of_the_engine_and_samples_are_met",
         f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
     ),
     f"{_J}.solver": (

@@ -18,7 +18,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.methods.time_limit import message as out_of_time
 from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.models.exudyn.timetable import IntegrationInterval, steps_and_rows
+from rotor_mbs.scenario.time_table import Interval, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration
 
 os.environ.setdefault("EXUDYN_SUPPRESS_UI_WINDOW_OPEN", "1")
@@ -128,9 +128,9 @@ class System:
     def integrate(
         self,
         scheme: Scheme,
-        intervals: Sequence[IntegrationInterval],
+        intervals: Sequence[Interval],
         rows_between: bool,
-        before_interval: Callable[[IntegrationInterval], None],
+        before_interval: Callable[[Interval], None],
     ) -> Integration:
         """From the initial state to the end of the last interval, or to the first failure, which is in the result.
 
@@ -236,7 +236,7 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     return settings
 
 
-def _schedule(settings: Any, scheme: Scheme, interval: IntegrationInterval, rows_between: bool) -> None:
+def _schedule(settings: Any, scheme: Scheme, interval: Interval, rows_between: bool) -> None:
     integration = settings.timeIntegration
     span = (interval.end - interval.start) / interval.sample_intervals
     steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
@@ -248,7 +248,7 @@ def _schedule(settings: Any, scheme: Scheme, interval: IntegrationInterval, rows
     settings.solution.sensors.writePeriod = 0.0 if every_step else period
 
 
-def _count(total: Integration, scheme: Scheme, interval: IntegrationInterval, it: Any, failure: str) -> None:
+def _count(total: Integration, scheme: Scheme, interval: Interval, it: Any, failure: str) -> None:
     """Add one interval's outcome; an implicit step evaluates its residual once more than it iterates.
 
     The engine's index is one ahead of the steps it took, and two where the last one failed.

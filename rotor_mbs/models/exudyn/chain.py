@@ -28,9 +28,9 @@ from rotor_mbs.models.exudyn.geometry import (
     rotation_z,
 )
 from rotor_mbs.models.exudyn.loads import chain_sensors
-from rotor_mbs.models.exudyn.timetable import ROTOR, Loads, Moment, constant_rest, is_driven, pitch_terms
+from rotor_mbs.models.exudyn.moments import ROTOR, Loads, Moment, is_driven, pitch_terms
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import is_constant
+from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
 
 NODES = ("euler_parameters", "rotation_vector")
@@ -142,7 +142,7 @@ def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) 
     """Spring, damper and torque between hub and blade; the engine adds `torque` to what resists."""
     stiffness, damping = scene.bearing(blade)
     name, moment = f"pitch spring {blade + 1}", Moment(loads, pitch_terms(scene, blade))
-    constants = {"stiffness": stiffness, "damping": damping, "offset": constant_rest(scene, blade)}
+    constants = {"stiffness": stiffness, "damping": damping, "offset": constant_value(scene.pitch_load(blade)[1])}
     if all(map(is_constant, scene.pitch_load(blade))):
         constants["torque"] = -moment.at(0.0)
     constants = {key: value for key, value in constants.items() if value}

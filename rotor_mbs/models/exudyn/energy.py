@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.models.exudyn.geometry import pitching
-from rotor_mbs.models.exudyn.timetable import ROTOR, LoadSegment, pitch_terms, rest_of, sample_times
+from rotor_mbs.models.exudyn.moments import ROTOR, pitch_terms
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import is_constant, value_at
-from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.scenario.time_table import Segment, is_constant, values_at
+from rotor_mbs.solution.trajectory import Array, sample_times
 
 # Points of the local polynomial that stands in for the power between rows.
 _POINTS = 8
@@ -24,15 +24,13 @@ def spring_energy(scene: Scene, angles: Array) -> Array:
     total = np.zeros(len(angles))
     if scene.bearing_stiffness:
         for i in pitching(scene):
-            total += (
-                0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - _over_samples(scene, rest_of(i), angles)) ** 2
-            )
+            total += 0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - _rest(scene, i, angles)) ** 2
     return total
 
 
-def _over_samples(scene: Scene, load: int, angles: Array) -> Array:
-    table = scene.load_tables[load]
-    return np.array([value_at(table, t) for t in sample_times(scene)[: len(angles)].tolist()])
+def _rest(scene: Scene, blade: int, angles: Array) -> Array:
+    """(n,) rad at the first n samples."""
+    return values_at(scene.pitch_load(blade)[1], sample_times(scene)[: len(angles)])
 
 
 def work_needs_rows(scene: Scene) -> bool:
@@ -40,7 +38,7 @@ def work_needs_rows(scene: Scene) -> bool:
     return scene.has_damping or not scene.has_constant_loads
 
 
-def work(scene: Scene, segments: Sequence[LoadSegment], time: Array, angles: Array, rates: Array) -> Array:
+def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the torques less what the dampers took, from rows of time s, angles rad, rates rad/s.
 
     A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `work_of_rests`.
@@ -84,7 +82,7 @@ def work_of_rests(scene: Scene, angles: Array) -> Array:
     total = np.zeros(len(angles))
     for i in pitching(scene):
         if not is_constant(scene.pitch_load(i)[1]):
-            rest = _over_samples(scene, rest_of(i), angles)
+            rest = _rest(scene, i, angles)
             energy = 0.5 * scene.bearing_stiffness[i] * rest * (rest - 2.0 * angles[:, 1 + i])
             total += energy - energy[:1]
     return total

@@ -8,9 +8,7 @@ gravity are wrong by percents.)
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,9 +16,9 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.adapter import Linearized, System
 from rotor_mbs.models.exudyn.geometry import pitching, quaternion
-from rotor_mbs.models.exudyn.timetable import Loads
+from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.linearization import Linearization
+from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
 from rotor_mbs.solution.trajectory import Array
 
 # rad, m: each doubling of the step takes one order of it out of the error.
@@ -32,7 +30,7 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
 
     Raises MethodRefusal where the engine does not take the scene.
     """
-    state = _at(scene, angles, speed, torque)
+    state = scene_at(scene, angles, speed, torque)
     system = System(tree.parts(state, Loads(state)))
     found = _extrapolated(system.linearized)
     inverse = np.asarray(np.linalg.inv(found.M), dtype=np.float64)
@@ -46,7 +44,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array) -> Linearizat
 
     Raises MethodRefusal where the engine does not take the scene, or the state is not at rest.
     """
-    state = _at(scene, angles, 0.0, 0.0)
+    state = scene_at(scene, angles, 0.0, 0.0)
     system = System(chain.parts(state, Loads(state), "euler_parameters"))
     found = _extrapolated(system.linearized)
     force = system.forces()
@@ -55,7 +53,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array) -> Linearizat
     if left > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(found.K).max():
         raise MethodRefusal(f"exudyn_chain: not at rest: {left:g} N of the forces are not taken by the joints")
     N = _free_directions(found.C)
-    geometric = _limit([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS])
+    geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
     joint = _joint_angles(state) @ N
     mass = N.T @ found.M @ N
 
@@ -67,26 +65,8 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array) -> Linearizat
     return Linearization(stiffness, damping, joint @ np.linalg.solve(mass, N.T @ force))
 
 
-def _at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
-    return replace(
-        scene,
-        initial_angles=tuple(float(angle) for angle in angles),
-        initial_rates=(speed, *(0.0 for _ in scene.blades)),
-        rotor_torque=((0.0, torque),) if torque else (),
-        outputs=("angles",),
-    )
-
-
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
-    return Linearized(*(_limit(list(matrices)) for matrices in zip(*map(linearized, _STEPS), strict=True)))
-
-
-def _limit(values: list[Array]) -> Array:
-    """At step 0, from values at h, 2h, 4h, ... whose error is a power series of the step (Richardson)."""
-    for power in range(1, len(values)):
-        pairs = itertools.pairwise(values)
-        values = [(2.0**power * fine - coarse) / (2.0**power - 1.0) for fine, coarse in pairs]
-    return values[0]
+    return Linearized(*(limit_at_zero(matrices, 2.0) for matrices in zip(*map(linearized, _STEPS), strict=True)))
 
 
 def _free_directions(C: Array) -> Array:

@@ -13,8 +13,9 @@ import numpy as np
 
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
 from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, blade_body, fixed_blade_rotation, mounting, pitching
-from rotor_mbs.models.exudyn.timetable import ROTOR, LoadSegment, is_driven
+from rotor_mbs.models.exudyn.moments import ROTOR, is_driven
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Segment, values_before
 from rotor_mbs.solution.trajectory import Array
 
 # (name of a sensor) -> (samples, k) values
@@ -68,7 +69,7 @@ def newton_euler(scene: Scene, blade: BladeOnBody, sampled: Sampled) -> tuple[Ar
     return force, moment, frames
 
 
-def tree_loads(scene: Scene, segments: Sequence[LoadSegment], time: Array, sampled: Sampled) -> dict[str, Array]:
+def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: Sampled) -> dict[str, Array]:
     """Loads of the kinematic tree: every blade by Newton and Euler, and their sum with the hub's share at the shaft.
 
     The moment of a pitch actuator is what they leave about the pitch axis.
@@ -77,7 +78,7 @@ def tree_loads(scene: Scene, segments: Sequence[LoadSegment], time: Array, sampl
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
     shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
     assert isinstance(shaft_moment, np.ndarray)
-    shaft_moment[:, 1] -= torque_before(segments, time)
+    shaft_moment[:, 1] -= values_before(segments, time)[ROTOR]
     if scene.hub_inertia:
         shaft_moment[:, 1] += scene.hub_inertia * sampled("hub spin rate")[:, 1]
     actuators = np.zeros((len(time), len(blades)))
@@ -168,12 +169,6 @@ def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> t
     multipliers = sampled(f"{joint} torque")
     x, y, z = root[:, :, 0], root[:, :, 1], seat[:, :, 2]
     return force, multipliers[:, :1] * np.cross(z, x) + multipliers[:, 1:2] * np.cross(z, y)
-
-
-def torque_before(segments: Sequence[LoadSegment], time: Array) -> Array:
-    """(n,) N m on the rotor; at a jump the value before it, at 0 the one after."""
-    which = np.searchsorted([segment.end for segment in segments[:-1]], time * (1.0 - 1e-12))
-    return np.array([segments[k].at(ROTOR, float(t)) for k, t in zip(which, time, strict=True)])
 
 
 def _matrices(rows: Array) -> Array:

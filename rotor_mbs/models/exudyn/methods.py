@@ -20,8 +20,9 @@ from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
 from rotor_mbs.models.exudyn.energy import work_needs_rows
 from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, ExtrapolatedSolver
-from rotor_mbs.models.exudyn.timetable import Loads, LoadSegment, integration_intervals
+from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Segment, intervals
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
@@ -29,7 +30,7 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 _SHORTEST_INTERVAL = 1e-8
 _MOST_STEPS = 1e9
 
-Reading = Callable[[Scene, Sequence[LoadSegment], Callable[[str], Array]], Trajectory]
+Reading = Callable[[Scene, Sequence[Segment], Callable[[str], Array]], Trajectory]
 
 
 _NODE = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
@@ -68,7 +69,7 @@ class MultibodySolver:
 
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
-        self._intervals = integration_intervals(scene, loads.segments, every_sample=scheme.step is None)
+        self._intervals = intervals(loads.segments, scene.samples, every_sample=scheme.step is None)
         self.system = System(parts)
 
     def integrate(self) -> Integration:

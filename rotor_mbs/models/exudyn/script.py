@@ -14,7 +14,7 @@ import numpy as np
 from rotor_mbs.models.exudyn import tree
 from rotor_mbs.models.exudyn.blueprint import Part, Ref
 from rotor_mbs.models.exudyn.geometry import pitching
-from rotor_mbs.models.exudyn.timetable import Loads, Moment
+from rotor_mbs.models.exudyn.moments import Loads, Moment
 from rotor_mbs.scenario.scene import Scene
 
 _STEP = 6.7e-4  # s, the largest time step: the default of exudyn_tree/rk67

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,9 @@ from numpy.typing import NDArray
 from rotor_mbs.models.exudyn import chain, energy, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
 from rotor_mbs.models.exudyn.loads import chain_loads, tree_loads
-from rotor_mbs.models.exudyn.timetable import LoadSegment, sample_times
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Array, Trajectory
+from rotor_mbs.scenario.time_table import Segment
+from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times
 
 Indices = NDArray[np.intp]
 
@@ -25,7 +24,7 @@ class _Reader:
         tables = {name: recorded(name) for name in state}
         time = next(iter(tables.values()))[:, 0]
         kept = _distinct_rows(scene, time)
-        self._rows = kept[: _finite_rows(*(table[kept] for table in tables.values()))]
+        self._rows = kept[: finite_rows(*(table[kept] for table in tables.values()))]
         self._tables, self._recorded = tables, recorded
         self.time = time[self._rows]
         self.samples = _sample_rows(scene, self.time)
@@ -41,19 +40,18 @@ class _Reader:
         return self.all(name)[self.samples]
 
 
-def tree_trajectory(scene: Scene, segments: Sequence[LoadSegment], recorded: Callable[[str], Array]) -> Trajectory:
+def tree_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array]) -> Trajectory:
     """The kinematic tree's own coordinates; `recorded` gives (n, 1 + k) rows of a sensor, time first."""
     read = _Reader(scene, recorded, ("angles", "rates"))
-    angles = _all_blades(scene, read.all("angles"), scene.initial_angles)
-    rates = _all_blades(scene, read.all("rates"), (0.0,) * len(scene.initial_rates))
+    angles, rates = all_coordinates(scene, read.all("angles"), read.all("rates"))
     bodies = [(tree.link_name(link), body) for link, body in enumerate(tree.bodies(scene))]
     fields = _fields(scene, segments, read, angles, rates, bodies)
     if scene.wants("loads"):
         fields |= tree_loads(scene, segments, read.time[read.samples], read.sampled)
-    return _cut(scene, fields)
+    return finite_samples(scene, fields)
 
 
-def chain_trajectory(scene: Scene, segments: Sequence[LoadSegment], recorded: Callable[[str], Array]) -> Trajectory:
+def chain_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array]) -> Trajectory:
     """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps."""
     placed = chain.placed_bodies(scene)
     bodies = [(each.name, each.body) for each in placed]
@@ -64,15 +62,7 @@ def chain_trajectory(scene: Scene, segments: Sequence[LoadSegment], recorded: Ca
     fields["constraint_error"] = _largest_gap(read, bodies)
     if scene.wants("loads"):
         fields |= chain_loads(scene, read.sampled)
-    return _cut(scene, fields)
-
-
-def _all_blades(scene: Scene, moving: Array, fixed: Sequence[float]) -> Array:
-    """(n, 1 + blades): the columns that move, and the fixed value where a blade cannot pitch."""
-    out = np.empty((len(moving), len(fixed)))
-    out[:] = fixed
-    out[:, scene.moving_coordinates] = moving
-    return out
+    return finite_samples(scene, fields)
 
 
 def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
@@ -89,11 +79,7 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
         rate = read.all(f"blade {i + 1} spin")[:, 2] - _dot(hub_omega, z)
         angles.append(unwrap(read.time, wrapped, rate, scene.initial_angles[1 + i]))
         rates.append(rate)
-    still = (0.0,) * len(scene.initial_rates)
-    return (
-        _all_blades(scene, np.stack(angles, axis=1), scene.initial_angles),
-        _all_blades(scene, np.stack(rates, axis=1), still),
-    )
+    return all_coordinates(scene, np.stack(angles, axis=1), np.stack(rates, axis=1))
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -119,7 +105,7 @@ def _largest_gap(read: _Reader, bodies: Sequence[tuple[str, Body]]) -> Array:
 
 def _fields(
     scene: Scene,
-    segments: Sequence[LoadSegment],
+    segments: Sequence[Segment],
     read: _Reader,
     angles: Array,
     rates: Array,
@@ -161,16 +147,6 @@ def _distinct_rows(scene: Scene, time: Array) -> Indices:
     return np.flatnonzero(np.concatenate([[True], np.diff(time) > slack]))
 
 
-def _finite_rows(*tables: Array) -> int:
-    """How many rows from the first are finite in every table."""
-    if not len(tables[0]):
-        return 0
-    finite = np.ones(len(tables[0]), dtype=bool)
-    for table in tables:
-        finite &= np.isfinite(table.reshape(len(table), -1)).all(axis=1)
-    return len(finite) if finite.all() else int(np.argmin(finite))
-
-
 def _sample_rows(scene: Scene, time: Array) -> Indices:
     """Row of each sample, as far as they were reached without a gap."""
     wanted = sample_times(scene)
@@ -193,10 +169,3 @@ def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
     turns = np.round((start - wrapped[0]) / turn) + np.concatenate([[0.0], np.cumsum(gained)])
     unwrapped: Array = wrapped + turn * turns
     return unwrapped
-
-
-def _cut(scene: Scene, fields: Mapping[str, Array]) -> Trajectory:
-    """The samples as a trajectory, up to the first row in which any field is not finite."""
-    n = _finite_rows(*fields.values())
-    kept: dict[str, Any] = {name: table[:n] for name, table in fields.items()}
-    return Trajectory(time=sample_times(scene)[:n], **kept)

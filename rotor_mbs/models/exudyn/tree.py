@@ -17,9 +17,9 @@ from rotor_mbs.models.exudyn.geometry import (
     pitching,
 )
 from rotor_mbs.models.exudyn.loads import tree_sensors
-from rotor_mbs.models.exudyn.timetable import ROTOR, Loads, Moment, constant_rest, pitch_terms
+from rotor_mbs.models.exudyn.moments import ROTOR, Loads, Moment, pitch_terms
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import is_constant
+from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
 
 _TREE = Ref("object", "rotor")
@@ -88,7 +88,7 @@ def _tree(scene: Scene) -> Part:
         detail += ", gravity"
     if any(stiffness := [scene.bearing(i)[0] for i in blades]):
         parameters["jointPControlVector"] = [0.0, *stiffness]
-        parameters["jointPositionOffsetVector"] = [0.0, *(constant_rest(scene, i) for i in blades)]
+        parameters["jointPositionOffsetVector"] = [0.0, *(constant_value(scene.pitch_load(i)[1]) for i in blades)]
         detail += ", bearing stiffness"
     damping = [scene.shaft_damping, *(scene.bearing(i)[1] for i in blades)]
     if any(damping):

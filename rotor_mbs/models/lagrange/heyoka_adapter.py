@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import ModuleType
 from typing import Any
@@ -85,6 +85,16 @@ def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
     real128 = heyoka().real128
     numbers = [real128(str(value.numerator)) / real128(str(value.denominator)) for value in values]
     return np.array(numbers, dtype=real128)
+
+
+def quad_arithmetic() -> tuple[Callable[[Fraction], Any], Callable[[Any], Any], Callable[[Any], Any]]:
+    """To a quad number; sine and cosine of arrays of them as objects, which NumPy multiplies by doubles, too."""
+    real128 = heyoka().real128
+
+    def of_objects(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        return lambda numbers: function(numbers.astype(real128)).astype(object)
+
+    return lambda value: array_of([value], quad=True)[0], of_objects(np.sin), of_objects(np.cos)
 
 
 def failure(outcome: Any) -> str:

@@ -15,7 +15,6 @@ from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.parameters import (
-    LoadSegment,
     RotorForm,
     changing_loads,
     load_segments,
@@ -24,7 +23,8 @@ from rotor_mbs.models.lagrange.parameters import (
 )
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.scenario.time_table import Segment
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 # As closed_form.accelerations
@@ -58,14 +58,14 @@ class OdeSolver:
         columns = scene.moving_coordinates
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
         self._initial = np.concatenate([*start, np.zeros(int(self._work_unit > 0.0))])
-        self._times = np.linspace(0.0, scene.duration, scene.samples) if times is None else times
+        self._times = sample_times(scene) if times is None else times
         self._states: Array = self._initial[None, :]
 
     def integrate(self) -> Integration:
         self._states, integration = over_segments(self._times, self._segments, self._initial, self._advance)
         return integration
 
-    def _advance(self, segment: LoadSegment, state: Array, times: Array) -> Advance:
+    def _advance(self, segment: Segment, state: Array, times: Array) -> Advance:
         function = right_hand_side(
             self._scene, self._form, segment, work_unit=self._work_unit, accelerations=self._accelerations
         )
@@ -96,7 +96,7 @@ def work_unit(scene: Scene) -> float:
 def right_hand_side(
     scene: Scene,
     form: RotorForm,
-    segment: LoadSegment,
+    segment: Segment,
     *,
     work_unit: float = 0.0,
     accelerations: Accelerations | None = None,
@@ -107,15 +107,13 @@ def right_hand_side(
     """
     equations = accelerations or closed_form.accelerations
     count = 1 + len(form.blades)
-    lines = [(float(offset), float(slope)) for offset, slope in segment.lines]
     changing = changing_loads(scene)
-    start = load_values([offset for offset, _ in lines])
-    constant = start if not any(slope for _, slope in lines) else None
+    constant = None if any(segment.slopes) else load_values(segment.values)
 
     def derivative(time: float, state: Sequence[float]) -> list[float]:
         values = state.tolist() if isinstance(state, np.ndarray) else state
         angles, rates = values[:count], values[count : 2 * count]
-        loads = constant or load_values([offset + slope * time for offset, slope in lines])
+        loads = constant or load_values(segment.loads_at(time))
         try:
             found = equations(angles, rates, form, loads, math.sin, math.cos)
         except (ZeroDivisionError, ValueError, OverflowError):

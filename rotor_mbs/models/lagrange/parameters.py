@@ -1,6 +1,6 @@
-"""A scene's numbers as the closed form needs them: coefficients, load segments, units of rates.
+"""A scene's numbers as the closed form needs them: coefficients, loads, units of rates.
 
-Coefficients and segments are in exact rational arithmetic until the last step. Why: for a point mass the coefficients
+Coefficients are in exact rational arithmetic until the last step. Why: for a point mass the coefficients
 Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating point they leave a rounding remainder, and near
 a pitch of ±π/2 that remainder, not the physics, would be the inertia. Knows the scene only; no integrator.
 """
@@ -8,17 +8,16 @@ a pitch of ±π/2 that remainder, not the physics, would be the inertia. Knows t
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.scenario.time_table import Table, is_constant, knots
+from rotor_mbs.scenario.time_table import Segment, Table, is_constant, segments
 from rotor_mbs.solution.trajectory import Array
 
 # A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic parameter.
@@ -163,17 +162,6 @@ def _cosine_of_turn(turn: Fraction) -> Fraction:
     return Fraction(total, _ONE).limit_denominator(10**50)
 
 
-class LoadSegment(NamedTuple):
-    """From `start` to `end` (s) load i is lines[i] = (offset, slope): offset + slope·t (N m or rad, per s; exact).
-
-    The loads are those of `load_tables`.
-    """
-
-    start: float
-    end: float
-    lines: tuple[tuple[Fraction, Fraction], ...]
-
-
 def load_tables(scene: Scene) -> tuple[Table, ...]:
     """Loads over time: rotor torque, then the torque of each pitch that moves, then the rest angle of each."""
     pitches = [scene.pitch_load(column - 1) for column in scene.moving_coordinates[1:]]
@@ -185,33 +173,9 @@ def changing_loads(scene: Scene) -> tuple[int, ...]:
     return tuple(i for i, table in enumerate(load_tables(scene)) if not is_constant(table))
 
 
-def load_segments(scene: Scene) -> list[LoadSegment]:
-    """The whole duration, cut where a load has a kink or a jump; one segment where all are constant."""
-    tables = load_tables(scene)
-    cuts = [0.0, *knots(tables, scene.duration), scene.duration]
-    return [
-        LoadSegment(start, end, tuple(_line(table, start, end) for table in tables))
-        for start, end in itertools.pairwise(cuts)
-    ]
-
-
-def _line(table: Table, start: float, end: float) -> tuple[Fraction, Fraction]:
-    """Offset and slope of a table that has no kink between `start` and `end`."""
-    if is_constant(table):
-        return Fraction(table[0][1] if table else 0), Fraction(0)
-    before = [row for row in table if row[0] <= start] or [table[0]]
-    after = [row for row in table if row[0] >= end] or [table[-1]]
-    (t0, value0), (t1, value1) = (map(Fraction, row) for row in (before[-1], after[0]))
-    slope = (value1 - value0) / (t1 - t0) if t1 > t0 and value1 != value0 else Fraction(0)
-    return value0 - slope * t0, slope
-
-
-def loads_before(scene: Scene, times: Array) -> list[Array]:
-    """(n,) of each of `load_tables` at `times` (s): at a jump the value before it, at 0 the one after."""
-    segments = load_segments(scene)
-    which = np.searchsorted([segment.end for segment in segments[:-1]], times)
-    lines = np.array([[(float(offset), float(slope)) for offset, slope in segment.lines] for segment in segments])
-    return list((lines[which, :, 0] + lines[which, :, 1] * times[:, None]).T)
+def load_segments(scene: Scene) -> tuple[Segment, ...]:
+    """The whole run; the loads of a segment are those of `load_tables`."""
+    return segments(load_tables(scene), scene.duration)
 
 
 def work_is_integrated(scene: Scene) -> bool:

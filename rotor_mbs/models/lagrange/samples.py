@@ -12,10 +12,10 @@ from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.loads import sampled_loads
-from rotor_mbs.models.lagrange.parameters import LoadSegment, RotorForm, changing_loads, load_tables, rotor_form
+from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, load_tables, rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import value_at
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.scenario.time_table import Segment, value_at, values_at
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_rows
 
 
 class Advance(NamedTuple):
@@ -36,9 +36,9 @@ class Advance(NamedTuple):
 
 def over_segments(
     times: Array,
-    segments: Sequence[LoadSegment],
+    segments: Sequence[Segment],
     initial: Any,
-    advance: Callable[[LoadSegment, Any, Array], Advance],
+    advance: Callable[[Segment, Any, Array], Advance],
 ) -> tuple[Any, Integration]:
     """States at the samples, (n, variables), cut before the first row that is not finite; and the engine's report.
 
@@ -57,8 +57,7 @@ def over_segments(
         if message:
             break
     states = np.concatenate(rows)
-    finite = np.isfinite(states.astype(float, copy=False)).all(axis=1)
-    states = states[: len(states) if finite.all() else int(np.argmin(finite))]
+    states = states[: finite_rows(states.astype(float, copy=False))]
     reached = float(times[max(len(states) - 1, 0)])
     return states, Integration(not message, message, reached, steps, evaluations, message == deadline.message())
 
@@ -69,12 +68,8 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     times   (n or more,) s
     states  (n, 2k) angles, then rates, of the k coordinates that move; with the work in J as one more column, or not
     """
-    columns, time = scene.moving_coordinates, times[: len(states)]
-    count = len(columns)
-    angles = np.tile(np.array(scene.initial_angles, dtype=float), (len(time), 1))
-    rates = np.zeros_like(angles)
-    angles[:, columns] = states[:, :count]
-    rates[:, columns] = states[:, count : 2 * count]
+    count, time = len(scene.moving_coordinates), times[: len(states)]
+    angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
     result = Trajectory(time, angles, rates)
     if scene.wants("tip"):
         paths = [
@@ -107,7 +102,7 @@ def loads_at(scene: Scene, time: Array) -> LoadValues:
     """Loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
     values: list[Any] = [value_at(table, 0.0) for table in load_tables(scene)]
     for i in changing_loads(scene):
-        values[i] = np.array([value_at(load_tables(scene)[i], t) for t in time.tolist()])
+        values[i] = values_at(load_tables(scene)[i], time)
     return load_values(values)
 
 

@@ -16,7 +16,6 @@ from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import (
-    LoadSegment,
     RotorForm,
     changing_loads,
     load_segments,
@@ -25,7 +24,8 @@ from rotor_mbs.models.lagrange.parameters import (
 )
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.scenario.time_table import Segment
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
 # Unrolled code is twice as fast as compact code, but its compile time grows with the number of blades.
 _UNROLLED_BLADES = 4
@@ -137,7 +137,7 @@ class Propagation:
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
         self._changing = system.changing
         self._segments = load_segments(scene)
-        self.times = np.linspace(0.0, scene.duration, scene.samples) if times is None else times
+        self.times = sample_times(scene) if times is None else times
         self.states = self._initial[None, :]
 
     def run(self) -> Integration:
@@ -146,7 +146,7 @@ class Propagation:
         self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
         return integration
 
-    def _advance(self, segment: LoadSegment, _state: Array, times: Array) -> Advance:
+    def _advance(self, segment: Segment, _state: Array, times: Array) -> Advance:
         """From where the integrator is, the end of the segment before."""
         integrator, kind = self._integrator, self._initial.dtype
         if self._changing:

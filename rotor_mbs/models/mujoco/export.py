@@ -6,8 +6,8 @@ import math
 from xml.etree import ElementTree as ET
 
 from rotor_mbs.models.mujoco import mjcf
-from rotor_mbs.models.mujoco.timetable import loads_of, segments, steps_and_rows
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import steps_and_rows
 
 STEP = 2.5e-4  # s, of the file where none is given: the default of mujoco/rk4
 
@@ -26,20 +26,20 @@ def mjcf_file(scene: Scene, integrator: str = "rk4", step: float = STEP) -> str:
     root = mjcf.model(scene, integrator, spacing / steps)
     root.insert(0, ET.Comment(_header(scene, steps)))
     _add_shapes(root, scene)
-    pieces = segments(scene)
-    if loads_of(scene):
+    pieces, has_loads = mjcf.load_segments(scene), bool(mjcf.loads_of(scene))
+    if has_loads:
         custom = ET.SubElement(root, "custom")
         for number, piece in enumerate(pieces, start=1):
-            data = mjcf.numbers(piece.start, *piece.value, *piece.slope)
+            data = mjcf.numbers(piece.start, *piece.values, *piece.slopes)
             ET.SubElement(custom, "numeric", name=f"segment {number}", data=data)
     keyframe = ET.SubElement(root, "keyframe")
     key = ET.SubElement(keyframe, "key", name="start")
-    moving = mjcf.moving(scene)
+    moving = scene.moving_coordinates
     key.set("qpos", mjcf.numbers(*(scene.initial_angles[i] for i in moving)))
     key.set("qvel", mjcf.numbers(*(scene.initial_rates[i] for i in moving)))
-    if loads_of(scene):
-        key.set("act", mjcf.numbers(*pieces[0].value))
-        key.set("ctrl", mjcf.numbers(*pieces[0].slope))
+    if has_loads:
+        key.set("act", mjcf.numbers(*pieces[0].values))
+        key.set("ctrl", mjcf.numbers(*pieces[0].slopes))
     return mjcf.text(root)
 
 
@@ -49,7 +49,7 @@ def _header(scene: Scene, steps: int) -> str:
         f"SI units, rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from one to the next.",
         "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then mj_step(model, data, nstep=...).",
     ]
-    if loads_of(scene):
+    if mjcf.loads_of(scene):
         lines += [
             "An actuator's activation is its torque in N m, its control the slope of the torque in N m/s. An actuator",
             '"rest ..." has the rest angle of a spring in rad instead, and the stiffness as its gain.',

@@ -22,22 +22,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.models.mujoco.timetable import constant_rest, loads_of
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Segment, Table, constant_value, is_constant, segments
 
 LEAST = 2e-15  # kg, kg m²
 
 INTEGRATORS = {"rk4": "RK4", "implicitfast": "implicitfast"}
 
 
-def moving(scene: Scene) -> tuple[int, ...]:
-    """Coordinates that have a hinge, in the order of the engine's: 0 for the rotor, i for the pitch of blade i."""
-    return (0, *(i for i, blade in enumerate(scene.blades, start=1) if blade.has_pitch_inertia))
+@dataclass(frozen=True)
+class Load:
+    """A moment `gain` times a table over time, on a coordinate (0 = rotor).
+
+    gain   1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
+    """
+
+    name: str
+    coordinate: int
+    gain: float
+    table: Table
+
+
+def loads_of(scene: Scene) -> list[Load]:
+    """Torque on the rotor, torques of the pitches that move, rest angles that change over time, as far as there are."""
+    found = [Load("torque rotor", 0, 1.0, scene.rotor_torque)] if scene.has_torque else []
+    for number in scene.moving_coordinates[1:]:
+        torque, rest = scene.pitch_load(number - 1)
+        if torque:
+            found.append(Load(f"torque pitch {number}", number, 1.0, torque))
+        if not is_constant(rest):
+            found.append(Load(f"rest pitch {number}", number, scene.bearing(number - 1)[0], rest))
+    return found
+
+
+def load_segments(scene: Scene) -> tuple[Segment, ...]:
+    """The whole run; the loads of a segment are those of `loads_of`: activations, and their slopes."""
+    return segments([load.table for load in loads_of(scene)], scene.duration)
 
 
 def joint_name(coordinate: int) -> str:
@@ -106,7 +132,7 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(*_quaternion(phase, pitch)))
     if blade.has_pitch_inertia:
         stiffness, damping = scene.bearing(number - 1)
-        _joint(body, number, "0 0 1", stiffness, damping, constant_rest(scene, number))
+        _joint(body, number, "0 0 1", stiffness, damping, constant_value(scene.pitch_load(number - 1)[1]))
     _inertial(body, blade.mass, blade.centre_of_mass, blade.inertia)
     if scene.wants("tip"):
         ET.SubElement(body, "site", name=f"tip {number}", pos=numbers(*blade.tip))

@@ -13,18 +13,16 @@ import numpy as np
 from rotor_mbs.methods import time_limit
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.models.mujoco.adapter import Engine, Poses
-from rotor_mbs.models.mujoco.timetable import (
-    Interval,
-    Segment,
-    intervals,
-    loads_of,
-    sample_times,
-    segments,
-    steps_and_rows,
-)
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import is_constant, value_at
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
+from rotor_mbs.solution.trajectory import (
+    Array,
+    Integration,
+    Trajectory,
+    all_coordinates,
+    finite_samples,
+    sample_times,
+)
 
 # Evaluations of the equations of motion in a step.
 _STAGES = {"rk4": 4, "implicitfast": 1}
@@ -61,8 +59,8 @@ class MujocoSolver:
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
-        self._moving = list(mjcf.moving(scene))
-        self._intervals = intervals(scene)
+        self._moving = scene.moving_coordinates
+        self._intervals = intervals(mjcf.load_segments(scene), scene.samples, every_sample=True)
         self._rows_between = scene.wants("energy") and _work_needs_rows(scene)
         self._rows = _Rows()
         self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
@@ -93,26 +91,23 @@ class MujocoSolver:
         steps, count = steps_and_rows(span, self._step, self._rows_between)
         total = 0
         for row in range(1, count + 1):
-            loads = segment.at(interval.start + span * (row - 1) / count)
-            taken, message = self.engine.advance(span / steps, steps // count, loads, segment.slope)
+            loads = segment.loads_at(interval.start + span * (row - 1) / count)
+            taken, message = self.engine.advance(span / steps, steps // count, loads, segment.slopes)
             total += taken
             if message:
                 return total, message
             time = interval.end if row == count else interval.start + span * row / count
-            self._rows.add(time, self.engine.state, segment, interval.is_sample and row == count)
+            self._rows.add(time, self.engine.state, segment, interval.ends_at_sample and row == count)
         return total, ""
 
     def observe(self) -> Trajectory:
         """Samples of the last integration, cut before the first that is not finite."""
         scene, rows = self._scene, self._rows
         angles, rates, at = np.array(rows.angles), np.array(rows.rates), rows.samples
-        fields = {
-            "angles": _all_coordinates(angles[at], self._moving, scene.initial_angles),
-            "rates": _all_coordinates(rates[at], self._moving, (0.0,) * len(scene.initial_rates)),
-        }
+        fields = dict(zip(("angles", "rates"), all_coordinates(scene, angles[at], rates[at]), strict=True))
         with np.errstate(over="ignore", invalid="ignore"):
             if {"tip", "energy", "loads"} & set(scene.outputs):
-                values = np.array([segment.at(t) for segment, t in zip(rows.segments, rows.times, strict=True)])
+                values = np.array([segment.loads_at(t) for segment, t in zip(rows.segments, rows.times, strict=True)])
                 poses = self.engine.poses(angles, rates, values)
             if scene.wants("tip"):
                 fields["tip"] = poses.site[at]
@@ -123,9 +118,7 @@ class MujocoSolver:
                 fields["work"] = done + _work_of_rests(scene, fields["angles"])
             if scene.wants("loads"):
                 fields |= {name: table[at] for name, table in self._loads(poses, values).items()}
-        finite = np.all([np.isfinite(table.reshape(len(at), -1)).all(axis=1) for table in fields.values()], axis=0)
-        n = len(at) if finite.all() else int(np.argmin(finite))
-        return Trajectory(time=sample_times(scene)[:n], **{name: table[:n] for name, table in fields.items()})
+        return finite_samples(scene, fields)
 
     def _kinetic_energy(self, poses: Poses) -> Array:
         """(n,) J of the bodies, by the engine's masses and principal moments."""
@@ -143,7 +136,7 @@ class MujocoSolver:
         in_frame = [np.einsum("nbij,nbi->nbj", poses.frame, vectors)[:, 1:] for vectors in (force, moment)]
         shaft_moment = moment[:, 0].copy()
         if self._scene.has_torque:
-            shaft_moment[:, 1] -= values[:, 0]  # the first of `loads_of`
+            shaft_moment[:, 1] -= values[:, 0]  # the first of `mjcf.loads_of`
         pitching = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
         return {
             "blade_root_force": in_frame[0],
@@ -159,14 +152,14 @@ class MujocoSolver:
         Constant loads: torque times angle. Otherwise the power is integrated from row to row by the trapezoidal rule
         with its end correction, ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here.
         """
-        loads = loads_of(self._scene)
+        loads = mjcf.loads_of(self._scene)
         columns, gains = [self._moving.index(load.coordinate) for load in loads], np.array([one.gain for one in loads])
         torques = gains * values
         if not _work_needs_rows(self._scene):
             turned = angles[:, columns] - angles[:1, columns]
             return np.asarray((torques * turned).sum(axis=1))
         dampings = np.array(_dampings(self._scene))[self._moving]
-        slopes = gains * np.array([segment.slope for segment in self._rows.segments]).reshape(values.shape)
+        slopes = gains * np.array([segment.slopes for segment in self._rows.segments]).reshape(values.shape)
         power = (torques * rates[:, columns]).sum(axis=1) - (dampings * rates**2).sum(axis=1)
         change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
         change -= 2.0 * (dampings * rates * accelerations).sum(axis=1)
@@ -177,7 +170,7 @@ class MujocoSolver:
 
 def _work_needs_rows(scene: Scene) -> bool:
     """Whether the work has to be integrated along the path: it is exact for constant loads without dampers."""
-    return scene.has_damping or len(segments(scene)) > 1 or any(segments(scene)[0].slope)
+    return scene.has_damping or not scene.has_constant_loads
 
 
 def _dampings(scene: Scene) -> tuple[float, ...]:
@@ -187,11 +180,10 @@ def _dampings(scene: Scene) -> tuple[float, ...]:
 
 def _springs(scene: Scene, samples: int) -> Iterator[tuple[int, float, Array, bool]]:
     """For each spring: coordinate, stiffness (N m/rad), (samples,) rest angle in rad, whether that changes."""
-    for number in mjcf.moving(scene)[1:]:
+    for number in scene.moving_coordinates[1:]:
         stiffness, rest = scene.bearing(number - 1)[0], scene.pitch_load(number - 1)[1]
         if stiffness:
-            over_time = np.array([value_at(rest, t) for t in sample_times(scene)[:samples].tolist()])
-            yield number, stiffness, over_time, not is_constant(rest)
+            yield number, stiffness, values_at(rest, sample_times(scene)[:samples]), not is_constant(rest)
 
 
 def _spring_energy(scene: Scene, angles: Array) -> Array:
@@ -210,11 +202,3 @@ def _work_of_rests(scene: Scene, angles: Array) -> Array:
             energy = 0.5 * stiffness * rest * (rest - 2.0 * angles[:, number])
             total += energy - energy[0]
     return total
-
-
-def _all_coordinates(states: Array, moving: list[int], fixed: tuple[float, ...]) -> Array:
-    """(n, 1 + blades): the columns that move, and the fixed value where a blade cannot pitch."""
-    out = np.empty((len(states), len(fixed)))
-    out[:] = fixed
-    out[:, moving] = states
-    return out

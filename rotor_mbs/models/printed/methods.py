@@ -20,7 +20,7 @@ from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.observables import PointMassRotor, torque_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, is_constant, value_at
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, sample_times
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class PrintedSolver:
         scene, rotor, result = self._scene, self._rotor, self._result
         if result is None:
             raise RuntimeError("observe comes after integrate")
-        time = np.linspace(0.0, scene.duration, scene.samples)
+        time = sample_times(scene)
         time = time[time <= result.time[-1]]
         angles, rates = self._coordinates(result.at(time))
         trajectory = Trajectory(time, angles, rates, **self._refined(result))
@@ -106,12 +106,7 @@ class PrintedSolver:
         return {"refined_time": time, "refined_angles": angles, "refined_rates": rates}
 
     def _coordinates(self, states: Array) -> tuple[Array, Array]:
-        """Angles and rates, (n, 1 + blades) each, of states of what moves; a fixed pitch stays where it started."""
-        angles = np.tile(np.array(self._scene.initial_angles, dtype=float), (len(states), 1))
-        rates = np.zeros_like(angles)
-        angles[:, : self._moving] = states[:, : self._moving]
-        rates[:, : self._moving] = states[:, self._moving :]
-        return angles, rates
+        return all_coordinates(self._scene, states[:, : self._moving], states[:, self._moving :])
 
 
 class PrintedModel:

@@ -1,0 +1,87 @@
+"""Loads over time: segments against the tables they are cut from, and where engines stop."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+from rotor_mbs.scenario.time_table import (
+    Table,
+    constant_value,
+    intervals,
+    segments,
+    steps_and_rows,
+    value_at,
+    values_at,
+    values_before,
+)
+
+CONSTANT: Table = ((0.0, 7.0),)
+RAMP: Table = ((0.3, 0.0), (0.47, 2.0), (0.47, 5.0), (0.8, 1.0))
+
+
+def drawn_table(chance: random.Random) -> Table:
+    """Rows at tenths of a second, so that some of them are jumps."""
+    times = sorted(chance.choices([k / 10.0 for k in range(12)], k=chance.randint(1, 6)))
+    times = [t for i, t in enumerate(times) if i < 2 or times[i - 2] < t]
+    return tuple((t, chance.choice([-3.0, 0.0, 1.5, chance.uniform(-1e3, 1e3)])) for t in times)
+
+
+def test_segments_have_the_values_of_their_tables() -> None:
+    """At a jump those of the side they are on; 2e-16 of the largest value is its last digit, 20 of them a bound."""
+    chance = random.Random(7)
+    for _ in range(200):
+        tables = [drawn_table(chance) for _ in range(3)] + [()]
+        parts = segments(tables, 1.0)
+        assert [parts[0].start, *(part.end for part in parts)] == [*(part.start for part in parts), 1.0]
+        for part in parts:
+            for share in (0.0, 0.37, 0.999):
+                time = part.start + share * (part.end - part.start)
+                exact = [value_at(table, time) for table in tables]
+                assert part.loads_at(time) == pytest.approx(exact, rel=4e-15, abs=4e-12)
+            before = [value_at(table, math.nextafter(part.end, 0.0)) for table in tables]
+            assert part.loads_at(part.end) == pytest.approx(before, rel=4e-15, abs=1e-11)
+
+
+def test_a_sample_on_a_jump_has_the_value_before_it() -> None:
+    parts = segments([RAMP, CONSTANT], 1.0)
+    times = np.linspace(0.0, 1.0, 101)
+    found = values_before(parts, times)
+    assert found[0, 47] == pytest.approx(2.0)
+    exact = np.where(np.arange(101) == 47, 2.0, values_at(RAMP, times))
+    assert found[0] == pytest.approx(exact, abs=1e-14)
+    assert (found[1] == 7.0).all()
+
+
+def test_a_load_that_changes_has_no_constant_value() -> None:
+    assert (constant_value(CONSTANT), constant_value(RAMP), constant_value(())) == (7.0, 0.0, 0.0)
+
+
+def test_intervals_meet_samples_and_kinks() -> None:
+    parts = segments([RAMP], 1.0)
+    assert [(p.start, p.values[0]) for p in parts] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
+    few = intervals(parts, 11, every_sample=False)
+    assert np.allclose([one.end for one in few], [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])
+    assert [one.sample_intervals for one in few] == [3, 1, 1, 1, 3, 2]
+    assert [one.ends_at_sample for one in few] == [True, True, False, True, True, True]
+    every = intervals(parts, 11, every_sample=True)
+    assert [one.end for one in every if one.ends_at_sample] == np.linspace(0.0, 1.0, 11)[1:].tolist()
+    assert [one.end for one in every if not one.ends_at_sample] == [0.47]
+    assert all(one.segment.start <= 0.5 * (one.start + one.end) <= one.segment.end for one in every)
+
+
+def test_a_kink_that_is_off_a_sample_by_rounding_is_on_it() -> None:
+    parts = segments([((0.0, 1.0), (0.1 + 1e-14, 5.0), (0.1 + 1e-14, 2.0))], 1.2)
+    assert all(one.ends_at_sample for one in intervals(parts, 61, every_sample=True))
+    first, second = parts
+    assert first.loads_at(first.end) == pytest.approx([5.0])
+    assert second.loads_at(second.end) == [2.0]
+
+
+def test_rows_between_samples_are_a_divisor_of_the_steps() -> None:
+    assert steps_and_rows(0.01, 0.01 / 15, False) == (15, 1)
+    assert steps_and_rows(0.01, 1e-4 / 1.37, True) == (140, 10)
+    assert steps_and_rows(0.01, 1e-4, True) == (100, 100)
