@@ -33,7 +33,7 @@ class Linearization:
 
 
 def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
-    """`scene` from `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m; pitches at rest."""
+    """`scene` at `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m."""
     return replace(
         scene,
         initial_angles=tuple(float(angle) for angle in angles),
