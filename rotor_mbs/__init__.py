@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from rotor_mbs.api import SweepData as SweepData
     from rotor_mbs.api import compare as compare
     from rotor_mbs.api import load as load
-    from rotor_mbs.api import modes as modes
     from rotor_mbs.api import open as open
     from rotor_mbs.api import run as run
     from rotor_mbs.api import scene as scene
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     from rotor_mbs.methods.base import Method as Method
     from rotor_mbs.report.data_comparison import DataComparison as DataComparison
     from rotor_mbs.report.data_comparison import compare_data as compare_data
+    from rotor_mbs.report.mode_study import modes as modes
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
     from rotor_mbs.studies.claims import claims as claims
@@ -58,7 +58,6 @@ _PLACES = {
         "SweepData",
         "compare",
         "load",
-        "modes",
         "open",
         "run",
         "scene",
@@ -68,6 +67,7 @@ _PLACES = {
     "rotor_mbs.errors": ("InputError", "MethodRefusal", "RotorError", "StoreError"),
     "rotor_mbs.methods.base": ("Method",),
     "rotor_mbs.report.data_comparison": ("DataComparison", "compare_data"),
+    "rotor_mbs.report.mode_study": ("modes",),
     "rotor_mbs.scenario.scene": ("Blade", "Scene"),
     "rotor_mbs.studies.claims": ("claims",),
     "rotor_mbs.studies.export": ("export",),

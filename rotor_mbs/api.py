@@ -33,12 +33,12 @@ from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.store.sweep_columns import MISSING
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
-    from rotor_mbs.report.mode_study import Modes
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
     from rotor_mbs.store.sweep_dataset import StoredSweep
 
@@ -185,23 +185,15 @@ class Comparison:
         Select by label: `data.angles.sel(solver="lagrange/taylor", coordinate="pitch 1")`.
         """
         xarray = need_xarray()
-        names = list(self.runs)
-        sets = [self.runs[name].to_xarray() for name in names]
-        over_time = [one.drop_dims("refined_time", errors="ignore") for one in sets]
-        joined = xarray.concat(
-            over_time, xarray.Variable("solver", names), join="outer", combine_attrs="drop_conflicts"
-        )
-        statuses = xarray.Variable("solver", [self.runs[name].status for name in names])
-        return joined.assign(status=statuses)
+        over_time = [run.to_xarray().drop_dims("refined_time", errors="ignore") for run in self.runs.values()]
+        solvers = xarray.Variable("solver", list(self.runs))
+        joined = xarray.concat(over_time, solvers, join="outer", combine_attrs="drop_conflicts")
+        return joined.assign(status=("solver", [run.status for run in self.runs.values()]))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """The results file under another name; `rotor-mbs report` and `rotor_mbs.open` read it. Replaces the file."""
         target = Path(path)
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(self._file, target)
-        except OSError as exc:
-            raise StoreError(f"{target}: cannot be written: {exc.strerror}") from exc
+        replace_file(target, self._file.read_bytes())
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
@@ -250,8 +242,7 @@ def compare(
     """
     named = check_names(methods)
     chosen, reasons = (asked_methods([scene], named), []) if named else selected_methods([scene])
-    able = chosen[scene.name]
-    if not able:
+    if not (able := chosen[scene.name]):
         raise MethodRefusal("; ".join(reasons))
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "comparison.h5"
     run_scenes([scene], {scene.name: able}, path, workers=workers, timeout_s=timeout, settings=settings)
@@ -327,7 +318,7 @@ class SweepData:
 
     @functools.cached_property
     def statuses(self) -> dict[str, int]:
-        return dict(Counter(STATUSES[code] for code in self._stored.column("status").tolist() if code != MISSING))
+        return dict(Counter(STATUSES[code] for code in self.column("status").tolist() if code != MISSING))
 
     def column(self, name: str) -> Any:
         """An array whole, such as "status", "pitch_max" or "angles": one row for each run. Raises StoreError."""
@@ -357,36 +348,6 @@ class SweepData:
         return f"{self.path}: {sum(self.statuses.values())} runs: {counts}"
 
 
-def modes(scene: Scene, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
-    """Natural frequencies, damping ratios and mode shapes of a scene, by every model that can be linearized.
-
-    At rest under gravity; over `speeds` in steady rotation without gravity (Campbell diagram); under gravity by the
-    Floquet multipliers of a turn. The torque of the scene is left out: the drive keeps the speed.
-
-    Parameters
-    ----------
-    speeds : rad/s of the rotor, increasing, from 0 up.
-    stiffnesses : N m/rad of every bearing, for the stability chart over speed and stiffness.
-
-    Raises
-    ------
-    InputError
-        For speeds or stiffnesses that do not increase, or are negative.
-
-    Examples
-    --------
-    >>> import rotor_mbs as rm
-    >>> study = rm.modes(rm.scene("stiff/nrel-5mw").replace(gravity=0.0), speeds=[0.0, 1.2])
-    >>> study.agrees, list(study.rotation)[:2]
-    (True, ['lagrange', 'exudyn_tree'])
-    >>> study.rotation["lagrange"].names
-    ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
-    """
-    from rotor_mbs.report.mode_study import modes_study  # late: matplotlib
-
-    return modes_study(scene, speeds, stiffnesses)
-
-
 def open(path: str | os.PathLike[str]) -> ResultsTree | SweepData:
     """The results file at `path`: its scenes and runs by path, or the dataset of a sweep. Raises StoreError for others.
 
@@ -397,10 +358,10 @@ def open(path: str | os.PathLike[str]) -> ResultsTree | SweepData:
     >>> tree["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
     (1001, 4)
     """
-    if is_sweep(Path(path)):
-        return SweepData(Path(path))
-    with open_results(Path(path)) as results:
-        return ResultsTree(Path(path), {name: tuple(scene.runs) for name, scene in results.scenes.items()})
+    if is_sweep(file := Path(path)):
+        return SweepData(file)
+    with open_results(file) as results:
+        return ResultsTree(file, {name: tuple(scene.runs) for name, scene in results.scenes.items()})
 
 
 @dataclass(frozen=True)
@@ -448,8 +409,10 @@ def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
     run = _with_reference(found.run, None if stored.method == REFERENCE else found.reference)
     run.status, run.message = stored.status, str(facts.get("message", ""))
     run.metrics = metrics_of(run.scene, run.trajectory, run.reference)
-    setup, integration, output = (float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output"))
-    run.setup_time_s, run.run_times_s, run.output_time_s = setup, [integration], output
+    run.setup_time_s, seconds, run.output_time_s = (
+        float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output")
+    )
+    run.run_times_s = [seconds]
     return run
 
 

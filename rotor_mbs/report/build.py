@@ -91,8 +91,7 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
     modes, bench, compared = (read_records(opened.path, kind) for kind in ("modes", "bench", "comparison"))
     has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench or compared)
     data_pages = [
-        (COMPARISON if not i else f"data--{i + 1}.html", f"Data of another program{f': {one.scene}' * (len(compared) > 1)}")
-        for i, one in enumerate(compared)
+        (f"data--{i + 1}.html" if i else COMPARISON, f"Data against {one.scene}") for i, one in enumerate(compared)
     ]
     is_suite = has_runs and is_stability_suite(opened)
     kinds = [

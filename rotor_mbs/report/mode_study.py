@@ -23,8 +23,31 @@ from rotor_mbs.store.records import write_records
 from rotor_mbs.studies.modes import compute_modes
 
 
-def modes_study(scene: Scene, speeds: Sequence[float], stiffnesses: Sequence[float]) -> Modes:
-    """As `rotor_mbs.modes`."""
+def modes(scene: Scene, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
+    """Natural frequencies, damping ratios and mode shapes of a scene, by every model that can be linearized.
+
+    At rest under gravity; over `speeds` in steady rotation without gravity (Campbell diagram); under gravity by the
+    Floquet multipliers of a turn. The torque of the scene is left out: the drive keeps the speed.
+
+    Parameters
+    ----------
+    speeds : rad/s of the rotor, increasing, from 0 up.
+    stiffnesses : N m/rad of every bearing, for the stability chart over speed and stiffness.
+
+    Raises
+    ------
+    InputError
+        For speeds or stiffnesses that do not increase, or are negative.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> study = rm.modes(rm.scene("stiff/nrel-5mw").replace(gravity=0.0), speeds=[0.0, 1.2])
+    >>> study.agrees, list(study.rotation)[:2]
+    (True, ['lagrange', 'exudyn_tree'])
+    >>> study.rotation["lagrange"].names
+    ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
+    """
     found = compute_modes(scene, speeds, stiffnesses)
     return Modes(**{one.name: getattr(found, one.name) for one in fields(SceneModes)}, hash=scene_hash(scene))
 

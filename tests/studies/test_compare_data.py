@@ -217,7 +217,7 @@ def test_every_comparison_of_a_file_has_a_page(tmp_path: Path) -> None:
     write_records(tmp_path / "c.h5", [record, replace(record, scene="own")])
     index = write_report(tmp_path / "c.h5", tmp_path)
     pages = [path.read_text() for path in (index, tmp_path / "data--2.html")]
-    assert all(page.count("Data of another program: ") == 2 for page in pages)
+    assert all(page.count("Data against ") == 2 for page in pages)
     assert 'href="data--2.html"' in pages[0]
 
 
