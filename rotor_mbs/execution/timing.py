@@ -115,19 +115,12 @@ def _expected(earlier: Sequence[Warm]) -> float:
 def allot(seconds: Mapping[T, float], wanted: Mapping[T, int], budget_s: float) -> dict[T, int]:
     """Repeats of each point: all it wants or what an equal share of time allows, and one in any case.
 
-    The share is the largest with which the sum stays within the budget: what cheap points leave goes to expensive ones.
+    What points that want less than their share leave is shared by the others.
     """
-
-    def counts(share: float) -> dict[T, int]:
-        return {point: max(1, min(wanted[point], int(share / one))) for point, one in seconds.items()}
-
-    def cost(share: float) -> float:
-        return sum(count * seconds[point] for point, count in counts(share).items())
-
-    low, high = 0.0, max((wanted[point] * one for point, one in seconds.items()), default=0.0) * (1.0 + 1e-12)
-    if cost(high) <= budget_s:
-        return counts(high)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if cost(middle) <= budget_s else (low, middle)
-    return counts(low)
+    found: dict[T, int] = {}
+    by_demand = sorted(seconds, key=lambda point: wanted[point] * seconds[point])
+    for done, point in enumerate(by_demand):
+        share = budget_s / (len(by_demand) - done) * (1.0 + 1e-12)
+        found[point] = max(1, min(wanted[point], int(share / seconds[point])))
+        budget_s -= found[point] * seconds[point]
+    return {point: found[point] for point in seconds}

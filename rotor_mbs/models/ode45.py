@@ -16,11 +16,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.methods.settings import Settings, number
+from rotor_mbs.solution.trajectory import Array
 
-Array = NDArray[np.float64]
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 F = Fraction

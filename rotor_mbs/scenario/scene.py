@@ -13,9 +13,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, field, fields
 from operator import attrgetter
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rotor_mbs.scenario.time_table import Table, is_constant, value_at
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
 OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
@@ -70,6 +74,14 @@ class Blade:
     @property
     def is_point_mass(self) -> bool:
         return not any(self.inertia)
+
+    @property
+    def inertia_tensor(self) -> NDArray[np.float64]:
+        """(3, 3) kg m²."""
+        import numpy as np  # late: a scene is read without it
+
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     @property
     def pitch_inertia(self) -> float:

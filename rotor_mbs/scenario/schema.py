@@ -21,7 +21,6 @@ from rotor_mbs.scenario.validation import (
     NotNegative,
     NotNegativeSize,
     Number,
-    PerBlade,
     Size,
     Table,
     Text,
@@ -184,6 +183,10 @@ def _goes_forward(rows: list[list[float]]) -> list[list[float]]:
     return rows
 
 
+def _as_list(value: object) -> object:
+    return value if isinstance(value, list) else [value]
+
+
 def _as_tables(value: object) -> object:
     """One table for all blades, or one for each, of a number, rows [t, value], or a list of numbers and rows."""
     if not isinstance(value, list) or is_one_table(value):
@@ -191,22 +194,31 @@ def _as_tables(value: object) -> object:
     return [_as_rows(entry) for entry in value]
 
 
-_Row = Annotated[list[Size], Field(min_length=2, max_length=2)]
-Rows = Annotated[list[_Row], Field(min_length=1), BeforeValidator(_as_rows), AfterValidator(_goes_forward)]
-Tables = Annotated[list[Rows], BeforeValidator(_as_tables)]
-_ROWS = "rows [t, {}] with t from 0 s upwards, at most two rows with one t"
-_TABLES = "a number ({}), rows [t, {}] with t from 0 s upwards, or a list with one or the other for each blade"
+def _in_list_for_blades(value: object, info: ValidationInfo) -> object:
+    return _one_per_blade(value, info, 0, "in a list for")
 
 
-def _bare_pitches_acted_on(tables: Sequence[bool], info: ValidationInfo) -> None:
-    """Raises where one of the blades without pitch inertia is acted on; tables: for each blade, or one for all."""
-    acted_on = [i for i in _context(info).get("bare_pitches", ()) if tables[i if len(tables) > 1 else 0]]
+def _on_pitches_with_inertia(values: list[Any], info: ValidationInfo) -> list[Any]:
+    """Raises where a number or a table that is not zero is for a blade without pitch inertia; one may be for all."""
+    acts = [_not_zero(value) if isinstance(value, list) else value != 0.0 for value in values]
+    acted_on = [i for i in _context(info).get("bare_pitches", ()) if acts[i if len(acts) > 1 else 0]]
     if acted_on:
         raise invalid(f"acts on {_blades_named(acted_on)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
+    return values
 
 
 def _not_zero(rows: list[list[float]]) -> bool:
     return any(value != 0.0 for _, value in rows)
+
+
+_Row = Annotated[list[Size], Field(min_length=2, max_length=2)]
+Rows = Annotated[list[_Row], Field(min_length=1), BeforeValidator(_as_rows), AfterValidator(_goes_forward)]
+# Of validators that come before the type's own, the last one is the first.
+_PITCHES = (BeforeValidator(_in_list_for_blades), AfterValidator(_on_pitches_with_inertia))
+Tables = Annotated[list[Rows], BeforeValidator(_as_tables), *_PITCHES]
+PerBlade = Annotated[list[NotNegativeSize], BeforeValidator(_as_list), *_PITCHES]
+_ROWS = "rows [t, {}] with t from 0 s upwards, at most two rows with one t"
+_TABLES = "a number ({}), rows [t, {}] with t from 0 s upwards, or a list with one or the other for each blade"
 
 
 class BearingTable(Table):
@@ -216,40 +228,12 @@ class BearingTable(Table):
     damping: PerBlade = Field([0.0], description="a number of at least 0 (N m s/rad), or a list with one per blade")
     rest: Tables = Field([[[0.0, 0.0]]], description=_TABLES.format("rad", "angle"))
 
-    @field_validator("stiffness", "damping", "rest", mode="before")
-    @classmethod
-    def _has_one_per_blade(cls, value: object, info: ValidationInfo) -> object:
-        return _one_per_blade(value, info, 0, "in a list for")
-
-    @field_validator("stiffness", "damping")
-    @classmethod
-    def _acts_on_inertia(cls, value: list[float], info: ValidationInfo) -> list[float]:
-        _bare_pitches_acted_on([number != 0.0 for number in value], info)
-        return value
-
-    @field_validator("rest")
-    @classmethod
-    def _rests_on_inertia(cls, tables: list[list[list[float]]], info: ValidationInfo) -> list[list[list[float]]]:
-        _bare_pitches_acted_on([_not_zero(rows) for rows in tables], info)
-        return tables
-
 
 class TorqueTable(Table):
     """[torque]"""
 
     rotor: Rows = Field([[0.0, 0.0]], description=f"a number (N m), or {_ROWS.format('torque')}")
     pitch: Tables = Field([[[0.0, 0.0]]], description=_TABLES.format("N m", "torque"))
-
-    @field_validator("pitch", mode="before")
-    @classmethod
-    def _has_one_per_blade(cls, value: object, info: ValidationInfo) -> object:
-        return _one_per_blade(value, info, 0, "in a list for")
-
-    @field_validator("pitch")
-    @classmethod
-    def _acts_on_inertia(cls, tables: list[list[list[float]]], info: ValidationInfo) -> list[list[list[float]]]:
-        _bare_pitches_acted_on([_not_zero(rows) for rows in tables], info)
-        return tables
 
 
 class InitialTable(Table):

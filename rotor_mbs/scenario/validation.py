@@ -118,16 +118,11 @@ def _one_line(value: str) -> str:
     return value
 
 
-def _as_list(value: object) -> object:
-    return value if isinstance(value, list) else [value]
-
-
 Number = Annotated[float, BeforeValidator(_double)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Size = Annotated[Number, AfterValidator(_of_a_rotor)]
 NotNegativeSize = Annotated[Size, Field(ge=0)]
 Vector = Annotated[list[Size], Field(min_length=3, max_length=3)]
-PerBlade = Annotated[list[NotNegativeSize], BeforeValidator(_as_list)]
 Text = Annotated[str, AfterValidator(_not_blank)]
 Line = Annotated[Text, AfterValidator(_one_line)]
 

@@ -131,10 +131,8 @@ def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:
 
 
 def _inertia_about_hub(blade: Blade) -> Array:
-    xx, yy, zz, xy, xz, yz = blade.inertia
     r = np.array(blade.centre_of_mass)
-    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return np.asarray(own + blade.mass * (r @ r * np.eye(3) - np.outer(r, r)))
+    return np.asarray(blade.inertia_tensor + blade.mass * (r @ r * np.eye(3) - np.outer(r, r)))
 
 
 def _centre(scene: Scene, angles: Array, rates: Array, blade: int) -> tuple[Array, Array]:

@@ -93,9 +93,7 @@ def fixed_blade_rotation(scene: Scene, index: int) -> Array:
 
 def blade_body(blade: Blade) -> Body:
     """The blade as the scene tells it."""
-    xx, yy, zz, xy, xz, yz = blade.inertia
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return Body(blade.mass, np.array(blade.centre_of_mass), tensor)
+    return Body(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor)
 
 
 def hub_body(scene: Scene) -> Body:

@@ -55,46 +55,22 @@ def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Equations:
     return lambda angles, rates, _form, *rest: accelerations(angles, rates, turned, *rest)
 
 
+def _sum(*parts: tuple[float, float, float]) -> Equations:
+    """The sum of (weight, factor of the rotor's rate, factor of the pitches' rates)."""
+
+    def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
+        total = np.zeros(len(rates))
+        for weight, spin, pitch in parts:
+            total += weight * np.array(accelerations(angles, [spin * rates[0], *(pitch * w for w in rates[1:])], *rest))
+        return total.tolist()
+
+    return equations
+
+
 # The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with one kind of rate at a
 # time, and with rates reversed, each kind of product is taken out without another text of the equations.
-
-
-def _spin(rates: Sequence[Number]) -> list[Number]:
-    return [rates[0], *(0.0 for _ in rates[1:])]
-
-
-def _still(rates: Sequence[Number]) -> list[Number]:
-    return [0.0 for _ in rates]
-
-
-def _reversed(rates: Sequence[Number]) -> list[Number]:
-    return [-rate for rate in rates]
-
-
-def _without_coriolis(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
-    spin, pitches, still = (
-        np.array(accelerations(angles, chosen, *rest)) for chosen in (_spin(rates), [0.0, *rates[1:]], _still(rates))
-    )
-    return (spin + pitches - still).tolist()  # type: ignore[no-any-return]
-
-
-def _without_centrifugal(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
-    spin = _spin(rates)
-    whole, forth, back, still = (
-        np.array(accelerations(angles, chosen, *rest)) for chosen in (rates, spin, _reversed(spin), _still(rates))
-    )
-    return (whole - 0.5 * (forth + back) + still).tolist()  # type: ignore[no-any-return]
-
-
-def _without_products(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
-    forth, back, still = (
-        np.array(accelerations(angles, chosen, *rest)) for chosen in (rates, _reversed(rates), _still(rates))
-    )
-    return (0.5 * (forth - back) + still).tolist()  # type: ignore[no-any-return]
-
-
 LEFT_OUT: Mapping[str, Equations] = {
-    "Coriolis terms (products of rotor rate and pitch rate)": _without_coriolis,
-    "centrifugal terms (square of the rotor rate)": _without_centrifugal,
-    "terms with products of rates": _without_products,
+    "Coriolis terms (products of rotor rate and pitch rate)": _sum((1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)),
+    "centrifugal terms (square of the rotor rate)": _sum((1.0, 1, 1), (-0.5, 1, 0), (-0.5, -1, 0), (1.0, 0, 0)),
+    "terms with products of rates": _sum((0.5, 1, 1), (-0.5, -1, -1), (1.0, 0, 0)),
 }

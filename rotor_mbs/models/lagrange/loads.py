@@ -92,8 +92,7 @@ def root_load(
     omega = np.stack([spin * s, spin * c, rate], axis=1)
     alpha = np.stack([spin_rate * s + spin * rate * c, spin_rate * c - spin * rate * s, rate_rate], axis=1)
     up = np.stack([-sin_phi * c, sin_phi * s, cos_phi], axis=1)
-    xx, yy, zz, xy, xz, yz = blade.inertia
-    r, inertia = np.array(blade.centre_of_mass), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    r, inertia = np.array(blade.centre_of_mass), blade.inertia_tensor
     force = blade.mass * (np.cross(alpha, r) + np.cross(omega, np.cross(omega, r)) + gravity * up)
     return force, alpha @ inertia + np.cross(omega, omega @ inertia) + np.cross(r, force)
 

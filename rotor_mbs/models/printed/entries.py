@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.models.printed import literal, matrices
 from rotor_mbs.models.printed.derivation import BladeTerms, blade_terms
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.symbols import Symbol
+from rotor_mbs.solution.trajectory import Array
 
-Array = NDArray[np.float64]
 Key = tuple[str, str]
 Entries = dict[Key, Any]
 

@@ -12,12 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.models.printed import matrices
 from rotor_mbs.models.printed.matrices import CORRECTED
-
-Array = NDArray[np.float64]
+from rotor_mbs.solution.trajectory import Array
 
 # Gauss's three points in [0, 1]: exact to degree five, so for a quartic interpolant.
 _GAUSS_POINTS = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
