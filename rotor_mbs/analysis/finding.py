@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredScene
@@ -26,32 +25,17 @@ class Tally:
 
 
 @dataclass(frozen=True)
-class Reproduced:
-    """Published numbers of one figure that the printed model reproduces, and the conditions.
-
-    gravity   m/s², None where it is not known; duration: s
-    rounding  whether they are amplified rounding error
-    """
-
-    figure: str
-    count: int
-    gravity: float | None
-    duration: float
-    rounding: bool
-
-
-@dataclass(frozen=True)
 class PrintedEnergy:
     """Scenes in which the energy of the printed model rises without work.
 
     gain, scene   J: the largest gain among runs that reached their end, and where ("" where none did)
-    ended_early   scenes where the integration ended early
+    ended_early   scenes where the integration ended early, and the gain until then (J)
     """
 
     rises: Tally
     gain: float
     scene: str
-    ended_early: tuple[str, ...]
+    ended_early: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -74,7 +58,6 @@ class Finding:
     scenes: int
     numbers: Tally | None
     numbers_corrected: Tally | None
-    reproduced: tuple[Reproduced, ...]
     claims_printed: Tally | None
     claims_corrected: Tally | None
     energy: PrintedEnergy | None
@@ -90,7 +73,6 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
         len(scenes),
         _tally(claim.printed.holds for claim in numbers),
         _tally(claim.corrected.holds for claim in numbers),
-        _reproduced(scenes, [claim for claim in numbers if claim.printed.holds]),
         _tally(claim.printed.holds for claim in others),
         _tally(claim.corrected.holds for claim in others),
         _printed_energy(scenes),
@@ -103,26 +85,6 @@ def _tally(verdicts: Iterable[bool | None]) -> Tally | None:
     return Tally(sum(decided), len(decided)) if decided else None
 
 
-def _reproduced(scenes: Mapping[str, StoredScene], numbers: Iterable[Claim]) -> tuple[Reproduced, ...]:
-    """By figure, in order."""
-    by_figure: dict[str, list[Claim]] = {}
-    for claim in numbers:
-        by_figure.setdefault(claim.published.figure, []).append(claim)
-    return tuple(_on_condition(figure, found, scenes) for figure, found in by_figure.items())
-
-
-def _on_condition(figure: str, numbers: Sequence[Claim], scenes: Mapping[str, StoredScene]) -> Reproduced:
-    of = numbers[0].published.of
-    assert of is not None  # every number has it
-    stored = scenes[of.scene]
-    run = run_selection.printed_run(stored)
-    assert run is not None  # it has given the number
-    rounding = any(claim.published.rounding for claim in numbers)
-    scene = scene_of(stored)
-    gravity = None if scene is None else scene.gravity
-    return Reproduced(figure, len(numbers), gravity, float(run.array("time")[-1]), rounding)
-
-
 def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
     runs = {name: run for name in natural_order(scenes) if (run := run_selection.printed_run(scenes[name])) is not None}
     gains = {name: run.attributes["energy_gain_J"] for name, run in runs.items() if "energy_gain_J" in run.attributes}
@@ -131,7 +93,7 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
     made = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
     complete = {name: gains[name] for name in made if runs[name].status == "ok"}
     largest = max(complete, key=lambda name: complete[name], default="")
-    ended_early = tuple(name for name, run in runs.items() if run.status not in COMPLETE)
+    ended_early = {name: gain for name, gain in gains.items() if runs[name].status not in COMPLETE}
     return PrintedEnergy(Tally(len(made), len(gains)), complete.get(largest, 0.0), largest, ended_early)
 
 

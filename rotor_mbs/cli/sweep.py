@@ -61,7 +61,10 @@ def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
     for line in result.lost:
         show(f"{line}; not computed, the same command tries again", sys.stderr)
     if study.table.picture and arguments.part == (1, 1):
-        line = draw(study, result.path, output.with_suffix(".svg"))
+        from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
+        from rotor_mbs.store.sweep_dataset import StoredSweep
+
+        line = save_picture(StoredSweep(result.path), output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)
     if arguments.metadata:
         from rotor_mbs.studies.sweep_metadata import describe
@@ -101,26 +104,3 @@ def _size(count: float) -> str:
             return f"{count:.4g} {unit}"
         count /= 1000.0
     return f"{count:.4g} TB"
-
-
-def draw(sweep: Sweep, dataset: Path, path: Path) -> str:
-    """The picture that a sweep file asks for, to `path`; returns a line about it. Raises InputError, StoreError."""
-    from rotor_mbs.analysis.sweep_numbers import spread_of, stability_map
-    from rotor_mbs.report.plots.sweep import map_figure, spread_figure
-    from rotor_mbs.store.hdf5 import replace_file
-    from rotor_mbs.store.sweep_dataset import StoredSweep
-
-    stored = StoredSweep(dataset)
-    if sweep.table.picture == "spread":
-        spread = spread_of(stored)
-        text = spread_figure(spread, sweep.table.title)
-        line = (
-            f"largest Lyapunov exponent {spread.exponent:.3f} ± {spread.uncertainty:.3f} per s "
-            f"({spread.pairs} pairs, {spread.start:.2f} to {spread.end:.2f} s)"
-        )
-    else:
-        found = stability_map(stored, max(abs(angle) for angle in sweep.base.initial_angles[1:]))
-        text = map_figure(found, sweep.table.title)
-        line = f"the pitches grow tenfold in {found.unstable.sum()} of {found.growth.size} runs"
-    replace_file(path, text.encode())
-    return f"{path}: {line}"

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis import errata as errata_analysis
 from rotor_mbs.analysis import published, run_selection
@@ -32,18 +35,16 @@ from rotor_mbs.report.core.files import (
 from rotor_mbs.report.pages.bench import bench_pages
 from rotor_mbs.report.pages.check import check_page
 from rotor_mbs.report.pages.data_comparison import comparison_page
-from rotor_mbs.report.pages.errata import errata_page
-from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.report.paper_figures import PaperFigure, available
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import OpenResults, StoredScene, is_sweep, open_results
+from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene, is_sweep, open_results
 from rotor_mbs.store.records import Record, read_records
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
-Part = str | PaperFigure  # a scene by its name, or a figure of the paper
+Part = str | Path | PaperFigure  # a scene by its name, a page by its file, or a figure of the paper
 _GROUPS = 2  # per worker
 _TIMEOUT_S = 600.0
 
@@ -52,7 +53,8 @@ _TIMEOUT_S = 600.0
 class Context:
     """What the page of a scene or a figure needs to know of the rest of the file.
 
-    files: the file name of each scene's page, in order; curves: error against run time, by scene
+    files: the file name of each scene's page, in order; curves: error against run time, by scene;
+    errata: empty where there is no such page
     """
 
     results: Path
@@ -61,6 +63,7 @@ class Context:
     conditions: Mapping[str, str]
     study: ClaimStudy | None
     curves: Mapping[str, Sequence[Record]]
+    errata: Sequence[published.Erratum]
     site: Site
 
 
@@ -111,7 +114,7 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
     elif has_runs:
         context, figures = _prepared(opened, main)
         site = context.site
-        pages |= _run_pages(opened, context, figures, jobs, on_page)
+        pages |= _run_pages(context, figures, jobs, on_page)
     if bench:
         pages |= bench_pages(opened, names[BENCH], site)
     if modes:
@@ -139,34 +142,44 @@ def _prepared(opened: OpenResults, main: Sequence[tuple[str, str]]) -> tuple[Con
         published.conditions() if decided else {},
         stored_claims(opened) if decided else None,
         by_scene(read_records(opened.path, "bench")),
+        published.errata() if has_errata else (),
         Site((main[0], *more, *main[1:])),
     )
     return context, figures
 
 
 def _scenes(opened: OpenResults) -> dict[str, StoredScene]:
-    return {name: opened.scenes[name] for name in natural_order(opened.scenes)}
+    return {name: _read_once(opened.scenes[name]) for name in natural_order(opened.scenes)}
 
 
-def _run_pages(
-    opened: OpenResults, context: Context, figures: Sequence[PaperFigure], jobs: int, on_page: OnPage
-) -> dict[str, str]:
+class _ReadOnce(StoredRun):
+    """A run whose arrays stay in memory: the pages ask for each of them some six times."""
+
+    @cached_property
+    def _known(self) -> dict[str, NDArray[Any]]:
+        return {}
+
+    def array(self, name: str) -> NDArray[Any]:
+        if name not in self._known:
+            self._known[name] = super().array(name)
+        return self._known[name]
+
+
+def _read_once(scene: StoredScene) -> StoredScene:
+    runs = {name: _ReadOnce(*(getattr(run, one.name) for one in fields(run))) for name, run in scene.runs.items()}
+    return replace(scene, runs=dict(runs))
+
+
+def _run_pages(context: Context, figures: Sequence[PaperFigure], jobs: int, on_page: OnPage) -> dict[str, str]:
     """The index, errata, figures one by one, and a page per scene."""
-    scenes, site = _scenes(opened), context.site
-    parts = _parts(context, figures, jobs, on_page)
-    has_errata = any(file == ERRATA for file, _ in site.pages)
-    errata = published.errata() if has_errata else ()
-    index = index_page(
-        opened, scenes, context.files, context.claims, context.conditions, errata,
-        study=context.study, curves=context.curves,
-    )  # fmt: skip
-    pages = {INDEX: render("index", index, site, INDEX)}
-    if has_errata:
-        entries = errata_analysis.entries(opened)
-        pages[ERRATA] = render("errata", errata_page(errata, entries, scenes, context.files), site, ERRATA)
+    files = [Path(INDEX), *([Path(ERRATA)] if context.errata else [])]
+    parts = _parts(context, [*files, *context.files, *figures], jobs, on_page)
+    pages = {file.name: str(parts[file]) for file in files}
+    pages |= {file: str(parts[scene]) for scene, file in context.files.items()}
     if figures:
-        pages[WALK] = render("walk", {"figures": [parts[figure] for figure in figures]}, site, WALK)
-    return pages | {file: str(parts[scene]) for scene, file in context.files.items()}
+        walk = {"figures": [parts[figure] for figure in figures]}
+        pages[WALK] = render("walk", walk, context.site, WALK)
+    return pages
 
 
 def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
@@ -174,9 +187,8 @@ def _has_printed_model(scenes: Mapping[str, StoredScene]) -> bool:
     return any(name in scene.methods for scene in scenes.values() for name in printed)
 
 
-def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int, on_page: OnPage) -> dict[Part, object]:
-    """All scenes and figures, in `jobs` processes (in this one where it is 1)."""
-    parts: list[Part] = [*context.files, *figures]
+def _parts(context: Context, parts: Sequence[Part], jobs: int, on_page: OnPage) -> dict[Part, object]:
+    """The parts, in `jobs` processes (in this one where it is 1)."""
     workers = min(jobs, len(parts))
     work = partial(make_parts, context)
     if workers <= 1:
@@ -194,24 +206,38 @@ def _parts(context: Context, figures: Sequence[PaperFigure], jobs: int, on_page:
 
 
 def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, object]:
-    """The task of a worker: the page of each scene, and the content of each figure. Raises StoreError."""
+    """The task of a worker: pages, and the content of figures. Raises StoreError."""
+    with open_results(context.results) as opened:
+        scenes = _scenes(opened)
+        return {part: _part(context, opened, scenes, part) for part in parts}
+
+
+def _part(context: Context, opened: OpenResults, scenes: Mapping[str, StoredScene], part: Part) -> object:
+    from rotor_mbs.report.pages.errata import errata_page
     from rotor_mbs.report.pages.figures import walk_figure
+    from rotor_mbs.report.pages.index import index_page
     from rotor_mbs.report.pages.scene import scene_page  # late: matplotlib, in the workers alone
 
+    if isinstance(part, PaperFigure):
+        return walk_figure(part, scenes, context.claims, context.files)
+    if part == Path(INDEX):
+        page = index_page(
+            opened, scenes, context.files, context.claims, context.conditions, context.errata,
+            study=context.study, curves=context.curves,
+        )  # fmt: skip
+        return render("index", page, context.site, INDEX)
+    if isinstance(part, Path):
+        page = errata_page(context.errata, errata_analysis.entries(opened), scenes, context.files)
+        return render("errata", page, context.site, ERRATA)
     names = list(context.files)
-    neighbours = dict(zip(names, zip(["", *names], [*names[1:], ""], strict=False), strict=True))
-    found: dict[Part, object] = {}
-    with open_results(context.results) as opened:
-        for part in parts:
-            if isinstance(part, PaperFigure):
-                found[part] = walk_figure(part, opened.scenes, context.claims, context.files)
-                continue
-            previous, following = (context.files.get(other, "") for other in neighbours[part])
-            own = [claim for claim in context.claims if part in claim.published.scenes]
-            page = scene_page(
-                opened.scenes[part], own, context.conditions,
-                previous=previous, following=following, study=context.study,
-                curves=context.curves.get(part, ()),
-            )  # fmt: skip
-            found[part] = render("scene", page, context.site)
-    return found
+    place = names.index(part)
+    page = scene_page(
+        scenes[part],
+        [claim for claim in context.claims if part in claim.published.scenes],
+        context.conditions,
+        previous=context.files[names[place - 1]] if place else "",
+        following=context.files[names[place + 1]] if place + 1 < len(names) else "",
+        study=context.study,
+        curves=context.curves.get(part, ()),
+    )
+    return render("scene", page, context.site)

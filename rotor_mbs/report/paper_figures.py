@@ -96,7 +96,8 @@ def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[t
 
 def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
     """A picture on `axes`: one for paths, else two, position above velocity."""
-    from rotor_mbs.report.plots import paths  # late: matplotlib
+    from rotor_mbs.report.core.canvas import TIME_AXIS  # late: matplotlib
+    from rotor_mbs.report.plots import paths
     from rotor_mbs.report.plots import time_histories as histories
 
     if figure.kind == PATHS:
@@ -117,7 +118,7 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
     axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)
     axes[1].set_title("(b) angular velocity", loc="left")
-    axes[1].set_xlabel(histories.TIME_AXIS)
+    axes[1].set_xlabel(TIME_AXIS)
 
 
 def torque_look(place: int) -> Look:

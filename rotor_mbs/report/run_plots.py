@@ -13,7 +13,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.looks import coordinate_look
+from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.paths import paths
 from rotor_mbs.report.plots.time_histories import Motion, Series
@@ -39,9 +39,12 @@ class RunPlots:
         """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
         run = self._run
         kinetic, potential, work = (_quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work"))
-        scale = energy_scale(run.scene, run.trajectory)
-        curves = (kinetic, potential, kinetic + potential - work)
-        return time_histories.energies(run.time, curves, scale)
+        curves = {"kinetic": kinetic, "potential": potential, "total less work": kinetic + potential - work}
+        looks = dict(zip(curves, (Look(VERMILLION, "-", ""), Look(BLUE, "--", ""), Look(INK, "-", "")), strict=True))
+        series = [Series(run.time, values, looks[name]) for name, values in curves.items()]
+        picture = time_histories.lines([("energy (J)", series)])
+        canvas.legend_inside(picture.axes[0], list(looks.items()))
+        return picture
 
     def loads(self, name: str = "blade_root_force") -> Panels:
         """A load over time: a panel per axis with a line per blade, or one panel with a line per axis (or blade).
@@ -54,14 +57,14 @@ class RunPlots:
         if load is None or load.plot is None:
             raise InputError(f"no load {name!r}; allowed: {', '.join(one.name for one in LOADS)}")
         stacked = values[:, :, None] if values.ndim == 2 else values
-        panels = canvas.panels((1.6,) * stacked.shape[2], time_histories.TIME_AXIS)
         first = 1 if load.dimensions[1] == "blade" else 0
         looks = [coordinate_look(first + i) for i in range(stacked.shape[1])]
-        for k, axes in enumerate(panels.axes):
-            series = [Series(self._run.time, stacked[:, i, k], look) for i, look in enumerate(looks)]
-            time_histories.draw_lines(
-                axes, series, f"{'xyz'[k]} {load.plot.axis}" if values.ndim == 3 else load.plot.axis
-            )
+        rows = [
+            (f"{axis} {load.plot.axis}" if values.ndim == 3 else load.plot.axis,
+             [Series(self._run.time, stacked[:, i, k], look) for i, look in enumerate(looks)])
+            for k, axis in zip(range(stacked.shape[2]), "xyz", strict=False)
+        ]  # fmt: skip
+        panels = time_histories.lines(rows, height=1.6)
         names = [f"blade {i + 1}" if first else "xyz"[i] for i in range(len(looks))]
         canvas.legend_inside(panels.axes[0], list(zip(names, looks, strict=True)))
         return panels
@@ -94,7 +97,7 @@ class ComparisonPlots:
         """The rotor's angle (rad) by each method over time."""
         runs = list(self._runs.values())
         return _with_legend(
-            time_histories.lines([_series(run, run.angles[:, 0]) for run in runs], "rotor angle (rad)", None), runs
+            time_histories.lines([("rotor angle (rad)", [_series(run, run.angles[:, 0]) for run in runs])]), runs
         )
 
     def energy_error(self) -> Panels:

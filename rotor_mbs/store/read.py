@@ -35,8 +35,9 @@ class StoredRun:
     def attributes(self) -> dict[str, Any]:
         """Status, message, metrics, times ... as plain values. Raises StoreError where they are damaged."""
         with self._reading("attributes"):
-            self._prove(digests.ATTRIBUTES, lambda: digests.attributes_digest(self._group.attrs))
-            return hdf5.attributes_of(self._group)
+            found = hdf5.attributes_of(self._group)
+            self._prove(digests.ATTRIBUTES, lambda: digests.attributes_digest(found))
+            return found
 
     @property
     def status(self) -> str:
@@ -152,11 +153,11 @@ def _scenes(group: Any, name: str, verify: bool, seen: set[int]) -> Iterator[Sto
         seen.add(hdf5.address(item))
         path = f"{name}/{key}" if name else key
         if "scene_hash" in item.attrs:
-            known = digests.stored_digests(item.attrs)
-            if verify and known and known.get(digests.ATTRIBUTES) != digests.attributes_digest(item.attrs):
+            known, attributes = digests.stored_digests(item.attrs), hdf5.attributes_of(item)
+            if verify and known and known.get(digests.ATTRIBUTES) != digests.attributes_digest(attributes):
                 raise StoreError(f"{item.file.filename}: {item.name}: attributes changed after they were written")
             runs = {run.method: run for run in _runs(item, path, verify)}
-            yield StoredScene(path, hdf5.attributes_of(item), runs)
+            yield StoredScene(path, attributes, runs)
         else:
             yield from _scenes(item, path, verify, seen)
 

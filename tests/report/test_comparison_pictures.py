@@ -18,7 +18,7 @@ from rotor_mbs.report.pages.comparison_pictures import parting
 from rotor_mbs.report.pages.glance import heat_map, short_sentences
 from rotor_mbs.report.plots import comparisons
 from rotor_mbs.report.plots.comparisons import Mark
-from rotor_mbs.report.plots.time_histories import Series
+from rotor_mbs.report.plots.time_histories import Series, errors
 from rotor_mbs.store.read import open_results
 
 TIME = np.linspace(0.0, 10.0, 201)
@@ -40,21 +40,22 @@ def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
 
 
 def test_energies_of_very_different_size_are_all_readable() -> None:
-    """1 MJ made by the printed model, 40 J lost by the chain, a rounding error: each bends away from zero."""
+    """1 MJ made by the printed model, 40 J lost by the chain, a rounding error: magnitudes; gains have filled marks."""
     values = (1e6 * TIME / 10.0, -40.0 * TIME / 10.0, 1e-4 * np.sin(TIME))
-    picture = comparisons.energy_from_start([Series(TIME, x, PRINTED) for x in values])
-    (axes,) = picture.axes
-    assert axes.get_yscale() == "symlog"
-    assert axes.get_ylabel().endswith("(J)")
+    (axes,) = errors([Series(TIME, x, PRINTED) for x in values], "energy (J)", signed=True).axes
+    assert axes.get_yscale() == "log"
     low, high = axes.get_ylim()
-    assert low <= -40.0
+    assert low <= 1e-5
     assert high >= 1e6
-    heights = [abs(float(axes.transAxes.inverted().transform(axes.transData.transform((0.0, x)))[1]
-                         - axes.transAxes.inverted().transform(axes.transData.transform((0.0, 0.0)))[1]))
-               for x in (1e6, -40.0)]  # fmt: skip
-    assert min(heights) > 0.1  # of the panel
-    straight = comparisons.energy_from_start([Series(TIME, values[1], CORRECTED)])
-    assert straight.axes[0].get_yscale() == "linear"
+    curves, marks = axes.get_lines()[::2], axes.get_lines()[1::2]
+    for curve, filled, wanted in zip(curves, marks, values, strict=True):
+        x, y = curve.get_xydata().T
+        shown = np.isfinite(y)
+        np.testing.assert_allclose(y[shown], np.interp(x[shown], TIME, np.abs(wanted)), atol=1e-9 * y[shown].max())
+        gained = np.interp(filled.get_xdata(), TIME, wanted)
+        assert (gained > 0.0).all()
+        assert bool(len(gained)) == bool((wanted > 0.0).any())
+    assert len(marks[0].get_xdata()) > 5
 
 
 def test_offsets_over_azimuth_do_not_draw_the_way_back_over_the_top() -> None:
@@ -147,7 +148,7 @@ def test_the_index_opens_with_pictures_then_three_sentences_then_folded_tables(r
     first_table = text.index("<table")
     for needed in ('class="viewer"', 'class="card still"', ">published 2.7315 rad<", "energy made from nothing"):
         assert 0 < text.index(needed) < first_table, needed
-    rest = text[text.index('<section id="finding"') :]
+    rest = text[text.index('<section id="scenes"') :]
     assert "<table" in rest
     assert "<table" not in re.sub(r"<details>.*?</details>", "", rest, flags=re.S)
     assert len(text.encode()) < 600_000
@@ -166,6 +167,6 @@ def test_the_heat_map_has_the_errors_the_methods_and_the_marks(report: Path, tmp
 
 
 def test_a_report_without_a_paper_has_a_short_finding_of_its_own() -> None:
-    one = Finding(1, None, None, (), None, None, None, (Agreement("lagrange/taylor", Tally(1, 1), 1e-11, 1e-14),))
+    one = Finding(1, None, None, None, None, None, (Agreement("lagrange/taylor", Tally(1, 1), 1e-11, 1e-14),))
     (sentence,) = short_sentences(one)
     assert sentence.startswith("The corrected model agrees with a quad-precision reference to 1.0×10⁻¹¹")

@@ -13,11 +13,10 @@ from support.scenes import ARM, GRAVITY, MASS, OFFSET, paper
 from support.sweeps import made_sweep
 
 from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
-from rotor_mbs.cli.sweep import draw
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core.elements import Section
-from rotor_mbs.report.pages.sweep import sweep_page
-from rotor_mbs.report.plots.sweep import map_figure, response, spread_figure
+from rotor_mbs.report.pages.sweep import save_picture, sweep_page
+from rotor_mbs.report.plots.sweep import map_panels, response, spread_panels
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
@@ -77,7 +76,7 @@ def test_nearby_starts_of_fig11_part_as_the_variational_equations_say(tmp_path: 
     assert (spread.high[inside] <= 3.0 * growth[inside] * start).all()
     ratio = np.log(spread.growth[inside] / start / growth[inside])
     assert abs(np.median(ratio)) < math.log(8.0 * math.e * math.sqrt(GRAVITY / OFFSET))
-    picture = draw(sweep, output, output.with_suffix(".svg"))
+    picture = save_picture(StoredSweep(output), output.with_suffix(".svg"))
     assert "largest Lyapunov exponent" in picture
     assert output.with_suffix(".svg").read_text().startswith("<?xml")
 
@@ -119,16 +118,15 @@ def test_the_map_is_that_of_mathieus_equation(tmp_path: Path, stiffness: float, 
 def test_the_figures_show_what_was_found() -> None:
     time = np.linspace(0.0, 1.0, 11)
     spread = Spread(time, *(1e-6 * np.exp(time) * k for k in (1.0, 2.0, 3.0, 2.0)), 1.234, 0.056, 0.2, 0.8, 7)
-    text = spread_figure(spread, "a title")
-    assert "growth 1.23 ± 0.06 per s" in text
-    assert "10 to 90 % of 7 pairs" in text
-    growth = np.array([[1.0, 100.0], [1.0, np.nan]])
-    found = StabilityMap("kx", "ky", "rad", "N", np.array([1.0, 2.0]), np.array([3.0, 4.0]), growth)
-    text = map_figure(found, "a map")
-    assert "kx (rad)" in text
-    assert "ky (N)" in text
-    assert "10 times its start" in text
-    assert text == map_figure(found, "a map")
+    (axes,) = spread_panels(spread).axes
+    median, growth = axes.get_lines()
+    np.testing.assert_array_equal(median.get_ydata(), spread.median)
+    slope = np.diff(np.log(growth.get_ydata())) / np.diff(growth.get_xdata())
+    np.testing.assert_allclose(slope, 1.234, rtol=1e-9)
+    for rows, crosses in (([[1.0, 100.0], [1.0, np.nan]], True), ([[1.0, 9.0], [1.0, np.nan]], False)):
+        found = StabilityMap("kx", "ky", "rad", "N", np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array(rows))
+        panels, has_line = map_panels(found, "kx (rad)", "ky (N)")
+        assert (panels.axes[0].get_xlabel(), panels.axes[0].get_ylabel(), has_line) == ("kx (rad)", "ky (N)", crosses)
 
 
 def test_a_map_needs_two_axes_and_a_pitch_that_can_grow(tmp_path: Path) -> None:

@@ -8,12 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.figures import comparison, in_pi
+from rotor_mbs.report.pages.figures import in_pi, same_and_different
 from rotor_mbs.report.paper_figures import FIGURES
 from rotor_mbs.report.plots.paths import projected
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -47,11 +46,13 @@ def test_the_comparison_gives_when_the_printed_model_visibly_departs(tmp_path: P
         Made(FIG11, "exudyn_tree/rk67", near),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
-        found = comparison(opened.scenes["paper/fig11"])
-    assert found.visible_from == pytest.approx(2.5, abs=0.04)  # 0.02 t = 0.05 rad, at the next sample
-    assert found.largest == pytest.approx(0.2)
-    assert found.exudyn == pytest.approx(1e-8)
-    assert not found.corrected_still
+        same, different = (
+            text.replace("\N{NO-BREAK SPACE}", " ") for text in same_and_different(opened.scenes["paper/fig11"])
+        )
+    assert "moves as the corrected one up to 2.50 s" in same  # 0.02 t = 0.05 rad, at the next sample
+    assert "Exudyn and the corrected model differ by no more than 1.0×10⁻⁸ rad up to 10.0 s" in same
+    assert "the printed angles differ from the corrected ones by up to 0.20 rad" in different
+    assert "no blade pitches" not in different
 
 
 def test_equal_models_do_not_visibly_depart(tmp_path: Path) -> None:
@@ -59,9 +60,9 @@ def test_equal_models_do_not_visibly_depart(tmp_path: Path) -> None:
     with open_results(
         store(tmp_path / "r.h5", [Made(FIG11, "reference", still), Made(FIG11, "printed/ode45", still)])
     ) as opened:
-        found = comparison(opened.scenes["paper/fig11"])
-    assert found.visible_from == math.inf
-    assert found.corrected_still
+        same, different = same_and_different(opened.scenes["paper/fig11"])
+    assert "moves as the corrected one throughout" in same
+    assert different == "Not the same: nothing visible."
 
 
 def test_a_figure_has_three_pictures_with_a_message_and_the_published_number(tmp_path: Path) -> None:

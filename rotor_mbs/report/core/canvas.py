@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,14 +21,15 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.core.looks import Look
+from rotor_mbs.report.core.looks import VERMILLION, Look
 from rotor_mbs.report.core.numbers import power
 from rotor_mbs.store.hdf5 import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
+TIME_AXIS = "time (s)"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 KINDS = ("pdf", "svg", "png")
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
@@ -126,32 +127,28 @@ def encoded(figure: Figure, kind: str) -> bytes:
     return stream.getvalue()
 
 
-def log_axis(axes: Any, lowest: float, highest: float) -> None:
-    """A vertical log axis over whole decades, labelled 10⁻¹²; at most eight labels."""
+def log_axis(axes: Any, lowest: float, highest: float, which: str = "y") -> None:
+    """A log axis over whole decades, labelled 10⁻¹²; at most eight labels."""
     low, high = math.floor(math.log10(lowest)), math.ceil(math.log10(highest))
     high = max(high, low + 1)
-    axes.set_yscale("log")
-    axes.set_ylim(10.0**low, 10.0**high)
-    every = max(1, math.ceil((high - low) / 7))
-    axes.yaxis.set_major_locator(LogLocator(base=10.0**every, numticks=12))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power(round(math.log10(value)))))
+    axes.set(**{f"{which}scale": "log", f"{which}lim": (10.0**low, 10.0**high)})
+    exponents = range(low, high + 1, max(1, math.ceil((high - low) / 7)))
+    ticks(getattr(axes, f"{which}axis"), {10.0**e: power(e) for e in exponents})
 
 
-def symmetric_log_axis(axes: Any, first: int, below: int | None, above: int) -> None:
-    """A vertical axis straight up to 10**first, logarithmic beyond, from -10**below (None: from 0) to 10**above."""
-    axes.set_yscale("symlog", linthresh=10.0**first)
-    axes.set_ylim(0.0 if below is None else -(10.0**below), 10.0**above)
-    every = max(1, math.ceil((above - first + 1) / 4))
-    lower = [] if below is None else [-(10.0**e) for e in range(first, below + 1, every)]
-    axes.set_yticks([*reversed(lower), 0.0, *(10.0**e for e in range(first, above + 1, every))])
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _decade(value)))
+def ticks(axis: Any, labels: Mapping[float, str]) -> None:
+    """Labels at these places and no others; without the tick objects that `set_ticks` makes at once."""
+    axis.set_major_locator(FixedLocator([*labels]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, "")))
+    axis.set_minor_locator(NullLocator())
 
 
-def _decade(value: float) -> str:
-    sign = "−" if value < 0.0 else ""
-    return f"{sign}{power(round(math.log10(abs(value))))}" if value else "0"
+def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any) -> None:
+    """A line with markers that are white inside, as far as the look has them."""
+    axes.plot(
+        x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker,
+        **{"markersize": 4.2, "markerfacecolor": "white"} | more,
+    )  # fmt: skip
 
 
 def svg_text(figure: Figure) -> str:
@@ -164,17 +161,21 @@ def svg_text(figure: Figure) -> str:
     return stream.getvalue()
 
 
-def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str) -> Any:
-    """Growth over `x` and `y` as colour, with a scale on the right; its powers of ten, from 1 to `largest`."""
-    levels = np.log10(np.clip(growth, 1.0, largest))
-    axes = panels.axes[0]
-    mesh = axes.pcolormesh(
-        x, y, levels, cmap="cividis", shading="nearest", vmin=0.0, vmax=np.log10(largest), rasterized=True
-    )
+def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: float) -> bool:
+    """Powers of ten of the growth over `x` and `y` as colour, from 1 to `largest`, with a scale on the right.
+
+    Returns whether there is a line on which the growth is `boundary`; it is drawn.
+    """
+    axes, levels = panels.axes[0], np.log10(np.maximum(growth, np.finfo(float).tiny))
+    shown, top = np.clip(levels, 0.0, np.log10(largest)), np.log10(largest)
+    mesh = axes.pcolormesh(x, y, shown, cmap="cividis", shading="nearest", vmin=0.0, vmax=top, rasterized=True)
     axes.grid(visible=False)
     with style():
         panels.figure.colorbar(mesh, ax=axes).set_label(label)
-    return levels
+    has_line = min(levels.shape) > 1 and bool(np.nanmin(levels) < np.log10(boundary) < np.nanmax(levels))
+    if has_line:
+        axes.contour(x, y, levels, levels=[np.log10(boundary)], colors=[VERMILLION], linewidths=1.0)
+    return has_line
 
 
 def is_map(artist: Any) -> bool:

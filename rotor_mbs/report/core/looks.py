@@ -8,15 +8,16 @@ from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.methods.ladders import Look
 
 __all__ = [
-    "COLOURS", "COORDINATES", "GREY", "INK", "PALETTE", "PAPER", "Look",
+    "BLUE", "COLOURS", "COORDINATES", "GREY", "INK", "PALETTE", "PAPER", "VERMILLION", "Look",
     "class_of", "coordinate_look", "label_of", "look_of", "palette_css", "with_capital", "with_light_palette",
 ]  # fmt: skip
 
 # Every colour of a picture, and what stands for it on a dark page. A picture has colours of methods or of coordinates,
 # never of both.
 INK, PAPER, GREY = "#000000", "#ffffff", "#666666"
+BLUE, VERMILLION = "#0072b2", "#d55e00"
 _METHODS = {  # Okabe & Ito's, distinguishable with colour blindness; without the yellow, which does not show on white
-    INK: "#e6e9ed", "#0072b2": "#4fa8e0", "#d55e00": "#ff8a3d", "#009e73": "#2fc498", "#cc79a7": "#e79cc6",
+    INK: "#e6e9ed", BLUE: "#4fa8e0", VERMILLION: "#ff8a3d", "#009e73": "#2fc498", "#cc79a7": "#e79cc6",
     "#e69f00": "#f7bd45", "#56b4e9": "#9bd6f8",
 }  # fmt: skip
 _COORDINATES = {  # Tol's muted ones: the rotor, then a blade each

@@ -126,25 +126,6 @@ def published_marks(claims: Sequence[Claim], shown: Sequence[int]) -> list[Mark]
     return found[:_PUBLISHED]
 
 
-def energy_picture(runs: Sequence[StoredRun], horizon: float | None) -> Picture | None:
-    """Energy less work from its start, of each run that has energies; None without."""
-    series, legend, sizes = [], [], []
-    for run in runs:
-        if "energy_error" not in run:
-            continue
-        look = look_of(run.method)
-        series.append(Series(run.array("time"), run.array("energy_error"), look))
-        legend.append(LegendEntry(label_of(run.method), look))
-        sizes.append(f"{label_of(run.method)} up to {prefixed(float(np.abs(series[-1].values).max(initial=0.0)), 'J')}")
-    if not series:
-        return None
-    caption = "Energy that comes from nothing: total energy less the work done, from its start"
-    panels = comparisons.energy_from_start(series, horizon)
-    is_bent = panels.axes[0].get_yscale() == "symlog"
-    notes = ["The axis is straight about zero and logarithmic beyond."] if is_bent else []
-    return picture(panels, "energy", caption, f"{caption}: {'; '.join(sizes)}.", notes, legend)
-
-
 def tips_section(
     stored: StoredScene, sides: dict[str, StoredRun], horizon: float | None, tables: Sequence[PageTable]
 ) -> Section:

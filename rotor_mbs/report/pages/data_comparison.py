@@ -115,7 +115,7 @@ def _motion(record: Record, verdict: DataVerdict) -> list[Picture]:
     chosen, time = [one for one in verdict.channels if one.unit == "rad"], record.arrays["time"]
     if not chosen:
         return []
-    panels = canvas.panels((2.9,), time_histories.TIME_AXIS)
+    panels = canvas.panels((2.9,), canvas.TIME_AXIS)
     axes = panels.axes[0]
     every = max(1, len(time) // 40)
     for one in chosen:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rotor_mbs.analysis.rehydrate import scene_of
+from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, Picture, Section
-from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
+from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.core.numbers import prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.plots import comparisons
-from rotor_mbs.report.plots.time_histories import Array, Series
+from rotor_mbs.report.plots.time_histories import Array, Series, lines
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, value_at
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-_COMMAND, _TAKEN = Look(GREY, ":", ""), Look("#d55e00", "--", "")
+_COMMAND, _TAKEN = Look(GREY, ":", ""), Look(VERMILLION, "--", "")
 
 
 def drive_section(stored: StoredScene, run: StoredRun | None) -> Section:
@@ -59,7 +61,7 @@ def _shaft(scene: Scene, run: StoredRun) -> Picture:
     if scene.shaft_damping:
         curves.append(Series(time, taken, _TAKEN))
     rows = [("torque (N m)", [Series(time, torque, coordinate_look(0))]), ("power (W)", curves)]
-    return picture(comparisons.stacked(rows), "drive", caption, described)
+    return picture(_from_zero(rows), "drive", caption, described)
 
 
 def _pitches(scene: Scene, run: StoredRun, driven: list[int]) -> Picture:
@@ -78,4 +80,13 @@ def _pitches(scene: Scene, run: StoredRun, driven: list[int]) -> Picture:
     most = prefixed(max(float(np.abs(one.values).max()) for one in powers), "W")
     described = f"Pitches and the power of their actuators: {'; '.join(ends)}; power up to {most}."
     rows = [("pitch (rad)", pitches), ("actuators' power (W)", powers)]
-    return picture(comparisons.stacked(rows), "pitch-drive", "Pitches, their commands and actuators", described)
+    return picture(_from_zero(rows), "pitch-drive", "Pitches, their commands and actuators", described)
+
+
+def _from_zero(rows: Sequence[tuple[str, Sequence[Series]]]) -> Panels:
+    """Panels one above the other, whose vertical axes have the zero."""
+    panels = lines(rows, height=1.3)
+    for axes in panels.axes:
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, 0.0), max(high, 0.0))
+    return panels

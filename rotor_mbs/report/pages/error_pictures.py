@@ -19,33 +19,23 @@ Curves = dict[str, Series]  # by method
 
 
 def error_picture(
-    curves: Curves, axis: str, name: str, caption: str, horizon: float | None = None, others: Sequence[Series] = ()
-) -> Picture | None:
+    curves: Curves, axis: str, name: str, caption: str, horizon: float | None = None, others: Sequence[Series] = (),
+    *, signed: bool = False,
+) -> Picture | None:  # fmt: skip
     """The curves and `others`, which have no marker; None where there is nothing to draw or to note."""
     if not curves:
         return None
     exact = [label_of(method) for method in curves if method not in visible(curves)]
     notes = [f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else []
-    largest = "; ".join(f"{label_of(method)} up to {number(float(c.values.max()))}" for method, c in curves.items())
-    panels = histories.errors([*others, *visible(curves).values()], axis, horizon)
+    sizes = {label_of(method): float(np.abs(one.values).max()) for method, one in curves.items()}
+    largest = "; ".join(f"{label} up to {number(size)}" for label, size in sizes.items())
+    panels = histories.errors([*others, *visible(curves).values()], axis, horizon, signed=signed)
     return picture(panels, name, caption, f"{caption}, logarithmic axis: {largest}", notes)
-
-
-def line_picture(
-    curves: Mapping[str, Series], axis: str, name: str, caption: str, horizon: float | None, unit: str
-) -> Picture:
-    """The curves, by label, over one axis; their ranges as alternative text."""
-    ranges = [
-        f"{label} from {number(float(one.values.min()), 3)} to {number(float(one.values.max()), 3)}"
-        for label, one in curves.items()
-    ]
-    described = f"{caption.partition(':')[0]} over time, in {unit}: {'; '.join(ranges)}."
-    return picture(histories.lines(list(curves.values()), axis, horizon), name, caption, described)
 
 
 def visible(curves: Curves) -> Curves:
     """The curves that a logarithmic axis can show."""
-    return {method: one for method, one in curves.items() if one.values.max() > LOWEST}
+    return {method: one for method, one in curves.items() if np.abs(one.values).max() > LOWEST}
 
 
 def run_legend(methods: Sequence[str]) -> list[LegendEntry]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -17,7 +16,7 @@ from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, with_unit
 from rotor_mbs.report.pages.claims import description_of, unit_of
-from rotor_mbs.report.pages.comparison_pictures import VISIBLE
+from rotor_mbs.report.pages.comparison_pictures import parting
 from rotor_mbs.report.pages.error_pictures import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.report.paper_figures import HEADINGS, PATHS, TORQUES, PaperFigure, compared_runs
@@ -25,29 +24,6 @@ from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 _ROUNDING = 1e-9  # rad
-
-
-@dataclass(frozen=True)
-class ModelComparison:
-    """How the models of a scene differ; None where the file does not have the runs.
-
-    visible_from      s, when the printed angles differ from the corrected ones by VISIBLE; inf: never
-    largest           rad, the largest difference of the two
-    ended             s, when the printed run ended early
-    corrected_still   whether no blade of the corrected model pitches
-    printed_pitch     rad, the largest pitch of the printed model
-    gain              J, rise of the printed model's energy without work
-    exudyn            rad, difference of Exudyn from the corrected model up to the time `until` (s)
-    """
-
-    visible_from: float | None
-    largest: float | None
-    ended: float | None
-    corrected_still: bool
-    printed_pitch: float | None
-    gain: float | None
-    exudyn: float | None
-    until: float
 
 
 def walk_figure(
@@ -60,7 +36,7 @@ def walk_figure(
     panels = []
     for letter, name in [("", figure.scenes[0])] if is_torques else figure.panels:
         row = {key: runs for place, key, runs in pictures if place == letter}
-        same, different = _torques(figure, scenes, row) if is_torques else _same_and_different(scenes[name])
+        same, different = _torques(figure, scenes, row) if is_torques else same_and_different(scenes[name])
         panels.append({
             "letter": letter,
             "scene": name,
@@ -84,9 +60,9 @@ def _torques(
     figure: PaperFigure, scenes: Mapping[str, StoredScene], row: Mapping[str, Mapping[str, StoredRun]]
 ) -> tuple[str, str]:
     """What is the same and what is not in a figure of torques."""
-    gaps = [gap for name in figure.scenes if (gap := comparison(scenes[name]).exudyn) is not None]
+    gaps = [gap for name in figure.scenes if (gap := _exudyn_gap(scenes[name])) is not None]
     same = "The same: every torque accelerates the rotor from rest"
-    same += f"; Exudyn and the corrected model differ by {with_unit(max(gaps), 'rad')} at most." if gaps else "."
+    same += f"; Exudyn and the corrected model differ by {with_unit(max(gaps)[0], 'rad')} at most." if gaps else "."
     turned = [
         f"{HEADINGS[key]}: {', '.join(_turned(run, at) for at, run in runs.items())}" for key, runs in row.items()
     ]
@@ -121,62 +97,46 @@ def _number(claim: Claim) -> str:
     )
 
 
-def comparison(scene: StoredScene) -> ModelComparison:
-    """The printed model, the corrected one and Exudyn on one scene."""
+def same_and_different(scene: StoredScene) -> tuple[str, str]:
+    """What the printed model, the corrected one and Exudyn have in common on a scene, and how they differ."""
     runs = compared_runs(scene)
-    printed, corrected, exudyn = (runs.get(key) for key in HEADINGS)
-    visible = largest = ended = gain = pitch = near = None
-    known = horizon(scene)
-    until = math.inf if known is None else known
-    if printed is not None:
-        gain = metric(printed, "energy_gain_J")
-        pitch = float(np.abs(printed.array("angles")[:, 1:]).max(initial=0.0))
-        if printed.status not in COMPLETE:
-            ended = float(printed.array("time")[-1])
+    printed, corrected = runs.get("printed"), runs.get("corrected")
+    same, different = [], []
     if printed is not None and corrected is not None:
-        gap = angle_difference(printed, corrected)
-        largest = float(gap.max())
-        apart = np.flatnonzero(gap > VISIBLE)
-        visible = float(printed.array("time")[apart[0]]) if len(apart) else math.inf
-    if exudyn is not None and corrected is not None:
-        gap = angle_difference(exudyn, corrected)
-        time = exudyn.array("time")[: len(gap)]
-        until = min(until, float(time[-1]))
-        near = float(gap[time <= until].max(initial=0.0))
-    still = corrected is not None and bool(np.abs(corrected.array("angles")[:, 1:]).max(initial=0.0) < _ROUNDING)
-    return ModelComparison(visible, largest, ended, still, pitch, gain, near, until)
+        parted, largest = parting(printed, corrected)
+        if parted is None or parted > 0.0:
+            until = "throughout" if parted is None else f"up to {with_unit(parted, 's', 3)}"
+            same.append(f"the printed model moves as the corrected one {until}")
+        pitches = [float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0)) for run in (corrected, printed)]
+        if pitches[0] < _ROUNDING and pitches[1] > 1e-3:
+            reach = with_unit(pitches[1], "rad")
+            different.append(f"no blade pitches in the corrected model; in print the pitches reach {reach}")
+        if parted is not None:
+            most = with_unit(largest, "rad")
+            different.append(f"the printed angles differ from the corrected ones by up to {most}")
+    gap = _exudyn_gap(scene)
+    if gap is not None:
+        near, until = with_unit(gap[0], "rad"), with_unit(gap[1], "s", 3)
+        same.append(f"Exudyn and the corrected model differ by no more than {near} up to {until}")
+    gain = None if printed is None else metric(printed, "energy_gain_J")
+    if gain is not None and gain > 1e3:
+        different.append(f"the energy of the printed model rises by {prefixed(gain, 'J')} without work done")
+    if printed is not None and printed.status not in COMPLETE:
+        end = with_unit(float(printed.array("time")[-1]), "s", 3)
+        different.append(f"it diverges, and ode45 stops at {end}")
+    common = f"The same: {'; '.join(same)}." if same else ""
+    return common, f"Not the same: {'; '.join(different) or 'nothing visible'}."
 
 
-def _same_and_different(scene: StoredScene) -> tuple[str, str]:
-    found = comparison(scene)
-    return _same(found), _different(found)
-
-
-def _same(found: ModelComparison) -> str:
-    parts = []
-    if found.visible_from is not None and found.visible_from > 0.0:
-        until = "throughout" if found.visible_from == math.inf else f"up to {with_unit(found.visible_from, 's', 3)}"
-        parts.append(f"the printed model moves as the corrected one {until}")
-    if found.exudyn is not None:
-        parts.append(
-            f"Exudyn and the corrected model differ by no more than {with_unit(found.exudyn, 'rad')} up to "
-            f"{with_unit(found.until, 's', 3)}"
-        )
-    return f"The same: {'; '.join(parts)}." if parts else ""
-
-
-def _different(found: ModelComparison) -> str:
-    parts = []
-    if found.corrected_still and found.printed_pitch is not None and found.printed_pitch > 1e-3:
-        pitch = with_unit(found.printed_pitch, "rad")
-        parts.append(f"no blade pitches in the corrected model; in print the pitches reach {pitch}")
-    if found.largest is not None and found.visible_from != math.inf:
-        parts.append(f"the printed angles differ from the corrected ones by up to {with_unit(found.largest, 'rad')}")
-    if found.gain is not None and found.gain > 1e3:
-        parts.append(f"the energy of the printed model rises by {prefixed(found.gain, 'J')} without work done")
-    if found.ended is not None:
-        parts.append(f"it diverges, and ode45 stops at {with_unit(found.ended, 's', 3)}")
-    return f"Not the same: {'; '.join(parts)}." if parts else "Not the same: nothing visible."
+def _exudyn_gap(scene: StoredScene) -> tuple[float, float] | None:
+    """rad, the difference of Exudyn from the corrected model up to a time, and that time in s; None without both."""
+    runs = compared_runs(scene)
+    if not {"corrected", "exudyn"} <= set(runs):
+        return None
+    gap, known = angle_difference(runs["exudyn"], runs["corrected"]), horizon(scene)
+    time = runs["exudyn"].array("time")[: len(gap)]
+    until = min(math.inf if known is None else known, float(time[-1]))
+    return float(gap[time <= until].max(initial=0.0)), until
 
 
 def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:

@@ -1,24 +1,37 @@
-"""Pictures of the stored quantities that say themselves how they are drawn, by their declarations alone."""
+"""Pictures of the stored quantities that say themselves how they are drawn, by their declarations alone.
+
+Those that are judged against the reference, such as loads, are drawn of the reference, beside the others' errors.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import product
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from rotor_mbs.analysis.rehydrate import scene_of
-from rotor_mbs.report.core.elements import LegendEntry, Section, line_entry
-from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
+from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.compared_quantities import compared_section, is_compared
-from rotor_mbs.report.pages.error_pictures import Curves, error_picture, line_picture, run_legend, visible
+from rotor_mbs.report.pages.error_pictures import Curves, Runs, error_picture, run_legend, visible
 from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.time_histories import Series
+from rotor_mbs.report.plots.time_histories import Array, Series
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities
+from rotor_mbs.solution.quantities import sizes as lengths
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-Runs = Mapping[str, StoredRun]
+
+class _Component(NamedTuple):
+    """group: the picture it is drawn in; label: its line there; place: index of the line's look; values: (n,)."""
+
+    group: str
+    label: str
+    place: int
+    values: Array
 
 
 def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
@@ -33,61 +46,105 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
     found = []
     for quantity, plot in plotted_quantities(scene):
         own = {method: run for method, run in runs.items() if quantity.name in run}
-        if not own:
-            continue
-        name = f"quantity-{quantity.name}"
-        if plot.logarithmic:
-            curves = sizes(quantity, own)
-            shown = error_picture(curves, plot.axis, name, plot.title, horizon)
-            section = Section(
-                [shown] if shown is not None and visible(curves) else [], run_legend(list(visible(curves)))
-            )
-        elif len(quantity.dimensions) == 1:
-            legend = [line_entry(label_of(m), look_of(m).colour, look_of(m).line) for m in own]
-            lines = {
-                label_of(m): Series(run.array("time"), run.array(quantity.name), look_of(m)) for m, run in own.items()
-            }
-            section = Section([line_picture(lines, plot.axis, name, plot.title, horizon, quantity.units)], legend)
-        elif is_compared(quantity, own):
-            section = compared_section(quantity, plot, own, name, horizon)
-        else:
-            section = _components(quantity, plot, own, name, horizon)
-        found.append((name, plot.title, section))
+        if own:
+            name = f"quantity-{quantity.name}"
+            found.append((name, plot.title, _section(quantity, plot, own, name, horizon)))
     return found
+
+
+def _section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:
+    """Sizes on a logarithmic axis; all runs on one axis where there is one component; else pictures of each run."""
+    if plot.logarithmic:
+        curves = sizes(quantity, runs)
+        shown = error_picture(curves, plot.axis, name, plot.title, horizon) if visible(curves) else None
+        return Section([] if shown is None else [shown], run_legend(list(visible(curves))))
+    if len(quantity.dimensions) == 1:
+        lines = {
+            m: Series(run.array("time"), run.array(quantity.name), Look(look_of(m).colour, look_of(m).line, ""))
+            for m, run in runs.items()
+        }
+        ranges = "; ".join(
+            f"{label_of(m)} from {number(float(one.values.min()), 3)} to {number(float(one.values.max()), 3)}"
+            for m, one in lines.items()
+        )
+        described = f"{plot.title} over time, in {quantity.units}: {ranges}."
+        panels = histories.lines([(plot.axis, list(lines.values()))], horizon)
+        return Section(
+            [picture(panels, name, plot.title, described)],
+            [LegendEntry(label_of(m), one.look) for m, one in lines.items()],
+        )
+    rule = quantity.judgement
+    is_compared = rule is not None and rule.with_reference and REFERENCE in runs
+    drawn = {REFERENCE: runs[REFERENCE]} if is_compared else runs
+    pictures: list[Picture] = []
+    for i, run in enumerate(drawn.values()):
+        pictures += _pictures(quantity, plot, run, f"{name}-{i}", horizon)
+    components = list(_components(quantity, next(iter(drawn.values()))))
+    legend = {one.label: LegendEntry(one.label, coordinate_look(one.place)) for one in components}
+    if not is_compared:
+        return Section(pictures, list(legend.values()))
+    errors = _errors(quantity, runs)
+    title = "Largest difference from the reference"
+    shown = error_picture(errors, f"difference ({quantity.units})", f"{name}-error", title, horizon)
+    if shown is not None:
+        pictures.append(replace(shown, legend=run_legend(list(visible(errors)))))
+    return Section(pictures, list(legend.values()), [_extremes(quantity, runs[REFERENCE].array("time"), components)])
 
 
 def sizes(quantity: Quantity, runs: Runs) -> Curves:
     """The largest magnitude of the quantity over its components, of each run that has it."""
-    return {
-        method: Series(run.array("time"), np.abs(_columns(run, quantity)).max(axis=1), look_of(method))
-        for method, run in runs.items()
-        if quantity.name in run
+    own = {method: run for method, run in runs.items() if quantity.name in run}
+    columns = {
+        method: np.abs(run.array(quantity.name)).reshape(len(run.array("time")), -1) for method, run in own.items()
     }
+    return {m: Series(run.array("time"), columns[m].max(axis=1), look_of(m)) for m, run in own.items()}
 
 
-def _columns(run: StoredRun, quantity: Quantity) -> histories.Array:
-    """(n, components)."""
+def _components(quantity: Quantity, run: StoredRun) -> Iterator[_Component]:
+    """One by one: with blades and axes, a picture per axis and a line per blade; else one picture."""
     values = run.array(quantity.name)
-    return values.reshape(len(values), -1)
-
-
-def _components(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:
-    """A picture per run, a line per component."""
+    names = {"coordinate": run.labels, "axis": ["x", "y", "z"]}
+    labels = names.get(quantity.dimensions[1], [f"blade {i + 1}" for i in range(values.shape[1])])
     first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
-    pictures = []
-    for i, (method, run) in enumerate(runs.items()):
-        columns = _columns(run, quantity).T
-        series = [Series(run.array("time"), x, coordinate_look(first + k)) for k, x in enumerate(columns)]
-        caption = with_capital(label_of(method))
-        described = f"{plot.title} over time, {caption}: {quantity.long_name}, in {quantity.units}."
-        pictures.append(picture(histories.lines(series, plot.axis, horizon), f"{name}-{i}", caption, described))
-    run = next(iter(runs.values()))
-    lengths = run.array(quantity.name).shape[1:]
-    labels = {
-        "coordinate": run.labels,
-        "blade": [f"blade {i + 1}" for i in range(max(lengths))],
-        "axis": ["x", "y", "z"],
-    }
-    each = [labels[dimension][:length] for dimension, length in zip(quantity.dimensions[1:], lengths, strict=True)]
-    names = [" ".join(one) for one in product(*each)]
-    return Section(pictures, [LegendEntry(label, coordinate_look(first + k)) for k, label in enumerate(names)])
+    for i, label in enumerate(labels[: values.shape[1]]):
+        if values.ndim == 2:
+            yield _Component("", label, first + i, values[:, i])
+        else:
+            yield from (_Component(axis, label, first + i, values[:, i, k]) for k, axis in enumerate("xyz"))
+
+
+def _pictures(quantity: Quantity, plot: Plot, run: StoredRun, name: str, horizon: float | None) -> Iterator[Picture]:
+    """One per group of components."""
+    components = list(_components(quantity, run))
+    for i, group in enumerate(dict.fromkeys(one.group for one in components)):
+        lines = [one for one in components if one.group == group]
+        series = [Series(run.array("time"), one.values, coordinate_look(one.place)) for one in lines]
+        largest = prefixed(max(float(np.abs(one.values).max()) for one in lines), quantity.units)
+        caption = with_capital(label_of(run.method)) + (f", {group} axis" if group else "")
+        described = f"{plot.title} over time, {caption}: {quantity.long_name}, up to {largest}."
+        yield picture(histories.lines([(plot.axis, series)], horizon), f"{name}-{i}", caption, described)
+
+
+def _errors(quantity: Quantity, runs: Runs) -> Curves:
+    """The largest difference from the reference over blades, at the samples that both have; vectors by their length."""
+    exact, found = runs[REFERENCE].array(quantity.name), {}
+    for method, run in runs.items():
+        if method != REFERENCE:
+            values = run.array(quantity.name)
+            n = min(len(values), len(exact))
+            off = lengths(quantity, values[:n] - exact[:n]).reshape(n, -1).max(axis=1)
+            found[method] = Series(run.array("time")[:n], off, look_of(method))
+    return found
+
+
+def _extremes(quantity: Quantity, time: Array, components: list[_Component]) -> PageTable:
+    """Smallest and largest value of each component, with their times."""
+    rows = []
+    for one in components:
+        places = (int(one.values.argmin()), int(one.values.argmax()))
+        cells = [
+            text for k in places for text in (prefixed(float(one.values[k]), quantity.units), number(float(time[k]), 4))
+        ]
+        rows.append([f"{one.label} {one.group}".strip(), *cells])
+    head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
+    return PageTable("Extremes in the reference", head, rows, numeric=(1, 2, 3, 4))

@@ -229,10 +229,16 @@ def difference_section(drawn: DrawnRuns) -> Section:
 def energy_section(drawn: DrawnRuns) -> Section:
     """Energy less work from its start, of every run."""
     runs = {name: run for name, run in drawn.all.items() if "energy_error" in run}
-    shown = comparison_pictures.energy_picture(list(runs.values()), drawn.horizon)
+    curves = {n: Series(run.array("time"), run.array("energy_error"), look_of(n)) for n, run in runs.items()}
+    shown = error_pictures.error_picture(
+        curves, "|energy from nothing| (J)", "energy",
+        "Energy that comes from nothing (total energy less work, from its start): filled marks gained, open ones lost",
+        drawn.horizon, signed=True,
+    )  # fmt: skip
     if shown is None:
         return Section()
-    return Section([shown], _horizon_entry(drawn), [scene_tables.energy_table(runs)])
+    legend = error_pictures.run_legend(list(error_pictures.visible(curves)))
+    return Section([shown], [*legend, *_horizon_entry(drawn)], [scene_tables.energy_table(runs)])
 
 
 def _path_tables(drawn: DrawnRuns) -> list[PageTable]:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, spread_of, stability_map
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
-from rotor_mbs.report.core.looks import Look, with_capital
-from rotor_mbs.report.core.numbers import number, with_unit
+from rotor_mbs.report.core.canvas import Panels, legend_inside
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
+from rotor_mbs.report.core.looks import with_capital
+from rotor_mbs.report.core.numbers import SPACE, apart
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.pages.scene_tables import status_text
@@ -22,6 +25,7 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.sweep_columns import parameter_name
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
+Array = NDArray[Any]
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
 _RESPONSE, _MOST_RESPONSES = "pitch_max", 3
@@ -30,16 +34,23 @@ _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     """What the template needs."""
-    asked, lines = _asked_picture(sweep)
-    statuses = sweep.column("status")
-    shown = [asked] if asked else _responses(sweep, statuses == STATUSES.index("ok"))
+    statuses = np.asarray(sweep.column("status"))
+    ok, lines = statuses == STATUSES.index("ok"), [with_capital(sweep.attributes["summary"].rstrip(".")) + "."]
+    shown, table = _responses(sweep, ok), _status_table(statuses)
+    if _asked(sweep):
+        try:
+            panels, caption, line, legend = _asked_picture(sweep)
+            shown = [picture(panels, "asked", caption, f"{caption}. {line}", legend=legend)]
+        except (InputError, StoreError) as exc:
+            line = f"No picture: {exc}."
+        lines.append(line)
     return {
         "title": sweep.attributes["title"],
-        "summary": [with_capital(sweep.attributes["summary"].rstrip(".")) + ".", *lines],
-        "picture": Section(shown, tables=[_status_table(statuses)] if shown else []),
-        "statuses": Section(tables=[] if shown else [_status_table(statuses)]),
+        "summary": lines,
+        "picture": Section(shown, tables=[table] if shown else []),
+        "statuses": Section(tables=[] if shown else [table]),
         "parameters": Section(tables=[_parameter_table(sweep)]),
-        "distributions": Section(_distributions(sweep, statuses == STATUSES.index("ok"))),
+        "distributions": Section(_distributions(sweep, ok)),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
         "versions": versions(sweep.attributes),
     }
@@ -56,60 +67,51 @@ def field_name(key: str) -> str:
     return f"initial pitch {'rate' if is_rate else 'angle'} of blade {coordinate}"
 
 
-def _asked_picture(sweep: StoredSweep) -> tuple[Picture | None, list[str]]:
-    """The picture that the sweep's file asks for, and what it says; neither where it cannot be drawn (yet)."""
+def save_picture(sweep: StoredSweep, path: Path) -> str:
+    """The picture that the sweep's file asks for, as a file; a line about it. Raises InputError, StoreError."""
+    panels, _, line, legend = _asked_picture(sweep)
+    legend_inside(panels.axes[0], [(one.label, one.look) for one in legend])
+    panels.save(path)
+    return f"{path}: {line}"
+
+
+def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
+    """With caption, what it says, legend."""
+    if _asked(sweep) == "spread":
+        return _spread(sweep)
+    start = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"])).initial_angles
+    found = stability_map(sweep, max(map(abs, start[1:]), default=0.0))
+    labels = [f"{field_name(key)} ({unit})" for key, unit in ((found.x_key, found.x_unit), (found.y_key, found.y_unit))]
+    panels, has_line = plots.map_panels(found, *labels)
+    line = f"The pitches grow {GROWN:g}-fold in {found.unstable.sum()} of {found.growth.size} runs."
+    caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
+    return panels, caption, line, [LegendEntry(f"{GROWN:g} times its start", plots.BOUNDARY)] if has_line else []
+
+
+def _asked(sweep: StoredSweep) -> str:
+    """The kind of picture that the sweep's file asks for; "" where it asks for none."""
     try:
-        asked = tomllib.loads(str(sweep.attributes.get("sweep_toml", "")))
+        return str(tomllib.loads(str(sweep.attributes.get("sweep_toml", ""))).get("picture", ""))
     except tomllib.TOMLDecodeError:
-        return None, []
-    try:
-        if asked.get("picture") == "spread":
-            return _spread(sweep)
-        if asked.get("picture") == "map":
-            return _map(sweep, asked.get("change", {}))
-    except (InputError, StoreError) as exc:
-        return None, [f"No picture: {exc}."]
-    return None, []
+        return ""
 
 
-def _spread(sweep: StoredSweep) -> tuple[Picture, list[str]]:
+def _spread(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
     found = spread_of(sweep)
     line = (
         f"Nearby starts part with the largest Lyapunov exponent {found.exponent:.3f} ± {found.uncertainty:.3f} per s "
         f"({found.pairs} pairs, {found.start:.2f} to {found.end:.2f} s)."
     )
     legend = [
-        line_entry(f"10 to 90 % of {found.pairs} pairs", "#0072b2", width=8.0),
-        line_entry("median", "#0072b2"),
-        line_entry(f"growth {found.exponent:.2f} ± {found.uncertainty:.2f} per s", "#d55e00", "--"),
+        LegendEntry(f"10 to 90 % of {found.pairs} pairs", plots.MEDIAN, 8.0),
+        LegendEntry("median", plots.MEDIAN),
+        LegendEntry(f"growth {found.exponent:.2f} ± {found.uncertainty:.2f} per s", plots.GROWTH),
     ]
-    return picture(plots.spread_panels(found), "spread", "Separation of nearby starts", line, legend=legend), [line]
+    return plots.spread_panels(found), "Separation of nearby starts", line, legend
 
 
-def _map(sweep: StoredSweep, change: dict[str, object]) -> tuple[Picture, list[str]]:
-    found = stability_map(sweep, _largest_start(sweep, change))
-    labels = [f"{field_name(key)} ({unit})" for key, unit in ((found.x_key, found.x_unit), (found.y_key, found.y_unit))]
-    line = f"The pitches grow {GROWN:g}-fold in {found.unstable.sum()} of {found.growth.size} runs."
-    legend: Sequence[LegendEntry] = [LegendEntry(f"{GROWN:g} times its start", Look("#d55e00", "-", ""))]
-    if found.unstable.all() or not found.unstable.any():
-        legend = []
-    caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
-    return picture(plots.map_panels(found, *labels), "map", caption, f"{caption}. {line}", legend=legend), [line]
-
-
-def _largest_start(sweep: StoredSweep, change: dict[str, object]) -> float:
-    """rad: the largest pitch at the start, of the base scene as the sweep changes it."""
-    scene = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"]))
-    angles = list(scene.initial_angles)
-    for key, value in change.items():
-        found = _COORDINATE.fullmatch(key)
-        if found and found[1] == "angles" and isinstance(value, int | float):
-            angles[int(found[2])] = float(value)
-    return max((abs(angle) for angle in angles[1:]), default=0.0)
-
-
-def _status_table(statuses: object) -> PageTable:
-    codes, counts = np.unique(np.asarray(statuses), return_counts=True)
+def _status_table(statuses: Array) -> PageTable:
+    codes, counts = np.unique(statuses, return_counts=True)
     total = int(counts.sum())
     rows = [
         (status_text(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / total:.1f} %")
@@ -122,45 +124,50 @@ def _parameter_table(sweep: StoredSweep) -> PageTable:
     rows = []
     for key in sweep.keys:
         values, unit = sweep.column(parameter_name(key)), sweep.columns[parameter_name(key)].units
-        limits = [with_unit(float(value), unit, 4) for value in (np.nanmin(values), np.nanmax(values))]
+        limits = [f"{text}{SPACE}{unit}" for text in apart(float(np.nanmin(values)), float(np.nanmax(values)))]
         rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
     return PageTable("Varied parameters", ("Parameter", "Key", "From", "To", "Values"), rows, (2, 3, 4))
 
 
-def _responses(sweep: StoredSweep, ok: object) -> list[Picture]:
+def _responses(sweep: StoredSweep, ok: Array) -> list[Picture]:
     """The largest pitch of each run that ended well, over each of the first parameters that were varied."""
-    values = sweep.column(_RESPONSE)[np.asarray(ok)] if _RESPONSE in sweep.columns else np.empty(0)
+    values = sweep.column(_RESPONSE)[ok] if _RESPONSE in sweep.columns else np.empty(0)
     found = []
     for key in sweep.keys[:_MOST_RESPONSES]:
         name = parameter_name(key)
-        parameter = sweep.column(name)[np.asarray(ok)]
+        parameter = sweep.column(name)[ok]
         if len(values) < 2 or not np.isfinite(values).all() or not np.ptp(parameter):
             continue
-        label, unit = field_name(key), sweep.columns[name].units
-        logarithmic = parameter.min() > 0.0 and parameter.max() > _SPAN * parameter.min()
-        caption = f"The largest pitch of each run over the {label}"
-        x_label = label if unit == "1" else f"{label} ({unit})"
-        panels = plots.response(parameter, values, x_label, "largest pitch (rad)", logarithmic=logarithmic)
+        caption = f"The largest pitch of each run over the {field_name(key)}"
+        label = _axis(field_name(key), sweep.columns[name].units)
+        panels = plots.response(parameter, values, label, "largest pitch (rad)", logarithmic=_is_wide(parameter))
         found.append(picture(panels, f"over-{name}", caption, caption))
     return found
 
 
-def _distributions(sweep: StoredSweep, ok: object) -> list[Picture]:
+def _distributions(sweep: StoredSweep, ok: Array) -> list[Picture]:
     """A picture for each number of the runs that ended well."""
     found = []
     left_out = {*map(parameter_name, sweep.keys), *_COUNTS}
     for name, column in sweep.columns.items():
         if column.dimensions != ("run",) or name in left_out or sweep.column(name).dtype.kind != "f":
             continue
-        values = sweep.column(name)[np.asarray(ok)]
+        values = sweep.column(name)[ok]
         values = values[np.isfinite(values)]
         if len(values) < 2 or not np.ptp(values):
             continue
-        positive = values[values > 0.0]
-        logarithmic = len(positive) > 1 and positive.max() > _SPAN * positive.min() and len(positive) == len(values)
-        low, middle, high = (number(float(x), 3) for x in np.quantile(values, (0.05, 0.5, 0.95)))
-        unit = "" if column.units == "1" else f" ({column.units})"
-        caption = f"{with_capital(column.long_name)}: median {middle}, 5 to 95 % from {low} to {high}{unit}"
-        panels = plots.distribution(values, f"{name.replace('_', ' ')}{unit}", logarithmic=logarithmic)
+        low, middle, high = apart(*map(float, np.quantile(values, (0.05, 0.5, 0.95))))
+        what = f"median {middle}, 5 to 95 % from {low} to {high}"
+        caption = _axis(f"{with_capital(column.long_name)}: {what}", column.units)
+        panels = plots.distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
         found.append(picture(panels, f"of-{name}", caption, f"{caption}, over {len(values)} runs."))
     return found
+
+
+def _axis(label: str, unit: str) -> str:
+    return label if unit == "1" else f"{label} ({unit})"
+
+
+def _is_wide(values: Array) -> bool:
+    """Whether a logarithmic axis shows more."""
+    return bool(values.min() > 0.0 and values.max() > _SPAN * values.min())

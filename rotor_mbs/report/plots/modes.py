@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotor_mbs.analysis.campbell import FloquetTable, LinearModes, StabilityChart
 from rotor_mbs.analysis.modes import GROWTH
-from rotor_mbs.report.core.canvas import Panels, growth_map, panels
-from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
+from rotor_mbs.report.core.canvas import Panels, curve, growth_map, panels
+from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
 
 SPEED_AXIS = "rotor speed (rad/s)"
 # Multiples of the rotor speed drawn as lines: gravity acts once a turn, a tower or yaw error on each blade in turn.
@@ -15,7 +17,6 @@ _HARMONICS = (1, 2, 3, 6)
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 # Growth over a turn beyond which the colours of the chart end.
 _MOST_GROWTH = 1e3
-_INK, _ACCENT = "#0072b2", "#d55e00"
 
 
 def mode_look(index: int) -> Look:
@@ -37,15 +38,11 @@ def campbell(modes: LinearModes) -> Panels:
             continue
         end = min(float(speeds[-1]), top / k)
         panel.axes[0].text(end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
-    for k in range(frequencies.shape[1]):
-        look = mode_look(k)
-        every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
-        known = frequencies[:, k]
-        panel.axes[0].plot(speeds, known, color=look.colour, linestyle=look.line, marker=look.marker, markevery=every,
-                           markersize=4.0, fillstyle="none")  # fmt: skip
+    for k, known in enumerate(frequencies.T):
         change = np.where(np.nanmax(known) > 1e-6 * top, known - known[np.flatnonzero(np.isfinite(known))[:1]], np.nan)
-        panel.axes[1].plot(speeds, change, color=look.colour, linestyle=look.line, marker=look.marker,
-                           markevery=every, markersize=4.0, fillstyle="none")  # fmt: skip
+        every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
+        for axes, values in zip(panel.axes, (known, change), strict=True):
+            curve(axes, speeds, values, mode_look(k), markevery=every, markersize=4.0)
     panel.axes[0].set_ylim(0.0, top)
     panel.axes[0].set_ylabel("frequency (rad/s)")
     panel.axes[1].set_ylabel("change (rad/s)")
@@ -60,8 +57,7 @@ def damping(modes: LinearModes) -> Panels:
         (panel.axes[1], "growth_rates", "growth rate (1/s)"),
     ):
         for k, values in enumerate(modes.over_speed(name).T):
-            look = mode_look(k)
-            axes.plot(modes.speeds, values, color=look.colour, linestyle=look.line)
+            curve(axes, modes.speeds, values, replace(mode_look(k), marker=""))
         axes.set_ylabel(label)
     return panel
 
@@ -72,9 +68,9 @@ def multipliers(table: FloquetTable) -> Panels:
     axes = panel.axes[0]
     sizes = np.abs(table.multipliers)
     axes.plot(
-        table.speeds, np.where(sizes > 0.0, sizes, np.nan), color=_INK, linestyle="none", marker=".", markersize=4.0
+        table.speeds, np.where(sizes > 0.0, sizes, np.nan), color=BLUE, linestyle="none", marker="o", markersize=2.0
     )
-    axes.plot(table.speeds, table.largest, color=_ACCENT, linestyle="-")
+    axes.plot(table.speeds, table.largest, color=VERMILLION, linestyle="-")
     axes.axhline(1.0, color=GREY, linewidth=0.8)
     known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
     if len(known) and known.max() / known.min() > 10.0:
@@ -88,11 +84,7 @@ def multipliers(table: FloquetTable) -> Panels:
 def chart(found: StabilityChart) -> Panels:
     """Growth over a turn as colour over speed and stiffness, with the boundary of stability."""
     panel = panels((3.6,), SPEED_AXIS)
-    axes = panel.axes[0]
     label = "growth over a turn (powers of ten)"
-    growth_map(panel, found.speeds, found.stiffnesses, found.largest, _MOST_GROWTH, label)
-    boundary = np.where(np.isfinite(found.largest), found.largest, _MOST_GROWTH) - (1.0 + GROWTH)
-    if min(found.largest.shape) > 1 and boundary.min() < 0.0 < boundary.max():
-        axes.contour(found.speeds, found.stiffnesses, boundary, levels=[0.0], colors=[_ACCENT], linewidths=1.0)
-    axes.set_ylabel("bearing stiffness (N m/rad)")
+    growth_map(panel, found.speeds, found.stiffnesses, found.largest, _MOST_GROWTH, label, 1.0 + GROWTH)
+    panel.axes[0].set_ylabel("bearing stiffness (N m/rad)")
     return panel

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
-from rotor_mbs.report.core.numbers import power
+from rotor_mbs.report.core.numbers import scaled
 
 Array = NDArray[Any]
 
-TIME_AXIS, ANGLE_AXIS, RATE_AXIS = "time (s)", "angle (rad)", "rate (rad/s)"
+ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
 # Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double of order one.
 LOWEST = 1e-18
 _HIGHEST = 1e4
 # Values larger than this many times the 90 % quantile are cut off.
 _RUNAWAY = 8.0
 _STILL = 10.0  # times what it is in the last samples, at most, where it has not passed
-# A range (rad, rad/s; of energies, of their scale) that is rounding error.
+# A range (rad, rad/s) that is rounding error.
 _ROUNDING = 1e-9
 _BINS = 130  # intervals of a curve that is drawn: one in some four pixels of a page
-ENERGY_LOOKS = (
-    ("kinetic", Look("#d55e00", "-", ""), 1.2),
-    ("potential", Look("#0072b2", "--", ""), 1.2),
-    ("total less work", Look("#000000", "-", ""), 2.6),
-)
 
 
 class Motion(NamedTuple):
@@ -70,10 +65,11 @@ def draw_coordinates(axes: Any, time: Array, values: Array, label: str, first: i
     set_range(axes, values)
 
 
-def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
-    """The curves over one vertical axis."""
+def draw_lines(axes: Any, series: Sequence[Series], label: str, scale: float = 1.0) -> None:
+    """The curves over one vertical axis, divided by `scale`."""
     for one in series:
-        axes.plot(*thin(one.time, one.values), color=one.look.colour, linestyle=one.look.line)
+        time, values = thin(one.time, one.values)
+        canvas.curve(axes, time, values / scale, one.look)
     axes.set_ylabel(label)
 
 
@@ -87,53 +83,36 @@ def set_range(axes: Any, values: Array) -> None:
         axes.set_ylim(middle - 0.1, middle + 0.1)
 
 
-def lines(series: Sequence[Series], label: str, horizon: float | None) -> Panels:
-    """The curves on one axis."""
-    panels = canvas.panels((2.3,), TIME_AXIS)
-    draw_lines(panels.axes[0], series, label)
-    mark_time(panels.axes[0], max(float(one.time[-1]) for one in series), horizon)
+def lines(rows: Sequence[tuple[str, Sequence[Series]]], horizon: float | None = None, height: float = 2.3) -> Panels:
+    """Panels one above the other, (label with a unit, curves) each; large numbers in k or M of the unit."""
+    panels = canvas.panels((height,) * len(rows), TIME_AXIS)
+    for axes, (label, series) in zip(panels.axes, rows, strict=True):
+        has_prefix = "(" in label and "(rad" not in label
+        largest = max(float(np.abs(one.values).max()) for one in series)
+        scale, prefix = scaled(largest if has_prefix else 1.0)
+        draw_lines(axes, series, label.replace("(", f"({prefix}", 1), scale)
+        mark_time(axes, max(float(one.time[-1]) for one in series), horizon)
     return panels
 
 
-def errors(series: Sequence[Series], label: str, horizon: float | None = None, lowest: float = 1.0) -> Panels:
-    """Non-negative curves on a logarithmic axis; the axis begins at `lowest` or at the smallest value drawn."""
+def errors(series: Sequence[Series], label: str, horizon: float | None = None, *, signed: bool = False) -> Panels:
+    """Magnitudes on a logarithmic axis from 1 or less; signed: markers are filled where a value is above zero."""
     panels = canvas.panels((2.9,), TIME_AXIS)
-    axes = panels.axes[0]
-    drawn = [(*_peaks(one.time, one.values), one.look) for one in series]
-    for time, values, look in drawn:
-        axes.plot(
-            time, values, color=look.colour, linestyle=look.line, linewidth=1.0 if look.marker else 1.8,
-            marker=look.marker or None, markersize=4.2, markerfacecolor="white",
-            markevery=(len(time) // 30, max(1, len(time) // 8)),
-        )  # fmt: skip
-    known = np.concatenate([values for _, values, _ in drawn] or [np.empty(0)])
-    known = known[np.isfinite(known)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (LOWEST, 1e-9)
-    canvas.log_axis(axes, max(min(low, lowest), LOWEST), min(high, _HIGHEST))
+    axes, known = panels.axes[0], []
+    for one in series:
+        time, values = _peaks(one.time, one.values)
+        sizes = np.where(np.abs(values) > LOWEST, np.minimum(np.abs(values), np.inf if signed else _HIGHEST), np.nan)
+        first, step = len(time) // 30, max(1, len(time) // 8)
+        canvas.curve(axes, time, sizes, one.look, 1.0 if one.look.marker else 1.8, markevery=(first, step))
+        if signed:
+            above = np.arange(first, len(time), step)[values[first::step] > 0.0]
+            look = replace(one.look, line="")
+            canvas.curve(axes, time[above], sizes[above], look, markerfacecolor=one.look.colour)
+        known += sizes[np.isfinite(sizes)].tolist()
+    canvas.log_axis(axes, max(min([*known, 1.0] if known else [LOWEST]), LOWEST), max(known, default=1e-9))
     axes.set_ylabel(label)
     if series:
         mark_time(axes, float(series[0].time[-1]), horizon)
-    return panels
-
-
-def energies(time: Array, curves: Sequence[Array], scale: float) -> Panels:
-    """Kinetic and potential energy and their sum less the work, in J; values beyond 3 `scale` are cut off."""
-    panels = canvas.panels((2.3,), TIME_AXIS)
-    axes = panels.axes[0]
-    largest = max(float(np.abs(curve).max()) for curve in curves)
-    top = min(largest, 3.0 * scale) if scale > 0.0 else largest
-    factor, prefix = next(((f, p) for f, p in ((1e6, "M"), (1e3, "k")) if top >= f), (1.0, ""))
-    for curve, (_, look, width) in zip(curves, ENERGY_LOOKS, strict=True):
-        # The total is drawn below the others, and wide: where they are small it would cover the kinetic energy.
-        axes.plot(
-            *thin(time, curve / factor), color=look.colour, linestyle=look.line, linewidth=width,
-            zorder=3.0 - 0.1 * width,
-        )  # fmt: skip
-    if largest < _ROUNDING * scale:
-        axes.set_ylim(-1e-3 * scale, 1e-3 * scale)
-    if largest > 3.0 * scale > 0.0:
-        axes.set_ylim(-2.0 * scale / factor, 3.0 * scale / factor)
-    axes.set_ylabel(f"energy ({prefix}J)")
     return panels
 
 
@@ -144,16 +123,9 @@ def error_over_step(series: Sequence[tuple[Array, Array, Look]], target: float) 
     for steps, values, look in series:
         shown = np.clip(values, LOWEST, _HIGHEST)
         known += [float(np.nanmin(shown)), float(np.nanmax(shown))]
-        axes.plot(
-            steps, shown, color=look.colour, linestyle=look.line, marker=look.marker, markersize=4.2,
-            markerfacecolor="white",
-        )  # fmt: skip
+        canvas.curve(axes, steps, shown, look)
     every_step = np.concatenate([steps for steps, _, _ in series])
-    low, high = math.floor(math.log10(every_step.min())), math.ceil(math.log10(every_step.max()))
-    decades = range(low, max(high, low + 1) + 1)
-    axes.set_xscale("log")
-    axes.set_xticks([10.0**e for e in decades], [power(e) for e in decades])
-    axes.set_xticks([], minor=True)
+    canvas.log_axis(axes, every_step.min(), every_step.max(), "x")
     canvas.log_axis(axes, min(known), max(known))
     axes.axhline(target, color=GREY, linewidth=0.8, linestyle=":")
     axes.set_ylabel("largest angle error (rad)")
@@ -179,11 +151,11 @@ def is_cut(values: Array) -> bool:
 
 
 def _peaks(time: Array, values: Array) -> tuple[Array, Array]:
-    """The largest sample of each interval; NaN, a gap in the curve, where a logarithmic axis cannot show it."""
+    """The sample of the largest magnitude of each interval."""
     if len(time) > 2 * _BINS:
-        index = [one[values[one].argmax()] for one in np.array_split(np.arange(len(time)), _BINS)]
+        index = [one[np.abs(values[one]).argmax()] for one in np.array_split(np.arange(len(time)), _BINS)]
         time, values = time[index], values[index]
-    return time, np.where(values > LOWEST, np.minimum(values, _HIGHEST), np.nan)
+    return time, values
 
 
 def mark_time(axes: Any, end: float, horizon: float | None) -> None:

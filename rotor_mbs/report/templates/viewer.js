@@ -167,6 +167,11 @@
         shown.forEach((index) => blades(see, index, over && index === 0));
         shown.forEach((index, row) => label(index, x + 6, y + 16 + 18 * row, over && index === 0));
       }
+      document.querySelectorAll(".now").forEach((line) => {
+        const [zero, scale, last] = line.dataset.time.split(" ").map(Number);
+        line.style.visibility = now > last ? "hidden" : "visible";
+        line.style.transform = `translateX(${zero + scale * now}px)`;
+      });
       part("time").value = Math.round((1000 * now) / end);
       part("time").setAttribute("aria-valuetext", `${now.toFixed(2)} s`);
       part("clock").textContent = `${now.toFixed(2)} s`;
