@@ -58,7 +58,7 @@ def test_what_does_not_grow_is_told() -> None:
 def test_nearby_starts_of_fig11_part_as_the_variational_equations_say(tmp_path: Path) -> None:
     heyoka_reference = pytest.importorskip("rotor_mbs.models.lagrange.reference")
     pytest.importorskip("heyoka")
-    sweep, output = _run(
+    _, output = _run(
         tmp_path,
         'title = "t"\nscene = "paper/fig11"\nsamples = 401\noutputs = ["angles"]\ndraws = 64\npicture = "spread"\n'
         + "".join(
