@@ -6,8 +6,8 @@ many starts, for several durations, and holds or fails only where nearly all run
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,29 +149,20 @@ class SampledRuns:
     def numbers(self, asked: TrajectoryNumber) -> list[float | None]:
         """(runs,) the number of each run; None where it is undefined."""
         runs = zip(self.angles, self.rates, strict=True)
-        return [measure(_Samples(self.time, angles, rates), asked) for angles, rates in runs]
+        return [measure({"time": self.time, "angles": angles, "rates": rates}, asked) for angles, rates in runs]
 
 
-@dataclass(frozen=True)
-class _Samples:
-    time: Array
-    angles: Array
-    rates: Array
-
-    def __contains__(self, name: str) -> bool:
-        return name in ("time", "angles", "rates")
-
-    def array(self, name: str) -> Array:
-        values: Array = getattr(self, name)
-        return values
-
-
-@dataclass(frozen=True)
+@dataclass
 class MeasuredRuns:
     """Numbers of the runs of one method for one duration: by what is read off, and by scene which runs decide."""
 
-    numbers: Mapping[TrajectoryNumber, Sequence[float | None]]
-    decides: Mapping[str, NDArray[np.bool_]]
+    numbers: dict[TrajectoryNumber, list[float | None]] = field(default_factory=dict)
+    decides: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
+
+    def add(self, scene: str, runs: SampledRuns, asked: Iterable[TrajectoryNumber]) -> None:
+        """The runs of one more scene, and of the `asked` numbers those that are read off it."""
+        self.numbers |= {number: runs.numbers(number) for number in asked if number.scene == scene}
+        self.decides[scene] = runs.decides
 
     def marks(self, item: Published) -> str:
         """A mark of the claim for each run; run k of one scene is compared with run k of another."""

@@ -19,11 +19,9 @@ _DATASETS = {"angle": "angles", "rate": "rates"}
 
 
 class RunArrays(Protocol):
-    """Arrays of a run by name: time (n,), angles, rates (n, 1 + blades); refined_time and so on where it has them."""
+    """Arrays of a run by name: time (n,), angles, rates (n, 1 + blades); refined_time and so on, None without them."""
 
-    def __contains__(self, name: str, /) -> bool: ...
-
-    def array(self, name: str) -> Array: ...
+    def get(self, name: str, /) -> Array | None: ...
 
 
 def measure(run: RunArrays, asked: TrajectoryNumber) -> float | None:
@@ -35,11 +33,10 @@ def measure(run: RunArrays, asked: TrajectoryNumber) -> float | None:
 
 
 def _series(run: RunArrays, name: str, coordinate: int) -> tuple[Array, Array] | None:
-    for time, values in (("refined_time", f"refined_{name}"), ("time", name)):
-        if time in run and values in run:
-            data = run.array(values)
-            if len(data) and coordinate < data.shape[1]:
-                return run.array(time), data[:, coordinate]
+    for prefix in ("refined_", ""):
+        time, values = run.get(f"{prefix}time"), run.get(f"{prefix}{name}")
+        if time is not None and values is not None and len(values) and coordinate < values.shape[1]:
+            return time, values[:, coordinate]
     return None
 
 

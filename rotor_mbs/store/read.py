@@ -81,6 +81,10 @@ class StoredRun:
             self._prove(name, lambda: digests.dataset_digest(values, dataset.attrs))
         return values
 
+    def get(self, name: str) -> NDArray[Any] | None:
+        """A dataset, whole; None where the run has none of that name."""
+        return self.array(name) if name in self else None
+
     @functools.cached_property
     def _digests(self) -> dict[str, str]:
         return digests.stored_digests(self._group.attrs)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 
 from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, MeasuredRuns, SampledRuns, numbers_in
-from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
+from rotor_mbs.analysis.published import Published, published
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.dask_cluster import open_task_pool
-from rotor_mbs.execution.pool import SerialPool, TaskPool
+from rotor_mbs.execution.pool import SerialPool
 from rotor_mbs.execution.provenance import versions
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -130,20 +130,20 @@ def claim_shares(
     scenes = find_scenes(sorted({number.scene for number in asked}))
     shares: list[ClaimShare] = []
     done, total = 0, len(scenes) * len(durations)
-    with _opened(folder, workers) as pool:
+    folder.mkdir(parents=True, exist_ok=True)
+    with closing(open_task_pool("local", workers) if workers else SerialPool()) as pool:
         for duration in durations:
-            measured: dict[str, MeasuredRuns] = {method: MeasuredRuns({}, {}) for method in METHODS}
+            measured = {method: MeasuredRuns() for method in METHODS}
             for scene in scenes:
                 sweep = moved_starts(scene, duration, runs, seed)
                 file = folder / f"{scene.name.replace('/', '-')}-{duration:g}s.h5"
                 result = run_sweep(sweep, file, engine=pool, timeout_s=_TIMEOUT_S)
-                measured = {
-                    method: _with(measured[method], scene.name, found, asked)
-                    for method, found in _by_method(StoredSweep(file), runs + 1)
-                }
+                for method, found in _by_method(StoredSweep(file), runs + 1):
+                    measured[method].add(scene.name, found, asked)
                 done += 1
                 on_sweep(done, total, f"{scene.name} {duration:g} s: {result.made} runs made")
-            shares += _shares(wanted, measured, duration)
+            for item in wanted:
+                shares += [ClaimShare(item.id, name, duration, found.marks(item)) for name, found in measured.items()]
     return ClaimShares(tuple(shares), SPREAD, runs)
 
 
@@ -165,25 +165,3 @@ def _by_method(sweep: StoredSweep, rows: int) -> Iterator[tuple[str, SampledRuns
     for number, method in enumerate(METHODS):
         runs = slice(number * rows, (number + 1) * rows)
         yield method, SampledRuns(sweep.column("time"), *(values[runs] for values in columns.values()))
-
-
-def _with(known: MeasuredRuns, scene: str, runs: SampledRuns, asked: Iterable[TrajectoryNumber]) -> MeasuredRuns:
-    """With the numbers of one more scene."""
-    found = {number: runs.numbers(number) for number in asked if number.scene == scene}
-    return MeasuredRuns({**known.numbers, **found}, {**known.decides, scene: runs.decides})
-
-
-def _shares(items: Sequence[Published], measured: dict[str, MeasuredRuns], duration: float) -> Iterator[ClaimShare]:
-    for item in items:
-        for method, runs in measured.items():
-            yield ClaimShare(item.id, method, duration, runs.marks(item))
-
-
-@contextmanager
-def _opened(folder: Path, workers: int) -> Iterator[TaskPool]:
-    folder.mkdir(parents=True, exist_ok=True)
-    pool = open_task_pool("local", workers) if workers else SerialPool()
-    try:
-        yield pool
-    finally:
-        pool.close()

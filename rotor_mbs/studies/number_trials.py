@@ -17,8 +17,6 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.trajectory import Array
 
 DURATIONS = (8.0, 9.0, 10.0, 11.0, 12.0, 13.0)  # s
 TOLERANCES = ((1e-5, 1e-9), (1e-6, 1e-8), (1e-6, 1e-9), (1e-6, 1e-10), (1e-7, 1e-9), (1e-8, 1e-9))
@@ -88,26 +86,12 @@ def perform(task: Trial) -> list[NumberTrial]:
         "relative_tolerance": task.conditions.relative_tolerance,
         "absolute_tolerance": task.conditions.absolute_tolerance,
     }
-    run = _Refined(solve(PRINTED, replace(task.scene, duration=task.conditions.duration), settings))
+    run = solve(PRINTED, replace(task.scene, duration=task.conditions.duration), settings).trajectory
     return [
         trial(item, task.conditions, measure(run, item.of), task.remainder)
         for item in task.items
         if item.of is not None
     ]
-
-
-@dataclass(frozen=True)
-class _Refined:
-    """The arrays of a solution as `measure` asks for them: at ode45's own output points."""
-
-    solution: Solution
-
-    def __contains__(self, name: str) -> bool:
-        return getattr(self.solution.trajectory, name, None) is not None
-
-    def array(self, name: str) -> Array:
-        values: Array = getattr(self.solution.trajectory, name)
-        return values
 
 
 def _results(tasks: Sequence[Trial], workers: int) -> Iterator[tuple[Trial, list[NumberTrial]]]:
