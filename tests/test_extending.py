@@ -131,6 +131,28 @@ def test_bench_measures_its_ladder_and_its_order(installed: Installed) -> None:
     assert "from outside, RK4" in (installed.folder / "bench-report" / "index.html").read_text()
 
 
+def test_a_sweep_takes_its_runs_side_by_side_and_judges_them_by_its_own_bounds(installed: Installed) -> None:
+    """Nine runs, each once; at a step of 0.1 s they are over the package's bound, as one alone is."""
+    installed.scene("one")
+    code = (
+        "import numpy as np, rotor_rk4, rotor_mbs as rm\n"
+        "blocks = []\n"
+        "class Counted(rotor_rk4.Block):\n"
+        "    def __init__(self, scenes, settings):\n"
+        "        blocks.append(len(scenes)); super().__init__(scenes, settings)\n"
+        "rotor_rk4.METHOD.__dict__['solve_many'] = Counted\n"
+        "scene = rm.load('one.toml').replace(samples=6, **{'initial.rates[1]': 8.0})\n"
+        "angles = {'initial.angles[1]': np.linspace(0.1, 0.9, 9).tolist()}\n"
+        "for step in (2e-3, 0.1):\n"
+        "    data = rm.sweep(scene, angles, methods=['outside/rk4'], settings={'step': step})\n"
+        "    alone = rm.run(scene.replace(**{'initial.angles[1]': 0.1}), 'outside/rk4', step=step)\n"
+        "    same = np.array_equal(data.at('angles', 5)[0], alone.angles[5])\n"
+        "    print(max(blocks) > 1, sum(blocks), *data.statuses, same)"
+    )
+    printed = installed.python("-c", code).split("\n")[:2]
+    assert printed == ["True 9 ok True", "True 18 inaccurate True"]
+
+
 def test_stability_takes_it_with_its_label(installed: Installed) -> None:
     installed.command("stability", installed.scene("one"), "-o", "stable.h5", "--report", "stable", "--timeout", "4")
     with h5py.File(installed.folder / "stable.h5") as file:

@@ -26,11 +26,10 @@ _MANY = 1_000_000  # runs that are not started without --yes
 def sweep(arguments: argparse.Namespace) -> int:
     """1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
     with closing(open_task_pool(arguments.engine, arguments.jobs)) as pool:
-        from rotor_mbs.scenario.sweep import MAX_ROWS, load_sweep
+        from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import plan_sweep
 
-        may_be_long = arguments.yes or arguments.dry_run
-        study = load_sweep(arguments.file, MAX_ROWS if may_be_long else _MANY)
+        study = load_sweep(arguments.file)
         plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             return _show_estimate(plan, pool, arguments)

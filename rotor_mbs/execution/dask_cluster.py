@@ -43,7 +43,7 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
         return WorkerPool(workers, _load)
     if re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
         return _open_cluster(name.removeprefix("dask:"))
-    raise InputError(f"--engine {name}: no such engine; allowed: {ENGINE_FORMS}")
+    raise InputError(f"engine {name}: no such engine; allowed: {ENGINE_FORMS}")
 
 
 def _load() -> None:
@@ -53,12 +53,12 @@ def _load() -> None:
 def _open_cluster(address: str) -> Cluster:
     import asyncio
 
-    engine = f"--engine dask:{address}"
+    engine = f"engine dask:{address}"
     try:
         from distributed import Client
         from distributed.comm.core import connect
     except ImportError as exc:
-        raise InputError("--engine dask: dask is not installed; pip install distributed") from exc
+        raise InputError("engine dask: dask is not installed; pip install distributed") from exc
     for name in list(logging.root.manager.loggerDict):
         if name.startswith(("distributed", "tornado")):  # what it logs of a lost connection is said here in a line
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -109,7 +109,7 @@ class Cluster:
 
     def _refuse_without_scheduler(self) -> None:
         if self._client.status != "running":
-            raise StoreError("--engine dask: the scheduler is gone; what is stored is kept, the same command goes on")
+            raise StoreError("engine dask: the scheduler is gone; what is stored is kept, the same command goes on")
 
     def _watch(self) -> None:
         """A cluster whose last worker is gone would be waited for without end."""
@@ -119,7 +119,7 @@ class Cluster:
             with suppress(Exception):  # the scheduler is gone, which ends the futures, too; or this client is closed
                 if self._client.nthreads():
                     without_since = time.monotonic()
-        error = StoreError(f"--engine dask: no workers for {self._patience_s:g} s; what is stored is kept")
+        error = StoreError(f"engine dask: no workers for {self._patience_s:g} s; what is stored is kept")
         for future in list(self._waiting):
             with suppress(Exception):  # one that has just ended
                 future.set_exception(error)
@@ -135,7 +135,7 @@ def refuse_other_code(expected: Mapping[str, str]) -> None:
     found = {name: identity().get(name, "missing") for name in expected}
     wrong = [f"{name} {found[name]} (here {here})" for name, here in expected.items() if found[name] != here]
     if wrong:
-        raise InputError(f"--engine dask: {_OTHER_CODE} (on {socket.gethostname()}: {', '.join(wrong)})")
+        raise InputError(f"engine dask: {_OTHER_CODE} (on {socket.gethostname()}: {', '.join(wrong)})")
 
 
 def run_as_worker(work: Callable[[T], R], task: T, timeout_s: float, expected: Mapping[str, str]) -> R:

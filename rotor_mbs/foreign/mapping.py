@@ -126,7 +126,7 @@ def sources(table: DataTable, scene: Scene, mapping: ColumnMapping | None) -> li
         raise InputError(f"{table.source}: no column for the time; it has: {shown}; allowed: `time` in a mapping file")
     if len(found) == 1:
         raise InputError(
-            f"{table.source}: no column for an angle or a rate; it has: {shown}; allowed: a mapping file (--columns)"
+            f"{table.source}: no column for an angle or a rate; it has: {shown}; allowed: a mapping file (columns)"
         )
     return found
 

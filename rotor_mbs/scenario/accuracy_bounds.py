@@ -64,7 +64,7 @@ class Bounds:
         """The first that fits. Raises InputError where none does: a check without a bound would pass anything."""
         bound = self.find(check, method)
         if bound is None:
-            raise InputError(f"no bound for check {check!r} of {method}; allowed: an entry in a --bounds file")
+            raise InputError(f"no bound for check {check!r} of {method}; allowed: an entry in a file of bounds")
         return bound
 
     def find(self, check: str, method: str) -> Bound | None:

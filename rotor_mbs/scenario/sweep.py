@@ -188,10 +188,8 @@ class Sweep:
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
 
 
-def load_sweep(path: Path, most_rows: int = MAX_ROWS) -> Sweep:
+def load_sweep(path: Path) -> Sweep:
     """The sweep in the TOML file `path`; a name such as sweeps/fig11-spread means a shipped one.
-
-    most_rows   of the design: a larger one is refused before any of its rows is made
 
     Raises InputError with all errors of the file, a line each.
     """
@@ -201,7 +199,7 @@ def load_sweep(path: Path, most_rows: int = MAX_ROWS) -> Sweep:
     if not path.exists() and str(path) in dict(list_scenes()):
         raise InputError(f"{path}: is a scene; allowed: a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}")
     text, tables = read_toml(path)
-    return _sweep(path, text, validate_file(SweepTable, tables, text, shown_path(path)), most_rows=most_rows)
+    return _sweep(path, text, validate_file(SweepTable, tables, text, shown_path(path)))
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
@@ -248,11 +246,11 @@ def _problem(path: Path, text: str, key: KeyPath, message: str) -> str:
     return f"{shown_path(path)}:{line_of(find_lines(text), key)}: {message}"
 
 
-def _sweep(path: Path, text: str, table: SweepTable, base: Scene | None = None, *, most_rows: int = MAX_ROWS) -> Sweep:
+def _sweep(path: Path, text: str, table: SweepTable, base: Scene | None = None) -> Sweep:
     """What the file's model cannot check: the base scene, the keys of the axes in it, and how many rows there are."""
     problem = functools.partial(_problem, path, text)
     base = _changed(base or _base(path, table.scene, problem), table, problem)
-    sweep = Sweep(table, base, _design(table, problem, most_rows), text, path)
+    sweep = Sweep(table, base, _design(table, problem), text, path)
     _check_rows(sweep)
     return sweep
 
@@ -282,16 +280,15 @@ def _changed(base: Scene, table: SweepTable, problem: Problem) -> Scene:
         raise InputError([problem((key,), f"{key}: {one}") for one in error.problems]) from error
 
 
-def _design(table: SweepTable, problem: Problem, most_rows: int) -> Design:
+def _design(table: SweepTable, problem: Problem) -> Design:
     axes = tuple(_axis(axis, table.draws or 0) for axis in table.axis)
     if table.combine == "zip" and len({axis.count for axis in axes}) > 1:
         counts = ", ".join(f"{axis.key} has {axis.count}" for axis in axes)
         wrong = f"combine: {counts}; allowed with zip: as many values in every axis"
         raise InputError(problem(("combine",), wrong))
     design = Design(axes, table.combine, table.seed)
-    if design.count > most_rows:
-        more = f" (with --yes {MAX_ROWS:,})" if most_rows < MAX_ROWS else ""
-        raise InputError(problem(("axis",), f"axis: {design.count:,} runs; allowed: at most {most_rows:,}{more}"))
+    if design.count > MAX_ROWS:
+        raise InputError(problem(("axis",), f"axis: {design.count:,} runs; allowed: at most {MAX_ROWS:,}"))
     return design
 
 

@@ -113,16 +113,18 @@ def clearly_ok(
     samples: Sequence[int],
     drifts: Array,
     angles: Array,
+    own: tuple[Bound, ...] = (),
 ) -> NDArray[np.bool_]:
-    """(k,) whether `judge`, without a reference, is certain to call each run ok.
+    """(k,) whether `judge`, without a reference, is certain to call each run ok; of a method without bounds it is not.
 
     drifts, angles   (k,) energy error of its scale, and the largest angle in rad, of each run
+    own              bounds that the method brings
     """
-    allowed = allowed_of(method)
+    allowed = allowed_of(method, own)
     complete = np.array([one.success and n == scenes[0].samples for one, n in zip(integrations, samples, strict=True)])
     complete &= angles <= ANGLE_LIMIT
     if allowed is None:
-        return complete
+        return np.zeros_like(complete)
     shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
     return complete & (drifts <= allowed.energy) & (np.array(shares) > _CLEAR_SHARE)
 

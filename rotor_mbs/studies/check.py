@@ -44,7 +44,7 @@ class DefaultSet:
 def default_set() -> DefaultSet:
     """Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method."""
     paper, own = find_scenes(["paper"]), find_scenes(["check"])
-    corrected = [name for name in method_names(is_corrected=True) if is_available(name)]
+    corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
     methods = {
         scene.name: [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
         for scene in paper
@@ -176,14 +176,9 @@ def judge_frozen(bounds: Bounds) -> list[Verdict]:
     return found
 
 
-def is_available(method: str) -> bool:
-    """Whether the engine of `method` is installed; "*" stands for none."""
-    return method == "*" or find_method(method).is_installed
-
-
 def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Verdict]:
     """Verdicts on measurements, in the order of `cases`; a measurement that was lost fails."""
-    available = [case for case in cases if is_available(case.method)]
+    available = [case for case in cases if case.method == "*" or find_method(case.method).is_installed]
     outcomes = {outcome.case: outcome for outcome in compute(available, perform_probe, workers, _TIMEOUT_S)}
     return [judge_measured(one, bounds) for case in available for one in measurements(outcomes[case])]
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotor_mbs.analysis.exact import mirrored, relabelled
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, Result
@@ -101,21 +102,12 @@ def _symmetry(case: Case) -> list[Verdict]:
     The mirror turns y into -y: azimuths stay, pitches change sign.
     """
     scene = _scene(case, 2.0)
-    base = _run(case, scene)
-    q, w = scene.initial_angles, scene.initial_rates
-    back = 2.0 * math.pi / len(scene.blades)
-    permuted = replace(
-        scene,
-        initial_angles=(q[0] - back, q[-1], *q[1:-1]),
-        initial_rates=(w[0], w[-1], *w[1:-1]),
-        blades=(scene.blades[-1], *scene.blades[:-1]),
-    )
-    mirrored = replace(scene, initial_angles=(q[0], *(-a for a in q[1:])), initial_rates=(w[0], *(-r for r in w[1:])))
+    base, count = _run(case, scene), 1 + len(scene.blades)
     growth = running_growth(load_frozen(case.scene.name))[: scene.samples]
     found = []
     for name, variant, columns, sign in (
-        ("blades permuted", permuted, [2, *range(3, len(q)), 1], 1.0),
-        ("mirrored along the shaft", mirrored, list(range(1, len(q))), -1.0),
+        ("blades permuted", relabelled(scene), [*range(2, count), 1], 1.0),
+        ("mirrored along the shaft", mirrored(scene), list(range(1, count)), -1.0),
     ):
         other = _run(case, variant)
         value = math.nan

@@ -25,9 +25,8 @@ from rotor_mbs.store.records import write_records
 from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.number_trials import number_trials
 from rotor_mbs.studies.sweep import run_sweep
-from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD
 
-METHODS = (PRINTED, ENSEMBLE_METHOD)
+METHODS = (PRINTED, "lagrange/taylor")
 DURATIONS = (8.0, 10.0, 12.0)  # s
 RUNS, SEED = 100, 2020
 SPREAD = 1e-15  # rad

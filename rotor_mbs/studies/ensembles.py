@@ -6,21 +6,16 @@ each other. Angles, rates, kinetic energy and the tips' offsets at the end of th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 
-from rotor_mbs.analysis.distributions import (
-    Array,
-    critical_distance,
-    critical_mean_difference,
-    largest_distance,
-    mean_difference,
-)
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # rad: half the width of the uniform distribution of every angle at the start.
 SPREAD = 1e-3
@@ -28,6 +23,7 @@ SPREAD = 1e-3
 # Probability that a comparison fails, in any channel, although both methods are right. Machines round differently, so
 # that beyond the horizon every machine draws anew.
 SIGNIFICANCE = 1e-5
+_SHARES = (0.1, 0.5, 0.9)  # of the quantiles
 
 
 @dataclass(frozen=True)
@@ -72,9 +68,6 @@ def compare_samples(one: Mapping[str, Array], other: Mapping[str, Array]) -> Ite
         )
 
 
-_SHARES = (0.1, 0.5, 0.9)
-
-
 def ensemble(
     scene: Scene,
     method: str,
@@ -103,3 +96,36 @@ def _at_the_end(run: Trajectory, *, complete: bool) -> Array:
     """Angles, rate of the rotor, kinetic energy, offset of every tip along the shaft."""
     row = np.array([*run.angles[-1], run.rates[-1, 0], run.kinetic_energy[-1], *run.tip[-1, :, 1]])
     return row if complete else np.full_like(row, np.nan)
+
+
+def largest_distance(one: Array, other: Array) -> float:
+    """Largest difference of the two empirical distribution functions, of (n,) and (m,) values; NaN where a value is."""
+    from scipy.stats import ks_2samp  # late: it takes a second to load
+
+    return float(ks_2samp(one, other, method="asymp").statistic)
+
+
+def critical_distance(n: int, m: int, significance: float) -> float:
+    """The distance that samples of n and m values from one distribution exceed with that probability.
+
+    Smirnov's limit for large samples, of smaller ones a little too large: N. Smirnov, Ann. Math. Stat. 19 (1948).
+
+    >>> round(critical_distance(100, 100, 0.05), 3)
+    0.192
+    """
+    return math.sqrt(0.5 * math.log(2.0 / significance) * (n + m) / (n * m))
+
+
+def mean_difference(one: Array, other: Array) -> float:
+    """Difference of the means of (n,) and (m,) values, in its standard errors."""
+    error = math.sqrt(float(one.var(ddof=1)) / len(one) + float(other.var(ddof=1)) / len(other))
+    return float(abs(one.mean() - other.mean())) / error if error else 0.0
+
+
+def critical_mean_difference(significance: float) -> float:
+    """In standard errors: what is exceeded with that probability, to either side, by means of many values.
+
+    >>> round(critical_mean_difference(0.05), 2)
+    1.96
+    """
+    return NormalDist().inv_cdf(1.0 - 0.5 * significance)

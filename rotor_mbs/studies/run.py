@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -159,13 +160,17 @@ def solve_judged(
         reference = solve(REFERENCE, scene, {}).trajectory
     own = own_settings(scene, method, {}) | dict(settings or {})
     try:
-        run = solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s)
+        run, _ = _judged(solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s), reference)
     except OutOfTimeError as exc:
-        run = _without_samples(scene, method, str(exc), own)
-        return replace(run, status="timed_out", message=str(exc)), reference
-    judgement = judge(scene, run, reference)
-    message = judgement.message + next_to_try(scene, method, run.settings, judgement.status)
-    return replace(run, status=judgement.status, message=message, metrics=judgement.metrics), reference
+        run = _without_samples(scene, method, own, "timed_out", str(exc))
+    return run, reference
+
+
+def _judged(run: Solution, reference: Trajectory | None) -> tuple[Solution, bool]:
+    """The run with status, message and metrics; and whether its engine claims a success that it is not."""
+    found = judge(run.scene, run, reference)
+    message = found.message + next_to_try(run.scene, run.method, run.settings, found.status)
+    return replace(run, status=found.status, message=message, metrics=found.metrics), found.false_success
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
@@ -213,8 +218,7 @@ def own_settings(scene: Scene, method: str, given: Mapping[str, object]) -> dict
 def perform_run(job: Job) -> Result:
     """Solves, judges and stores one run, in a worker process. Raises StoreError where it cannot be written."""
     case = job.case
-    is_read = case.method == REFERENCE and "frozen" in case.options
-    if is_read:
+    if case.method == REFERENCE and "frozen" in case.options:
         run, attributes = frozen_solution(case.scene, case.scene_hash)
     else:
         attributes = {}
@@ -232,19 +236,8 @@ def perform_run(job: Job) -> Result:
         reference: Trajectory | None = run.trajectory
     else:
         reference = load_reference(job.reference, case.scene) if job.reference is not None else None
-    verdict = judge(case.scene, run, reference)
-    attributes |= {
-        "status": verdict.status,
-        "message": verdict.message + next_to_try(case.scene, case.method, run.settings, verdict.status),
-        "false_success": verdict.false_success,
-        KEY_ATTRIBUTE: case.key,
-        **verdict.metrics,
-    }
-    if verdict.status == "timed_out" and not is_read:
-        attributes[LIMIT] = job.time_limit_s
-    write_run(job.part, case.scene_hash, run, attributes)
-    message, seconds = str(attributes["message"]), 0.0 if is_read else float(np.median(run.run_times_s))
-    return Result(verdict.status, message, seconds, is_read=is_read)
+    run, false_success = _judged(run, reference)
+    return _store(job, run, attributes | {"false_success": false_success})
 
 
 def store_time_out(job: Job, message: str) -> Result:
@@ -255,19 +248,25 @@ def store_time_out(job: Job, message: str) -> Result:
 def store_failure(status: str, job: Job, message: str) -> Result:
     """Stores a run that left no samples."""
     case = job.case
-    run = _without_samples(case.scene, case.method, message, case.settings)
-    attributes = {"status": status, "message": message, "false_success": False, KEY_ATTRIBUTE: case.key}
-    if status == "timed_out":
-        attributes[LIMIT] = job.time_limit_s
-    write_run(job.part, case.scene_hash, run, attributes)
-    return Result(status, message)
+    run = _without_samples(case.scene, case.method, case.settings, status, message)
+    return _store(job, run, {"false_success": False})
 
 
-def _without_samples(scene: Scene, method: str, message: str, settings: Mapping[str, object]) -> Solution:
+def _without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
-    return Solution(scene, method, trajectory, Integration(False, message), chosen)
+    return Solution(scene, method, trajectory, Integration(False, message), chosen, status=status, message=message)
+
+
+def _store(job: Job, run: Solution, attributes: Mapping[str, Any]) -> Result:
+    """Writes a judged run; attributes: further ones. One with `frozen_with` was read, not computed."""
+    is_read = "frozen_with" in attributes
+    facts = {"status": run.status, "message": run.message, KEY_ATTRIBUTE: job.case.key, **run.metrics, **attributes}
+    if run.status == "timed_out" and not is_read:
+        facts[LIMIT] = job.time_limit_s
+    write_run(job.part, job.case.scene_hash, run, facts)
+    return Result(run.status, run.message, 0.0 if is_read else float(np.median(run.run_times_s)), is_read=is_read)
 
 
 def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +28,11 @@ from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.layout import KEYWORDS, SWEEP_IDENTITY
 from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns, row_type
 from rotor_mbs.store.sweep_dataset import open_sweep
-from rotor_mbs.studies.sweep_work import ENSEMBLE_METHOD, Chunk, lost_rows, perform
+from rotor_mbs.studies.sweep_work import Chunk, lost_rows, perform
 
-# Runs handed to a worker at once by the fast path: an eighth of a second of work, fewer towards the end, so that all
-# workers end together. The least fills the lanes of any processor.
-_ENSEMBLE_RUNS = 128
+# Runs handed to a worker at once where the method computes many side by side: by the fastest one an eighth of a second
+# of work, fewer towards the end, so that all workers end together. The least fills the lanes of any processor.
+_MOST_RUNS = 128
 _LEAST_RUNS = 8
 _CHUNK_BYTES = 1 << 23
 
@@ -91,9 +90,9 @@ class SweepPlan:
 
     @staticmethod
     def _chunk_size(method: str, row_bytes: int, share: int) -> int:
-        if method != ENSEMBLE_METHOD:
+        if find_method(method).solve_many is None:
             return 1
-        return max(min(_CHUNK_BYTES // row_bytes, share, _ENSEMBLE_RUNS) // _LEAST_RUNS, 1) * _LEAST_RUNS
+        return max(min(_CHUNK_BYTES // row_bytes, share, _MOST_RUNS) // _LEAST_RUNS, 1) * _LEAST_RUNS
 
     def _by_method(self, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Spans of runs cut where the method changes."""
@@ -172,9 +171,7 @@ def plan_sweep(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time
         words = f"is no setting of {', '.join(chosen)}; allowed: {', '.join(sorted(known)) or 'none'}"
         raise InputError([sweep.problem(("settings", key), f"settings.{key}: {words}") for key in unknown])
     for method in chosen:
-        # The fast path's engine refuses nothing, where it is there: this process need not load it.
-        if method != ENSEMBLE_METHOD or find_spec("heyoka") is None:
-            find_method(method).items(sweep.base)
+        find_method(method).items(sweep.base)
     total = sweep.design.count * len(chosen)
     number, parts = part
     return SweepPlan(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)
@@ -306,7 +303,7 @@ def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
 
 
 def _seconds_per_run(plan: SweepPlan, first: int, pool: TaskPool) -> float:
-    chunk = next(plan.chunks([(first, first + min(plan.rows, _ENSEMBLE_RUNS))]))
+    chunk = next(plan.chunks([(first, first + min(plan.rows, _MOST_RUNS))]))
     try:
         # The first one loads and compiles, which all others find done.
         pool.submit(perform, chunk.part(0, 1), plan.time_limit_s).result()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.base import RunBlock
+from rotor_mbs.methods.base import Method, RunBlock
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
@@ -26,8 +26,7 @@ from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 from rotor_mbs.store.sweep_columns import AMPLIFICATION, MESSAGE_BYTES, METRICS, Rows, RunColumns
 
-ENSEMBLE_METHOD = "lagrange/taylor"
-_SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that `solve_many` computes
+_SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
 
 
 @dataclass(frozen=True)
@@ -80,8 +79,8 @@ def perform(chunk: Chunk) -> Rows | NDArray[np.int8]:
 def rows_of(chunk: Chunk) -> Rows:
     """(runs, ...) columns of all its runs. Raises InputError, MethodRefusal; a run's failure is in its row."""
     scenes = _scenes(chunk)
-    if chunk.method == ENSEMBLE_METHOD and _has_all_of(scenes[0].outputs):
-        rows = _ensemble(chunk, scenes)
+    if find_method(chunk.method).solve_many is not None and _has_all_of(scenes[0].outputs):
+        rows = _side_by_side(chunk, scenes)
     else:
         rows = empty_rows(len(scenes), chunk.row)
         for i, scene in enumerate(scenes):
@@ -177,7 +176,7 @@ def _put_extremes(rows: Rows, runs: slice, angles: Array, rates: Array) -> None:
     rows["pitch_max"][runs] = np.max([largest(angles[:, :, i]) for i in range(1, angles.shape[2])], axis=0)
 
 
-def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
+def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     method = find_method(chunk.method)
     assert method.solve_many is not None
     settings = method.settings.of(chunk.method, chunk.settings)
@@ -187,11 +186,11 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     errors = energy_balance(kinetic, found["potential_energy"], work)
     drifts = energy_drifts(scenes, kinetic, work, errors)
     angles = largest(found["angles"].reshape(len(scenes), -1))
-    ok = clearly_ok(scenes, chunk.method, block.integrations, block.samples, drifts, angles)
+    ok = clearly_ok(scenes, method.name, block.integrations, block.samples, drifts, angles, method.bounds)
     rows = empty_rows(len(scenes), chunk.row, (METRICS | AMPLIFICATION).keys() & set(chunk.row.names or ()))
     for name in chunk.row.names or ():
         if name not in rows:
-            values = errors if name == "energy_error" else _quantity(block, scenes, name)
+            values = errors if name == "energy_error" else _quantity(block, scenes, method, name)
             rows[name] = np.ascontiguousarray(values, chunk.row[name].base)
     rows["status"][ok] = code_of("ok")
     rows["energy_drift_max"] = drifts
@@ -199,17 +198,18 @@ def _ensemble(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for i, integration in enumerate(block.integrations):
         _put_effort(rows, i, integration, integration.time_reached)
     for i in np.flatnonzero(~ok).tolist():
-        run = Solution(scenes[i], chunk.method, block.trajectory(i), block.integrations[i], settings.as_dict())
+        run = Solution(scenes[i], method.name, block.trajectory(i), block.integrations[i], settings.as_dict())
+        run.is_corrected, run.bounds = method.is_corrected, method.bounds
         _put_verdict(rows, i, scenes[i], run)
     return rows
 
 
-def _quantity(block: RunBlock, scenes: Sequence[Scene], name: str) -> Array:
+def _quantity(block: RunBlock, scenes: Sequence[Scene], method: Method, name: str) -> Array:
     """(runs, samples, ...) of a quantity: the block's own, or its producer's of each run; NaN after a run broke off."""
     values: Array | None = block.quantities.get(name)
     if values is None:
         runs = enumerate(scenes)
-        made = [Solution(scene, ENSEMBLE_METHOD, block.trajectory(i), block.integrations[i])[name] for i, scene in runs]
+        made = [Solution(scene, method.name, block.trajectory(i), block.integrations[i])[name] for i, scene in runs]
         values = np.full((len(scenes), scenes[0].samples, *made[0].shape[1:]), np.nan)
         for row, found in zip(values, made, strict=True):
             row[: len(found)] = found

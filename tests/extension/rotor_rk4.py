@@ -11,6 +11,8 @@ from rotor_mbs.methods.settings import number
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 
+NAMES = ("tip", "kinetic_energy", "potential_energy", "work")
+
 
 @dataclass(frozen=True)
 class Rk4Settings(Settings):
@@ -69,6 +71,18 @@ class Solver:
         return Trajectory(self.time, angles, rates, tip=tip, **energies)
 
 
+class Block:
+    """Runs of many scenes, for sweeps."""
+
+    def __init__(self, scenes, settings):
+        solvers = [Solver(scene, settings) for scene in scenes]
+        self.integrations = [solver.integrate() for solver in solvers]
+        self.runs = [solver.observe() for solver in solvers]
+        self.samples = [len(run.time) for run in self.runs]
+        self.quantities = {name: np.stack([run.get(name) for run in self.runs]) for name in (*NAMES, "angles", "rates")}
+        self.trajectory = self.runs.__getitem__
+
+
 def items(scene):
     pitches = all(b.has_pitch_inertia for b in scene.blades)
     if scene.has_damping or scene.has_torque or any(scene.bearing_stiffness) or not pitches:
@@ -78,7 +92,7 @@ def items(scene):
 
 METHOD = Method(
     name="outside/rk4", label="from outside, RK4", look=Look("#882255", "-", "h"), settings=Rk4Settings, build=Solver,
-    items=items, order=4, fixed_step=True, ladders=(step_ladder(6),),
+    items=items, order=4, fixed_step=True, ladders=(step_ladder(6),), solve_many=Block,
     stability_function=stability_polynomial(1.0, 1.0, 1 / 2, 1 / 6, 1 / 24),
     bounds=(Bound("agreement", "outside/rk4", 1e-6, "order 4"), Bound("energy", "outside/rk4", 1e-6, "order 4")),
 )  # fmt: skip

@@ -73,10 +73,10 @@ def test_without_mujoco_it_says_how_to_get_it(tmp_path: Path) -> None:
 def test_without_mujoco_the_other_methods_are_as_before() -> None:
     code = """
 from rotor_mbs.methods.catalogue import default_methods, find_method
-from rotor_mbs.studies.check import default_set, is_available
+from rotor_mbs.studies.check import default_set
 assert not any(name.startswith("mujoco") for names in default_set().methods.values() for name in names)
 assert not any(name.startswith("mujoco") for name in default_methods())
-assert not is_available("mujoco/rk4") and find_method("mujoco/rk4").label == "MuJoCo, RK4"
+assert not find_method("mujoco/rk4").is_installed and find_method("mujoco/rk4").label == "MuJoCo, RK4"
 sys.exit(main(["show", "paper/fig03"]))
 """
     done = without_mujoco(code)

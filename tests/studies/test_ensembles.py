@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from support.references import TAYLOR
 from support.scenes import paper
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies.ensembles import ChannelDistance, compare_ensembles, compare_samples, ensemble
+from rotor_mbs.studies.ensembles import (
+    ChannelDistance,
+    compare_ensembles,
+    compare_samples,
+    critical_distance,
+    critical_mean_difference,
+    ensemble,
+    largest_distance,
+    mean_difference,
+)
 
 TREE = "exudyn_tree/rk67"
 
@@ -62,3 +73,18 @@ def test_tree_and_closed_form_on_every_chaotic_scene(name: str) -> None:
         quantiles = ", ".join(f"{value:.2f}" for value in one.quantiles)
         print(f"{name} {one.channel}: distance {one.distance:.2f}, mean {one.mean:.2f}, quantiles {quantiles}")
     assert largest(found) < 1.0
+
+
+def test_critical_values_are_exceeded_as_often_as_they_say() -> None:
+    """1000 comparisons of equal distributions at 5 %: 50 ± 21, three standard deviations; Smirnov's limit errs low."""
+    random = np.random.default_rng(4)
+    pairs = [(random.normal(size=120), random.normal(size=80)) for _ in range(1000)]
+    distant = sum(largest_distance(*pair) > critical_distance(120, 80, 0.05) for pair in pairs)
+    unlike = sum(mean_difference(*pair) > critical_mean_difference(0.05) for pair in pairs)
+    assert 20 <= distant <= 71
+    assert 29 <= unlike <= 71
+
+
+def test_a_run_that_broke_off_is_no_agreement() -> None:
+    assert math.isnan(largest_distance(np.array([1.0, math.nan]), np.array([1.0, 2.0])))
+    assert mean_difference(np.ones(3), np.ones(4)) == 0.0

@@ -114,7 +114,7 @@ def test_a_scheduler_that_dies_ends_in_one_line(
         _, errors = sweep.communicate(timeout=120)
     assert sweep.returncode == 1, errors
     assert b"Traceback" not in errors
-    assert errors.strip().splitlines()[-1].startswith(b"--engine dask: the scheduler is gone; what is stored is kept")
+    assert errors.strip().splitlines()[-1].startswith(b"engine dask: the scheduler is gone; what is stored is kept")
 
 
 class _WithoutWorkers:
@@ -137,4 +137,4 @@ def test_a_cluster_without_workers_ends_in_one_line() -> None:
     pool = dask_cluster.Cluster(_WithoutWorkers(), patience_s=0.2)
     (end,) = run_in(pool, abs, [-3], 60.0)
     assert isinstance(end.error, StoreError)  # which ends a sweep
-    assert str(end.error) == "--engine dask: no workers for 0.2 s; what is stored is kept"
+    assert str(end.error) == "engine dask: no workers for 0.2 s; what is stored is kept"

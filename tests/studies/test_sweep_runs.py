@@ -299,7 +299,7 @@ def test_a_full_disk_is_one_line_before_the_first_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--engine", "dask:tcp://127.0.0.1:9"], "--engine dask:tcp://127.0.0.1:9: no dask scheduler answers there"),
+        (["--engine", "dask:tcp://127.0.0.1:9"], "engine dask:tcp://127.0.0.1:9: no dask scheduler answers there"),
         (["--engine", "slurm"], "no such engine; allowed: local, or dask:tcp://host:port"),
         (["-m", "lagrange/nothing"], "unknown method"),
     ],
@@ -339,7 +339,7 @@ def test_methods_and_settings_of_the_file_are_told_with_their_line(
 
 def test_a_sweep_too_large_by_mistake_is_asked_for_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sweep", str(_file(tmp_path, draws=600_000)), "-o", str(tmp_path / "o.h5")]) == 2
-    assert "1,200,000 runs; allowed: at most 1,000,000 (with --yes" in capsys.readouterr().err
+    assert "1,200,000 runs; allowed without --yes: at most 1,000,000" in capsys.readouterr().err
     assert not list(tmp_path.glob("o.h5*"))
 
 

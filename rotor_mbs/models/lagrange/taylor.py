@@ -6,6 +6,7 @@ import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -177,6 +178,7 @@ class TaylorSolver:
 
 
 def items(scene: Scene) -> list[BuiltItem]:
-    """Raises MethodRefusal where heyoka is not installed, before anything is built."""
-    heyoka()
+    """Raises MethodRefusal where heyoka is not installed, before anything is built; does not load it."""
+    if find_spec("heyoka") is None:
+        heyoka()  # refuses
     return samples.items(scene)
