@@ -6,7 +6,7 @@ Each is tried by comparing the data so corrected with the reference, or with a r
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from time import monotonic
@@ -101,16 +101,17 @@ class CauseSearch:
     def _carried(self) -> Array:
         return carried_errors(self.exact.trajectory, self.exact.growth, self.exact.units)
 
-    def misfit(self, time: Array, values: Array, expected: Array | None, columns: Sequence[int] | None = None) -> float:
+    def misfit(self, time: Array, values: Array, states: Array | None) -> float:
         """The largest error per unit of growth; infinite with too few rows, or without a motion to compare with."""
-        if expected is None or len(time) < FEWEST:
+        if states is None or len(time) < FEWEST:
             return math.inf
-        return float(np.abs((values - expected) / self.carried(time)[:, columns or self.data.columns]).max())
+        columns = self.data.columns
+        return float(np.abs((values - states[:, columns]) / self.carried(time)[:, columns]).max())
 
     def expected(self, time: Array) -> Array:
-        """(n, channels) The reference at times of the data."""
+        """(n, 2 (1 + blades)) The reference at times of the data."""
         reference = self.exact.trajectory
-        return _states(reference)[np.searchsorted(reference.time, time)][:, self.data.columns]
+        return _states(reference)[np.searchsorted(reference.time, time)]
 
 
 def states_at(scene: Scene, time: Array, equations: Equations | None = None) -> Array | None:
@@ -137,23 +138,26 @@ def causes_in_the_data(search: CauseSearch) -> list[str]:
         return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else []
     inside = search.rows(search.data.time)
     time, values = search.data.time[inside], search.data.values[inside]
-    ways = [_units_and_zeros, _exchanged] if len(time) >= FEWEST else []
-    for way in ways:
-        found = way(search, time, values)
-        if found:
-            return found
-    return _other_time(search) or _lag(search, time, values) or _scatter(search, time, values)
+    found = mistakes_in_columns(search, time, values, search.expected(time))
+    return found or _other_time(search) or _lag(search, time, values) or _scatter(search, time, values)
 
 
-def _units_and_zeros(search: CauseSearch, time: Array, values: Array) -> list[str]:
+def mistakes_in_columns(search: CauseSearch, time: Array, values: Array, states: Array | None) -> list[str]:
+    """What is wrong with the columns of data that are otherwise a motion, of these states; empty where nothing fits."""
+    if states is None or len(time) < FEWEST:
+        return []
+    return _units_and_zeros(search, time, values, states) or _exchanged(search, time, values, states)
+
+
+def _units_and_zeros(search: CauseSearch, time: Array, values: Array, states: Array) -> list[str]:
     """Each channel by itself: unit, sign, zero, turns; the simplest of those that leave least."""
-    expected = search.expected(time)
+    carried = search.carried(time)
     names: dict[str, list[str]] = {}
-    for j, channel in enumerate(search.data.channels):
-        one = [channel.column]
+    for column, channel in zip(values.T, search.data.channels, strict=True):
+        expected = states[:, channel.column]
         left = {
-            text: search.misfit(time, corrected[:, None], expected[:, [j]], one)
-            for text, corrected in _corrections(channel.kind, values[:, j], expected[:, j])
+            text: float(np.abs((corrected - expected) / carried[:, channel.column]).max())
+            for text, corrected in _corrections(channel.kind, column, expected)
         }
         least = max(min(left.values()), 1e-3 * search.tolerance)
         if not least <= search.fitting:
@@ -182,10 +186,11 @@ def factors(search: CauseSearch) -> list[str]:
     """A factor of each channel, where that explains every channel; a parameter of the scene may be it, too."""
     inside = search.rows(search.data.time)
     time, values = search.data.time[inside], search.data.values[inside]
-    expected = search.expected(time)
+    states = search.expected(time)
+    expected = states[:, search.data.columns]
     sizes = (expected**2).sum(axis=0)
     found = np.where(sizes > 0.0, (values * expected).sum(axis=0) / np.where(sizes > 0.0, sizes, 1.0), 1.0)
-    if not found.all() or search.misfit(time, values / found, expected) > search.fitting:
+    if not found.all() or search.misfit(time, values / found, states) > search.fitting:
         return []
     wrong = [
         f"{channel.name} by {factor:.6g}"
@@ -195,10 +200,8 @@ def factors(search: CauseSearch) -> list[str]:
     return [f"too large by a factor: {', '.join(wrong)}"]
 
 
-def _exchanged(search: CauseSearch, time: Array, values: Array) -> list[str]:
+def _exchanged(search: CauseSearch, time: Array, values: Array, states: Array) -> list[str]:
     """Columns that are those of other channels, rates taken as angles among them."""
-    reference = search.exact.trajectory
-    states = _states(reference)[np.searchsorted(reference.time, time)]
     carried = search.carried(time)
     sizes = np.abs(values[:, :, None] - states[:, None, :]) / carried[:, None, :]
     errors = sizes.max(axis=0)  # (channels, 2 (1 + blades))
@@ -222,10 +225,11 @@ def _other_time(search: CauseSearch) -> list[str]:
     for factor, text in factors:
         time = data.time * factor
         inside = search.rows(time)
-        found = search.states(partial(states_at, scene), time[inside])
-        expected = None if found is None else found[:, data.columns]
-        if search.misfit(time[inside], data.values[inside], expected) <= search.fitting:
+        states = search.states(partial(states_at, scene), time[inside])
+        if search.misfit(time[inside], data.values[inside], states) <= search.fitting:
             return [text]
+        if found := mistakes_in_columns(search, time[inside], data.values[inside], states):
+            return ["; and ".join([text, *found])]
     return []
 
 
@@ -242,7 +246,7 @@ def _lag(search: CauseSearch, time: Array, values: Array) -> list[str]:
             found = search.states(partial(states_at, search.scene), moved[inside])
             if found is None:
                 break
-            left = search.misfit(moved[inside], values[inside], found[:, search.data.columns])
+            left = search.misfit(moved[inside], values[inside], found)
             change = _lag_change(search, moved[inside], values[inside], found)
             if left <= search.fitting and abs(change) <= 1e-6 * abs(lag):
                 rows = lag / step
@@ -265,7 +269,7 @@ def _scatter(search: CauseSearch, time: Array, values: Array) -> list[str]:
     """Errors that have nothing in common from row to row, whatever the growth."""
     if len(time) < 4 * FEWEST:
         return []
-    errors = values - search.expected(time)
+    errors = values - search.expected(time)[:, search.data.columns]
     wrong = np.abs(errors / search.carried(time)[:, search.data.columns]).max(axis=0) > search.tolerance
     centred = errors[:, wrong] - errors[:, wrong].mean(axis=0)
     sizes = (centred**2).mean(axis=0)

@@ -22,7 +22,15 @@ from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.solution.metrics import HORIZON_GROWTH
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.studies.data_causes import FEWEST, CauseSearch, Motion, causes_in_the_data, factors, states_at
+from rotor_mbs.studies.data_causes import (
+    FEWEST,
+    CauseSearch,
+    Motion,
+    causes_in_the_data,
+    factors,
+    mistakes_in_columns,
+    states_at,
+)
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
 _EARLY = 10.0  # growth up to which a cause is tried first: most are refuted there
@@ -46,6 +54,7 @@ def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
     """
     motions, parameters = list(_motions(search)), list(_parameters(search.scene))
     found: list[str] = []
+    both: list[str] = []
     fitted: list[tuple[float, str]] = []
     tried = 0
     try:
@@ -53,9 +62,11 @@ def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
         if found or search.worst <= search.tolerance:
             return found, ""
         for text, motion in motions:
-            found += [text] * _fits(search, motion)
+            beside = _fits(search, motion)
+            if beside is not None:
+                (both if beside else found).append("; and ".join([text, *beside]))
             tried += 1
-        for key, unit, changed in [] if found else parameters:
+        for key, unit, changed in [] if found or both else parameters:
             change, left = _fitted(search, changed)
             if left <= search.fitting:
                 size = f"{change:+.4g} {unit}" if unit else f"{100.0 * change:+.4g} %"
@@ -64,7 +75,7 @@ def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
     except OutOfTimeError:
         count = len(motions) + len(parameters)
         return found, f"the search for causes was ended by its time limit: {tried} of {count} scenes tried"
-    return found or [*_best(fitted, search.tolerance), *factors(search)], ""
+    return found or both or [*_best(fitted, search.tolerance), *factors(search)], ""
 
 
 def _best(fitted: Sequence[tuple[float, str]], tolerance: float) -> list[str]:
@@ -73,18 +84,23 @@ def _best(fitted: Sequence[tuple[float, str]], tolerance: float) -> list[str]:
     return [text for left, text in fitted if left <= 10.0 * least][:_MOST]
 
 
-def _fits(search: CauseSearch, motion: Motion) -> bool:
-    """First over the first rows, up to a growth of `_EARLY`, then up to the horizon."""
-    data = search.data
+def _fits(search: CauseSearch, motion: Motion) -> list[str] | None:
+    """First over the first rows, up to a growth of `_EARLY`, then up to the horizon.
+
+    None where it does not fit; else what is wrong with the columns beside, which is nothing where it fits as it is.
+    """
+    data, beside = search.data, list[str]()
     for growth, most in ((_EARLY, _EARLY_ROWS), (math.inf, 10**9)):
         inside = np.flatnonzero(search.rows(data.time, growth))[:most]
         if growth == _EARLY and len(inside) < FEWEST:
             continue
-        states = search.states(motion, data.time[inside])
-        expected = None if states is None else states[:, data.columns]
-        if not search.misfit(data.time[inside], data.values[inside], expected) <= search.fitting:
-            return False
-    return True
+        time, values = data.time[inside], data.values[inside]
+        states, beside = search.states(motion, time), []
+        if not search.misfit(time, values, states) <= search.fitting:
+            beside = mistakes_in_columns(search, time, values, states)
+            if not beside:
+                return None
+    return beside
 
 
 def _motions(search: CauseSearch) -> Iterator[tuple[str, Motion]]:

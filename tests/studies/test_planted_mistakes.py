@@ -181,6 +181,23 @@ PLANTS = {
     "noise": Plant("scatter from row to row, standard deviation 1", spoilt=noise(1e-4)),
     "truncated": Plant("the data end at t = 1.49 s of 2 s", spoilt=lambda t, q, w: (t[:150], q[:150], w[:150])),
     "another scene": Plant("the scene paper/fig09", changed=lambda _: short("paper/fig09")),
+    "gravity, and another zero": Plant(
+        "gravity of 9.81 m/s^2; and rotor: zero off by 1.5708", changed=with_gravity(9.81),
+        spoilt=lambda t, q, w: (t, q + QUARTER, w),
+    ),
+    "gravity, and blade order": Plant(
+        "gravity of 9.81 m/s^2; and columns exchanged: pitch 1 is pitch 3", changed=with_gravity(9.81),
+        spoilt=columns(0, 3, 1, 2),
+    ),
+    "E1, and sign of pitch": Plant(
+        "erratum E1 of the paper's equations; and pitch 1, pitch 2, pitch 3, pitch 1 rate", mistakes=Mistakes(e1=True),
+        spoilt=lambda t, q, w: (t, q * [1, -1, -1, -1], w * [1, -1, -1, -1]),
+    ),
+    "time in ms, and degrees": Plant(
+        "time in ms taken as s; and rotor, pitch 1, pitch 2, pitch 3: degrees taken as rad",
+        spoilt=lambda t, q, w: (1e3 * t, np.degrees(q), np.degrees(w)),
+    ),
+    "E1 and E3": Plant("erratum E1 of", mistakes=Mistakes(e1=True, e3=True)),
     "swapped columns": Plant("columns exchanged: rotor is pitch 1, pitch 1 is rotor", spoilt=columns(1, 0, 2, 3)),
 }  # fmt: skip
 REFUSED = {
@@ -194,7 +211,7 @@ REFUSED = {
 SLOW = {
     "degrees of pitch alone", "no gravity", "mass 1 % off, springs", "missing Coriolis, full inertia", "as printed",
     "numbers of rows", "half a sample late", "a factor", "E2", "no phases", "phases in degrees", "blade 1 down",
-    "blade 2 a little off", "pitch from flat",
+    "blade 2 a little off", "pitch from flat", "gravity, and blade order", "E1, and sign of pitch", "E1 and E3",
 }  # fmt: skip
 
 
