@@ -186,6 +186,16 @@ def test_a_picture_has_every_point_label_and_colour_of_its_axes() -> None:
     assert marks.count("M") == len(wanted)
 
 
+def test_a_gap_in_a_curve_is_a_gap_in_its_picture() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 1.0, np.nan, 1.0, 0.5], color=COLOURS[2])
+    text = svg.drawing(picture, "n", "t", "d")
+    curve = re.search(rf'class="{class_of(COLOURS[2])}"[^>]* d="([^"]*)"', text)
+    assert curve is not None
+    assert curve[1].count("M") == 2
+    assert "nan" not in text
+
+
 def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
     picture = panels((2.0,), "time (s)")
     picture.axes[0].plot([0.0, 1.0], [0.0, 3e-4])
