@@ -166,11 +166,13 @@ def _is_vertical(line: Line2D) -> bool:
     return bool(x[0] == x[1] and y[0] != y[1] and x[0] < 0.0)
 
 
-def test_a_picture_has_every_point_label_and_colour_of_its_axes() -> None:
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_a_picture_has_every_point_label_and_colour_of_its_axes(scale: str) -> None:
     picture = panels((2.0,), "time (s)")
     axes = picture.axes[0]
+    axes.set_yscale(scale)
     axes.plot([0.0, 0.5, 1.0, 1.0, 2.0], [0.1234567, 0.5, 0.25, 0.75, 0.123], color=COLOURS[2], marker="s")
-    axes.set_yticks([0.125, 0.625])
+    canvas.ticks(axes.yaxis, {0.125: "0.125", 0.625: "0.625"})
     axes.set_ylabel("angle (rad)")
     text = svg.drawing(picture, "n", "title <b>", "described & so")
     for shown in (">0.125<", ">0.625<", ">time (s)<", ">angle (rad)<", "title &lt;b&gt;", "described &amp; so"):
