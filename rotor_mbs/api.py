@@ -215,6 +215,8 @@ def compare(
 ) -> Comparison:
     """One scene by several methods, each judged against the scene's reference (shipped, or computed).
 
+    On the command line that is `rotor-mbs run SCENE -m METHOD -m METHOD`. `rotor-mbs compare` is `compare_data`.
+
     Parameters
     ----------
     methods : names; where none is given, those that the selection rule takes for such a scene.

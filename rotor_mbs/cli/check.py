@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from rotor_mbs.analysis.verdict_changes import regressions
-from rotor_mbs.analysis.verdicts import Verdict
+from rotor_mbs.analysis.verdicts import Verdict, regressions
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import check_names

@@ -32,14 +32,16 @@ def bench(arguments: argparse.Namespace) -> int:
     print_doubts(scenes)
     limits = {"repeats": arguments.repeats, "budget_s": arguments.budget}
     with ProgressLine() as progress:
-        report = run_bench(scenes, methods, output, workers=cores(), settings=settings, on_progress=progress, **limits)
-        made = [*report.made]
+        made, left_out = run_bench(
+            scenes, methods, output, workers=cores(), settings=settings, on_progress=progress, **limits
+        )
+        measured = len({one.case.scene.name for one in made})
         if arguments.growth:
             made += run_cost_scaling(methods, output, on_progress=progress, **limits)
-    _print_lines(report.left_out)
+    _print_lines(left_out)
     names = {scene.name for scene in scenes}
     print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
-    print(f"{output}: {report.measured} scenes measured, {report.kept} there already")
+    print(f"{output}: {measured} scenes measured, {len(scenes) - measured} there already")
     _write_pages(output)
     return int(print_not_computed(made))
 

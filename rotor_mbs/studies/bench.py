@@ -44,25 +44,6 @@ _RUN_LIMIT_S = 10.0
 _ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
 
 
-@dataclass(frozen=True)
-class BenchReport:
-    """scenes: how many; made: curves measured by this call; left_out: why a method is left out on a scene."""
-
-    scenes: int
-    made: list[Outcome]
-    left_out: list[str]
-
-    @property
-    def measured(self) -> int:
-        """Scenes of which this call measured a curve."""
-        return len({one.case.scene.name for one in self.made})
-
-    @property
-    def kept(self) -> int:
-        """Scenes of which all curves were stored already."""
-        return self.scenes - self.measured
-
-
 def run_bench(
     scenes: Sequence[Scene],
     methods: Sequence[str],
@@ -73,8 +54,10 @@ def run_bench(
     workers: int,
     settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
-) -> BenchReport:
+) -> tuple[list[Outcome], list[str]]:
     """The curves of every scene into the results file `output`; what it has already is kept.
+
+    Returns the curves measured by this call, and a line for each method that is left out on a scene.
 
     methods     whose ladders are measured; all where none is named
     repeats     timed runs of each point at most
@@ -94,8 +77,7 @@ def run_bench(
         able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
         cases += [_bench_case(scene, ladder, repeats, budget_s) for ladder in chosen if ladder.method in able]
         left_out += refused
-    made = execute(cases, _time_by_scene, ResultsStore(output), on_progress)
-    return BenchReport(len(scenes), made, left_out)
+    return execute(cases, _time_by_scene, ResultsStore(output), on_progress), left_out
 
 
 def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> list[Ladder]:
@@ -127,11 +109,6 @@ def _bench_case(scene: Scene, ladder: Ladder, repeats: int, budget_s: float) -> 
     return Case(scene, ladder.method, ladder.choices, BENCH, options, reference_case(scene).key, SOURCES)
 
 
-def _time_by_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
-    for name in dict.fromkeys(job.case.scene.name for job in jobs):
-        yield from _measure_scene([job for job in jobs if job.case.scene.name == name])
-
-
 def store_curve(job: Job, record: Record) -> Result:
     """Writes the part of a curve; its points are counted in the message."""
     write_records(job.part, [record])
@@ -140,8 +117,16 @@ def store_curve(job: Job, record: Record) -> Result:
     return Result("ok", counts)
 
 
+def _time_by_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
+    """Times, judges and collects every point of the curves of one scene, then of the next."""
+    by_scene: dict[str, list[Job]] = {}
+    for job in jobs:
+        by_scene.setdefault(job.case.scene.name, []).append(job)
+    for own in by_scene.values():
+        yield from _measure_scene(own)
+
+
 def _measure_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
-    """Times, judges and collects every point of the curves of one scene."""
     load_before = os.getloadavg()[0]
     case, results = jobs[0].case, jobs[0].reference
     assert results is not None  # every bench case has a reference

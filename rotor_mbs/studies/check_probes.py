@@ -25,7 +25,7 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 from rotor_mbs.studies.check_printed import differences
 from rotor_mbs.studies.check_status_rules import SCENE, known_runs, metrics_off, shares_off
 from rotor_mbs.studies.ensembles import compare_ensembles
-from rotor_mbs.studies.stored_references import load_frozen
+from rotor_mbs.studies.stored_references import frozen_solution
 
 # Scenes of probes that need none of the shipped ones.
 _OWN_SCENES = ("random states", "made by hand")
@@ -91,6 +91,10 @@ def _scene(case: Case, duration: float) -> Scene:
     return replace(case.scene, duration=duration, samples=1 + round(100 * duration), outputs=("angles", "rates"))
 
 
+def _frozen(case: Case) -> Trajectory:
+    return frozen_solution(case.scene, case.scene_hash)[0].trajectory
+
+
 def _run(case: Case, scene: Scene, **settings: object) -> Trajectory | None:
     run = solve(case.method, scene, settings)
     return run.trajectory if len(run.trajectory.time) == scene.samples else None
@@ -103,7 +107,7 @@ def _symmetry(case: Case) -> list[Verdict]:
     """
     scene = _scene(case, 2.0)
     base, count = _run(case, scene), 1 + len(scene.blades)
-    growth = running_growth(load_frozen(case.scene.name))[: scene.samples]
+    growth = running_growth(_frozen(case))[: scene.samples]
     found = []
     for name, variant, columns, sign in (
         ("blades permuted", relabelled(scene), [*range(2, count), 1], 1.0),
@@ -122,7 +126,7 @@ def _symmetry(case: Case) -> list[Verdict]:
 def _order(case: Case) -> list[Verdict]:
     """The slope of log error over log step, against the reference, over 0.5 s."""
     scene = _scene(case, 0.5)
-    exact = load_frozen(case.scene.name).angles[: scene.samples]
+    exact = _frozen(case).angles[: scene.samples]
     expected = float(str(case.options["expected"]))
     errors = []
     for step in _ORDER_STEPS:
@@ -138,7 +142,7 @@ def _extrapolated(case: Case) -> list[Verdict]:
 
     Over the whole run where its pitches that are zero stay so, up to the horizon else: there any rounding has grown.
     """
-    frozen = load_frozen(case.scene.name)
+    frozen = _frozen(case)
     moves = frozen.angles[:, 1:].any(axis=0).all()
     count = horizon_samples(frozen) if moves else len(frozen.time)
     scene = replace(_scene(case, float(frozen.time[count - 1])), samples=count)
@@ -169,7 +173,7 @@ def _ensemble(case: Case) -> Iterator[Verdict]:
 def _reference(case: Case) -> list[Verdict]:
     """Computed now against frozen; a fallback reference is compared within its own uncertainty."""
     scene = case.scene
-    frozen = load_frozen(case.scene.name)
+    frozen = _frozen(case)
     found = solve(REFERENCE, scene, {}).trajectory
     look = "the closed form, its coefficients, or a touched file under reference/"
     if len(found.time) != scene.samples or found.angle_uncertainty is None or found.error_growth is None:

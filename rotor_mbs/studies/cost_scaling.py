@@ -99,24 +99,20 @@ def run_cost_scaling(
 
 def _time_by_study(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
     for study in cost_studies():
-        own = [job for job in jobs if job.case.options["kind"] == study.kind]
-        if own:
-            yield from _measure(study, own)
-
-
-def _measure(study: CostStudy, jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
-    points = [
-        [
-            Point(job.case.method, job.case.method, i, size, tuple(sorted(job.case.settings.items())))
-            for i, size in enumerate(study.scenes)
-        ]
-        for job in jobs
-    ]
-    scenes = {point: (study.scenes[point.setting], None) for curve in points for point in curve}
-    measured = measure_points(scenes, points, jobs[0].case.options)
-    started = time.strftime("%Y-%m-%dT%H:%M:%S")
-    for job, own in zip(jobs, points, strict=True):
-        yield measured.finished(job, own, partial(_curve, study, job.case, started))
+        points = {
+            job: [
+                Point(job.case.method, job.case.method, i, size, tuple(sorted(job.case.settings.items())))
+                for i, size in enumerate(study.scenes)
+            ]
+            for job in jobs
+            if job.case.options["kind"] == study.kind
+        }
+        scenes = {point: (study.scenes[point.setting], None) for curve in points.values() for point in curve}
+        if points:
+            measured = measure_points(scenes, list(points.values()), jobs[0].case.options)
+            started = time.strftime("%Y-%m-%dT%H:%M:%S")
+            for job, own in points.items():
+                yield measured.finished(job, own, partial(_curve, study, job.case, started))
 
 
 def _curve(study: CostStudy, case: Case, started: str, rows: Sequence[Mapping[str, Any]]) -> Record:

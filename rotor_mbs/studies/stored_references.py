@@ -54,17 +54,6 @@ def load_reference(path: Path, scene: Scene) -> Trajectory | None:
         return rebuilt_reference(scene, stored)
 
 
-def load_frozen(name: str) -> Trajectory:
-    """Angles, rates, error growth and uncertainty of a scene's shipped reference. Raises StoreError without one."""
-    for path in shipped_files():
-        with open_results(path) as results:
-            stored = results.scenes[name].reference if name in results.scenes else None
-            if stored is not None:
-                names = ("time", "angles", "rates", "error_growth", "angle_uncertainty")
-                return Trajectory(**{name: stored.array(name) for name in names})
-    raise StoreError(f"{reference_folder()}: no frozen reference of {name}; `rotor-mbs reference` makes one")
-
-
 def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
     """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form."""
     from rotor_mbs.models.lagrange import samples
@@ -75,16 +64,19 @@ def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
     if "work" in stored:
         result.work = stored.array("work")
     result.angle_uncertainty = stored.array("angle_uncertainty")
-    result.error_growth = stored.array("error_growth") if "error_growth" in stored else None
+    result.error_growth = stored.get("error_growth")
     result.quantities |= {load.name: stored.array(load.name) for load in LOADS if load.name in stored}
     return result
 
 
 def frozen_solution(scene: Scene, scene_hash: str) -> tuple[Solution, dict[str, Any]]:
-    """The shipped reference of a scene, with the settings and times of when it was computed; and who computed it."""
+    """The shipped reference of a scene, with the settings and times of when it was computed; and who computed it.
+
+    Raises StoreError where none is shipped.
+    """
     path = frozen_file(scene_hash)
     if path is None:
-        raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}")
+        raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}; `rotor-mbs reference` makes one")
     with open_results(path) as results:
         stored = next(s for s in results.scenes.values() if s.attributes["scene_hash"] == scene_hash).reference
         assert stored is not None  # a file of references has one for each scene

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +89,7 @@ def statistics(stored: StoredSweep) -> dict[str, Any]:
         values = stored.column(name)
         if column.dimensions[0] == "run" and values.dtype.kind == "f":
             axes = tuple(i for i, one in enumerate(column.dimensions) if one in ("run", "time"))
-            numbers = _moments(_chosen(values, chosen), axes)
+            numbers = _moments(partial(_chosen, values, chosen), axes)
             found[name] = {"unit": column.units, "dimensions": list(column.dimensions), **numbers}
     return {"runs": int(chosen.sum()), "split": "train", "variables": found}
 
@@ -102,38 +102,21 @@ def _chosen(values: NDArray[Any], chosen: NDArray[np.bool_]) -> Iterator[NDArray
         yield np.asarray(values[piece][chosen[piece]], dtype=np.float64)
 
 
-@dataclass
-class _Moments:
-    """Running count, mean and sum of squared deviations, joined piece by piece as Chan, Golub and LeVeque (1983)."""
-
-    count: Any = 0.0
-    mean: Any = 0.0
-    squares: Any = 0.0
-    least: Any = field(default=np.inf)
-    largest: Any = field(default=-np.inf)
-
-    def add(self, values: NDArray[np.float64], axes: tuple[int, ...]) -> None:
+def _moments(pieces: Callable[[], Iterator[NDArray[np.float64]]], axes: tuple[int, ...]) -> dict[str, Any]:
+    """Over these axes, NaN left out; in two passes over the pieces, as a file need not fit into memory."""
+    count, total, squares, least, largest = (np.float64(start) for start in (0.0, 0.0, 0.0, np.inf, -np.inf))
+    for values in pieces():
         finite = np.isfinite(values)
-        count = finite.sum(axis=axes)
-        some = np.maximum(count, 1)
-        mean = np.where(finite, values, 0.0).sum(axis=axes) / some
-        squares = np.where(finite, values - np.expand_dims(mean, axes), 0.0)
-        total = self.count + count
-        step = mean - self.mean
-        self.squares = self.squares + (squares**2).sum(axis=axes) + step**2 * self.count * count / np.maximum(total, 1)
-        self.mean = self.mean + step * count / np.maximum(total, 1)
-        self.least = np.minimum(self.least, np.where(finite, values, np.inf).min(axis=axes, initial=np.inf))
-        self.largest = np.maximum(self.largest, np.where(finite, values, -np.inf).max(axis=axes, initial=-np.inf))
-        self.count = total
-
-
-def _moments(pieces: Iterable[NDArray[np.float64]], axes: tuple[int, ...]) -> dict[str, Any]:
-    found = _Moments()
-    for piece in pieces:
-        found.add(piece, axes)
-    deviation = np.sqrt(found.squares / np.maximum(found.count, 1))
-    numbers = {"mean": found.mean, "std": deviation, "min": found.least, "max": found.largest}
-    return {name: _plain(np.where(found.count > 0, values, np.nan)) for name, values in numbers.items()}
+        count = count + finite.sum(axis=axes)
+        total = total + np.where(finite, values, 0.0).sum(axis=axes)
+        least = np.minimum(least, np.where(finite, values, np.inf).min(axis=axes, initial=np.inf))
+        largest = np.maximum(largest, np.where(finite, values, -np.inf).max(axis=axes, initial=-np.inf))
+    mean = total / np.maximum(count, 1)
+    for values in pieces():
+        away = np.where(np.isfinite(values), values - np.expand_dims(mean, axes), 0.0)
+        squares = squares + (away**2).sum(axis=axes)
+    numbers = {"mean": mean, "std": np.sqrt(squares / np.maximum(count, 1)), "min": least, "max": largest}
+    return {name: _plain(np.where(count > 0, values, np.nan)) for name, values in numbers.items()}
 
 
 def _plain(values: NDArray[np.float64]) -> Any:

@@ -11,8 +11,7 @@ from rotor_mbs.analysis.claim_records import ClaimStudy, stored_claims
 from rotor_mbs.analysis.number_trials import NumberTrial
 from rotor_mbs.analysis.published import published
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.claims import SPREAD, claim_shares, moved_starts
-from rotor_mbs.studies.number_trials import number_trials
+from rotor_mbs.studies.claims import SPREAD, claim_shares, moved_starts, number_trials
 
 ITEMS = {item.id: item for item in published()}
 

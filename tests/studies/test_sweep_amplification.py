@@ -10,8 +10,9 @@ import pytest
 
 from rotor_mbs.cli import main
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.solution.metrics import horizon
-from rotor_mbs.studies.stored_references import load_frozen
+from rotor_mbs.studies.stored_references import frozen_solution
 
 SWEEP = """
 title = "fig11 and a neighbour"
@@ -35,7 +36,8 @@ def _sweep(folder: Path, asked: str) -> Path:
 
 def test_it_is_that_of_the_frozen_reference(tmp_path: Path) -> None:
     """Both from double precision variational equations, whose own rounding is far below a thousandth."""
-    frozen = load_frozen("paper/fig11")
+    (scene,) = find_scenes(["paper/fig11"])
+    frozen = frozen_solution(scene, scene_hash(scene))[0].trajectory
     with h5py.File(_sweep(tmp_path, "true")) as file:
         growth, until = file["error_growth"][()], file["horizon_s"][()]
         assert file["horizon_s"].attrs["units"] == "s"
