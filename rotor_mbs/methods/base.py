@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from importlib.util import find_spec
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rotor_mbs.methods.ladders import STEP, Ladder, Look
@@ -18,7 +19,7 @@ if TYPE_CHECKING:  # reading the catalogue needs none of them
     from rotor_mbs.solution.linearization import Linearization
     from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
-__all__ = ["BuiltItem", "Look", "Method", "RunBlock", "Settings", "Solver", "stability_polynomial"]
+__all__ = ["BuiltItem", "Look", "Method", "RunBlock", "Settings", "Solver", "late", "stability_polynomial"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +165,11 @@ def _is_installed(distribution: str) -> bool:
         return find_spec(module) is not None or metadata.distribution(distribution) is not None
     except metadata.PackageNotFoundError:
         return False
+
+
+def late(place: str) -> Callable[..., Any]:
+    """The function at "package.module:name", whose module is imported when it is first called."""
+    return lambda *arguments: resolve_name(place)(*arguments)
 
 
 def stability_polynomial(*coefficients: float) -> Callable[[complex], complex]:

@@ -6,8 +6,6 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
@@ -24,12 +22,6 @@ class Linearization:
     stiffness: Array
     damping: Array
     residual: Array
-
-    @property
-    def state_matrix(self) -> Array:
-        """(2n, 2n): d/dt of (δq, δq̇)."""
-        n = len(self.stiffness)
-        return np.block([[np.zeros((n, n)), np.eye(n)], [-self.stiffness, -self.damping]])
 
 
 def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:

@@ -145,7 +145,9 @@ def test_without_gravity_the_multipliers_are_those_of_the_eigenvalues():
     turn = periodic_turn(scene, 2.0)
     found = floquet(turn.transition, turn.flow, turn.gradient, 2.0).multipliers
     angles = [0.3, *turn.start[1:4]]
-    values = np.linalg.eigvals(linearize(scene, angles, [2.0, 0, 0, 0], turn.torque).state_matrix)
+    linear = linearize(scene, angles, [2.0, 0, 0, 0], turn.torque)
+    n = len(linear.stiffness)
+    values = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-linear.stiffness, -linear.damping]]))
     expected = np.exp(values * math.pi)
     for multiplier in expected:
         assert np.abs(found - multiplier).min() < 1e-7

@@ -125,7 +125,7 @@ def test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies(scene, spee
     ours, angles, at = linear(scene, speed), state(scene, speed), without_gravity(scene, speed)
     others = [engine.linearize_tree(at, angles, speed, closed.holding_torque(scene, speed))]
     if not speed:
-        others.append(engine.linearize_chain(at, angles))
+        others.append(engine.linearize_chain(at, angles, 0.0, 0.0))
     third = find_method("mujoco/rk4")
     if third.is_installed:
         others.append(third.linearize(at, angles, speed, closed.holding_torque(scene, speed)))
@@ -142,7 +142,7 @@ def test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies(scene, spee
 def test_joint_forces_stiffen_the_chain(monkeypatch):
     """Without the geometric stiffness the same comparison fails, by percents."""
     monkeypatch.setattr(engine, "_geometric_stiffness", lambda _system, _forces, N, _step: np.zeros_like(N))
-    found = frequencies(engine.linearize_chain(DAMPED, state(DAMPED, 0.0)), DAMPED, 0.0)
+    found = frequencies(engine.linearize_chain(DAMPED, state(DAMPED, 0.0), 0.0, 0.0), DAMPED, 0.0)
     assert np.abs(found[1:] / frequencies(linear(DAMPED, 0.0), DAMPED, 0.0)[1:] - 1.0).max() > 0.01
 
 

@@ -37,13 +37,15 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
     return Linearization(inverse @ found.K, inverse @ found.D, inverse @ system.forces())
 
 
-def linearize_chain(scene: Scene, angles: Sequence[float] | Array) -> Linearization:
+def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
     """The chain of bodies and joints at rest at `angles` (1 + blades,) rad, in the rotor's and the pitch angles.
 
     With N a basis of what the joints allow and λ the joint forces at rest, its stiffness is Nᵀ (K + ∂(C λ)/∂q) N.
 
     Raises MethodRefusal where the engine does not take the scene, or the state is not at rest.
     """
+    if speed or torque:
+        raise MethodRefusal("exudyn_chain: linearized at rest alone")
     state = scene_at(scene, angles, 0.0, 0.0)
     system = System(chain.parts(state, Loads(state), "euler_parameters"))
     found = _extrapolated(system.linearized)

@@ -7,12 +7,11 @@ Forces in N and moments in N m act on the blade at its root (hub on blade) and o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
-from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, blade_body, fixed_blade_rotation, mounting, pitching
+from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, fixed_blade_rotation, mounting, pitching
 from rotor_mbs.models.exudyn.moments import ROTOR, is_driven
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, values_before
@@ -22,50 +21,33 @@ from rotor_mbs.solution.trajectory import Array
 Sampled = Callable[[str], Array]
 
 
-@dataclass(frozen=True)
-class BladeOnBody:
-    """A blade in the engine's body that it is, or that it is part of.
-
-    index     of the blade, from 0
-    rotation  (3, 3) blade's frame to the engine's body
-    """
-
-    index: int
-    body: Body
-    rotation: Array
-
-    def name(self, what: str) -> str:
-        """Name of the sensor that keeps `what` of it."""
-        return f"blade {self.index + 1} {what}"
+def _rotation(scene: Scene, i: int) -> Array:
+    """(3, 3) from the frame of blade i to the engine's body that it is, or, where it cannot pitch, is part of."""
+    return np.eye(3) if i in pitching(scene) else fixed_blade_rotation(scene, i)
 
 
-def blade_on_body(scene: Scene, index: int) -> BladeOnBody:
-    """The blade as its own body, or as part of the hub where it cannot pitch."""
-    rotation = np.eye(3) if index in pitching(scene) else fixed_blade_rotation(scene, index)
-    return BladeOnBody(index, blade_body(scene.blades[index]), rotation)
-
-
-def motion_quantities(blade: BladeOnBody) -> dict[str, str]:
-    """What Newton's and Euler's laws need of a blade: the engine's names of outputs by those of sensors."""
+def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
+    """What Newton's and Euler's laws need of blade i: the engine's names of outputs by those of sensors."""
     outputs = {"root acceleration": "Acceleration", "root rotation": "RotationMatrix"}
-    if np.any(blade.body.inertia):
+    if not scene.blades[i].is_point_mass:
         outputs |= {"root spin": "AngularVelocityLocal", "root spin rate": "AngularAccelerationLocal"}
-    return {blade.name(what): output for what, output in outputs.items()}
+    return {f"blade {i + 1} {what}": output for what, output in outputs.items()}
 
 
-def newton_euler(scene: Scene, blade: BladeOnBody, sampled: Sampled) -> tuple[Array, Array, Array]:
-    """(n, 3) force, (n, 3) moment about the root in the blade's frame; (n, 3, 3) blade's frame to base frame.
+def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array, Array]:
+    """(n, 3) force, (n, 3) moment about the root in the frame of blade i; (n, 3, 3) that frame to the base frame.
 
     F = m (a + g e_z),  M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it.
     """
-    body, turned = blade.body, blade.rotation
-    frames = _matrices(sampled(blade.name("root rotation"))) @ turned
-    lifted = sampled(blade.name("root acceleration")) + np.array([0.0, 0.0, scene.gravity])
-    force = body.mass * _in_frames(frames, lifted)
-    moment = np.cross(body.com, force)
-    if np.any(body.inertia):
-        omega, alpha = (sampled(blade.name(what)) @ turned for what in ("root spin", "root spin rate"))
-        moment += alpha @ body.inertia + np.cross(omega, omega @ body.inertia)
+    blade, turned, name = scene.blades[i], _rotation(scene, i), f"blade {i + 1} root"
+    frames = _matrices(sampled(f"{name} rotation")) @ turned
+    lifted = sampled(f"{name} acceleration") + np.array([0.0, 0.0, scene.gravity])
+    force = blade.mass * _in_frames(frames, lifted)
+    moment = np.cross(blade.centre_of_mass, force)
+    if not blade.is_point_mass:
+        inertia = blade.inertia_tensor
+        omega, alpha = (sampled(f"{name} {what}") @ turned for what in ("spin", "spin rate"))
+        moment += alpha @ inertia + np.cross(omega, omega @ inertia)
     return force, moment, frames
 
 
@@ -74,7 +56,7 @@ def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: 
 
     The moment of a pitch actuator is what they leave about the pitch axis.
     """
-    blades = [newton_euler(scene, blade_on_body(scene, i), sampled) for i in range(len(scene.blades))]
+    blades = [_newton_euler(scene, i, sampled) for i in range(len(scene.blades))]
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
     shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
     assert isinstance(shaft_moment, np.ndarray)
@@ -98,9 +80,8 @@ def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) 
     links = pitching(scene)
     found = []
     for i in range(len(scene.blades)):
-        blade, link = blade_on_body(scene, i), 1 + links.index(i) if i in links else 0
-        point = blade.rotation @ blade.body.com
-        found += [on_link(name, output, link, point) for name, output in motion_quantities(blade).items()]
+        link, point = 1 + links.index(i) if i in links else 0, _rotation(scene, i) @ scene.blades[i].centre_of_mass
+        found += [on_link(name, output, link, point) for name, output in _motion_outputs(scene, i).items()]
     if scene.hub_inertia:
         found.append(on_link("hub spin rate", "AngularAccelerationLocal", 0, np.zeros(3)))
     return found
@@ -113,10 +94,9 @@ def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
         if i in pitching(scene):
             found += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else "")
             continue
-        blade = blade_on_body(scene, i)
-        point, body = list(blade.rotation @ blade.body.com - hub.com), Ref("object", "hub")
-        for name, output in motion_quantities(blade).items():
-            found.append(sensor(name, "SensorBody", output, bodyNumber=body, localPosition=point))
+        point = list(_rotation(scene, i) @ scene.blades[i].centre_of_mass - hub.com)
+        for name, output in _motion_outputs(scene, i).items():
+            found.append(sensor(name, "SensorBody", output, bodyNumber=Ref("object", "hub"), localPosition=point))
     return found
 
 
@@ -136,7 +116,7 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
     for i in range(len(scene.blades)):
         if i not in pitching(scene):
-            roots.append(newton_euler(scene, blade_on_body(scene, i), sampled)[:2])
+            roots.append(_newton_euler(scene, i, sampled)[:2])
             continue
         frames = _matrices(sampled(f"blade {i + 1} rotation"))
         force, moment = _joint_reaction(f"pitch bearing {i + 1}", hub @ mounting(i, len(scene.blades)), frames, sampled)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, stability_polynomial
+from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
@@ -23,12 +23,12 @@ from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, Extrapolated
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, intervals
-from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8
 _MOST_STEPS = 1e9
+_LINEARIZATION = "rotor_mbs.models.exudyn.linearization"
 
 Reading = Callable[[Scene, Sequence[Segment], Callable[[str], Array]], Trajectory]
 
@@ -109,20 +109,6 @@ def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettin
     return build()
 
 
-def _linearize_tree(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
-    from rotor_mbs.models.exudyn.linearization import linearize_tree
-
-    return linearize_tree(scene, angles, speed, torque)
-
-
-def _linearize_chain(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
-    from rotor_mbs.models.exudyn.linearization import linearize_chain
-
-    if speed or torque:
-        raise MethodRefusal("exudyn_chain: linearized at rest alone")
-    return linearize_chain(scene, angles)
-
-
 def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
     """Raises InputError for too short a step, MethodRefusal for a scene the engine cannot sample."""
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
@@ -191,7 +177,7 @@ METHODS = (
         # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
         # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
-        ladders=(step_ladder(8),), cost_scaling={"step": 1e-2}, linearize=_linearize_tree,
+        ladders=(step_ladder(8),), cost_scaling={"step": 1e-2}, linearize=late(f"{_LINEARIZATION}:linearize_tree"),
     ),
     _method(
         "exudyn_tree", "dopri5", "DOPRI5",
@@ -213,7 +199,7 @@ METHODS = (
         "exudyn_chain", "generalized_alpha", "generalized-α",
         look=Look(_GREEN, "-.", "^"), settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
         ladders=_CHAIN_ALPHA_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
-        linearize=_linearize_chain,
+        linearize=late(f"{_LINEARIZATION}:linearize_chain"),
     ),
     _method(
         "exudyn_chain", "newmark_index2", "Newmark index 2",

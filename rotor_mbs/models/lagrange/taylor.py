@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.models.lagrange import closed_form, samples
+from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import (
@@ -50,14 +50,21 @@ class EquationSystem:
         return (*self.parameters.structure, len(self.equations), *self.changing)
 
 
-def build_system(scene: Scene) -> EquationSystem:
-    """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed."""
+def build_system(scene: Scene, *, in_momenta: bool = False) -> EquationSystem:
+    """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed.
+
+    in_momenta   in Hamilton's variables: momenta in place of rates
+    """
     engine = heyoka()
     parameters = Parameters()
     form, loads = equation_numbers(scene, parameters)
-    angles, rates = state_symbols(form)
-    found = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
-    equations = [*zip(angles, rates, strict=True), *zip(rates, found, strict=True)]
+    angles, others = state_symbols(form)
+    if in_momenta:
+        rates = hamilton.rates(angles, others, form, engine.sin, engine.cos)
+        found = hamilton.forces(angles, rates, form, loads, engine.sin, engine.cos)
+    else:
+        rates, found = others, closed_form.accelerations(angles, others, form, loads, engine.sin, engine.cos)
+    equations = [*zip(angles, rates, strict=True), *zip(others, found, strict=True)]
     if work_is_integrated(scene):
         working = at_constant_rests(changing_loads(scene), loads)
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
@@ -65,7 +72,7 @@ def build_system(scene: Scene) -> EquationSystem:
 
 
 def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
-    """Angles and rates: rotor, then the pitches that move."""
+    """Angles, and rates or momenta: rotor, then the pitches that move."""
     count = 1 + len(form.blades)
     symbols = heyoka().make_vars(*[f"q{i}" for i in range(count)], *[f"w{i}" for i in range(count)])
     return symbols[:count], symbols[count:]

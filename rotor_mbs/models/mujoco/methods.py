@@ -8,12 +8,11 @@ from importlib import import_module
 from typing import Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, stability_polynomial
+from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import STEP, Ladder, step_ladder
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.linearization import Linearization
 
 _HINT = "pip install 'rotor_mbs[mujoco]'"
 _MOST_STEPS = 1e10
@@ -53,12 +52,6 @@ def _build(integrator: str) -> Callable[[Scene, Any], Solver]:
     return build
 
 
-def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
-    from rotor_mbs.models.mujoco.linearization import linearize
-
-    return linearize(scene, angles, speed, torque)
-
-
 def _method(integrator: str, label: str, **facts: Any) -> Method:
     return Method(
         name=f"mujoco/{integrator}",
@@ -80,7 +73,8 @@ METHODS = (
     _method(
         "rk4", "RK4", look=Look(_PURPLE, "--", "X"), settings=Rk4Settings, order=4,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
-        ladders=(step_ladder(10),), cost_scaling={"step": 5e-3}, linearize=_linearize,
+        ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
+        linearize=late("rotor_mbs.models.mujoco.solver:linearize"),
     ),
     # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
     _method(

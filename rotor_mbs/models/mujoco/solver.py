@@ -1,11 +1,9 @@
-"""The rotor in the engine: runs it from sample to sample, then reads energies and tips off the engine's bodies.
-
-Loads the engine.
-"""
+"""The rotor in the engine: runs it from sample to sample, then reads energies and tips off the engine's bodies; and the
+model linearized, by quotients of the engine's accelerations. Loads the engine."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +13,7 @@ from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.models.mujoco.adapter import Engine, Poses
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
+from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
 from rotor_mbs.solution.trajectory import (
     Array,
     Integration,
@@ -23,6 +22,9 @@ from rotor_mbs.solution.trajectory import (
     finite_samples,
     sample_times,
 )
+
+# rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the step's square.
+_STEPS = (1e-3, 2e-3, 4e-3, 8e-3)
 
 # Evaluations of the equations of motion in a step.
 _STAGES = {"rk4": 4, "implicitfast": 1}
@@ -202,3 +204,24 @@ def _work_of_rests(scene: Scene, angles: Array) -> Array:
             energy = 0.5 * stiffness * rest * (rest - 2.0 * angles[:, number])
             total += energy - energy[0]
     return total
+
+
+def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
+    """About `angles` (1 + blades,) rad, the rotor turning at `speed` rad/s under `torque` N m.
+
+    Raises MethodRefusal, with the engine's reason, where the engine does not take the scene.
+    """
+    state = scene_at(scene, angles, speed, torque)
+    columns = state.moving_coordinates
+    engine = Engine(mjcf.text(mjcf.model(state, "rk4", 1e-3)), mjcf.LEAST)
+    here = np.concatenate([np.array(values)[columns] for values in (state.initial_angles, state.initial_rates)])
+    n = len(columns)
+    loads = np.array(mjcf.load_segments(state)[0].values)
+
+    def accelerations(states: Array) -> Array:
+        return engine.poses(states[:, :n], states[:, n:], np.tile(loads, (len(states), 1))).acceleration
+
+    unit = np.eye(2 * n)
+    quotients = [(accelerations(here + h * unit) - accelerations(here - h * unit)).T / (2.0 * h) for h in _STEPS]
+    found = limit_at_zero(quotients, 4.0)
+    return Linearization(-found[:, :n], -found[:, n:], accelerations(here[None])[0])

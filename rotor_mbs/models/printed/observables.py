@@ -8,13 +8,14 @@ moments about the pitch axes and the shaft, which nothing transmits there, how l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from rotor_mbs.models.printed import matrices
 from rotor_mbs.models.printed.matrices import CORRECTED
+from rotor_mbs.scenario.time_table import Segment, Table, segments
 from rotor_mbs.solution.trajectory import Array
 
 # Gauss's three points in [0, 1]: exact to degree five, so for a quartic interpolant.
@@ -113,34 +114,24 @@ class PointMassRotor:
         return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]
 
 
-def torque_work(
-    torque: Sequence[tuple[float, float]], rotor_angle: Callable[[Array], Array], knots: Array, times: Array
-) -> Array:
-    """(n,) J done up to each of `times` by a torque ((t, τ), ...) that is linear between its rows and fixed outside.
+def torque_work(table: Table, angle: Callable[[Array], Array], knots: Array, times: Array) -> Array:
+    """(n,) J done up to each of `times` (s) by a torque over time (N m) on a coordinate.
 
-    Where τ is linear, ∫τ q̇2 dt = [τ q2] - τ' ∫q2 dt, and the integral is exact for a rotor_angle that is a quartic
-    between `knots` (s). No column of rates enters: the work is that of the angles that are reported.
+    Where τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for an `angle` (rad, from s) that is a
+    quartic between `knots` (s). No column of rates enters: the work is that of the angles that are reported.
     """
-    breaks = np.array([row[0] for row in torque])
-    values = np.array([row[1] for row in torque])
-    inside = breaks[(breaks > 0.0) & (breaks < times[-1])]
-    grid = np.unique(np.concatenate([knots[knots <= times[-1]], inside, times]))
-    start, width = grid[:-1], np.diff(grid)
-    at_start, at_end = _torque_between(breaks, values, start, grid[1:])
-    points = start[:, None] + width[:, None] * _GAUSS_POINTS
-    mean_angle = rotor_angle(points.ravel()).reshape(points.shape) @ _GAUSS_WEIGHTS
-    angle = rotor_angle(grid)
-    done = at_end * (angle[1:] - mean_angle) + at_start * (mean_angle - angle[:-1])
-    total = np.concatenate([[0.0], np.cumsum(done)])
-    work: Array = total[np.searchsorted(grid, times)]
-    return work
+    parts = segments([table], float(times[-1])) if len(times) > 1 else ()
+    grids = [np.unique([part.start, *_inside(knots, part), *_inside(times, part), part.end]) for part in parts]
+    done = [np.zeros(1)]
+    for part, grid in zip(parts, grids, strict=True):
+        start, width, torque = grid[:-1], np.diff(grid), part.at(0, grid)
+        points = start[:, None] + width[:, None] * _GAUSS_POINTS
+        mean = angle(points.ravel()).reshape(points.shape) @ _GAUSS_WEIGHTS
+        at_ends = angle(grid)
+        done.append(torque[1:] * (at_ends[1:] - mean) + torque[:-1] * (mean - at_ends[:-1]))
+    ends = np.concatenate([times[:1], *(grid[1:] for grid in grids)])
+    return np.asarray(np.cumsum(np.concatenate(done))[np.searchsorted(ends, times)])
 
 
-def _torque_between(breaks: Array, values: Array, start: Array, end: Array) -> tuple[Array, Array]:
-    """Torque at both ends of intervals that no row of the table splits; at a jump, the value on the inner side."""
-    row = np.searchsorted(breaks, start, side="right") - 1
-    before = np.clip(row, 0, len(breaks) - 1)
-    after = np.clip(row + 1, 0, len(breaks) - 1)
-    span = breaks[after] - breaks[before]
-    slope = np.divide(values[after] - values[before], span, out=np.zeros_like(span), where=span > 0.0)
-    return values[before] + slope * (start - breaks[before]), values[before] + slope * (end - breaks[before])
+def _inside(times: Array, part: Segment) -> Array:
+    return times[(times > part.start) & (times < part.end)]
