@@ -12,38 +12,47 @@ the time alone is guessed then.
 
 from __future__ import annotations
 
-import difflib
-import math
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, create_model
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import ALLOWED_UNITS, BASE_UNITS, TIME, UNITS, Channel, channels, guess, split_unit
 from rotor_mbs.foreign.table import DataTable, shown_names
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.toml_file import read_toml
+from rotor_mbs.scenario.toml_file import TableError, read_toml
+from rotor_mbs.scenario.validation import Number, Table, validate
 
-_KEYS = ("column", "unit", "sign", "offset", "wrapped")
+
+class Entry(Table):
+    """What a mapping file says of a channel: sign * (column + offset) in `unit`.
+
+    wrapped   whether turns are missing, so that jumps of more than half a turn are taken out
+    """
+
+    column: str = Field(description="the name of a column")
+    unit: str = Field(default="", description="a unit such as deg")
+    sign: Literal[1, -1] = Field(default=1, description="1, -1")
+    offset: Number = Field(default=0.0, description="a number, in the column's unit")
+    wrapped: bool = Field(default=False, description="true, false")
+
+
+_OfName = BeforeValidator(lambda value: {"column": value} if isinstance(value, str) else value)
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel comes from: sign * (column + offset) in `unit`.
-
-    wrapped   whether turns are missing, so that jumps of more than half a turn are taken out
-    assumed   whether nobody said which unit it is
-    """
+    """Where a channel comes from, in which unit, and whether nobody said so."""
 
     channel: Channel
-    column: str
+    entry: Entry
     unit: str
-    sign: float = 1.0
-    offset: float = 0.0
-    wrapped: bool = False
-    assumed: bool = False
+    assumed: bool
 
     @property
     def factor(self) -> float:
@@ -51,64 +60,37 @@ class Source:
 
     def __str__(self) -> str:
         """A line of the list of what was read."""
-        shift = f" {self.offset:+g}" if self.offset else ""
-        notes = ["unit assumed"] * self.assumed + ["wrapped"] * self.wrapped
-        sign = "-" if self.sign < 0.0 else ""
-        return f"{self.channel.name} = {sign}{self.column!r}{shift} [{self.unit}]" + (
-            f" ({', '.join(notes)})" if notes else ""
-        )
+        shift = f" {self.entry.offset:+g}" if self.entry.offset else ""
+        notes = ", ".join(["unit assumed"] * self.assumed + ["wrapped"] * self.entry.wrapped)
+        sign = "-" if self.entry.sign < 0 else ""
+        return f"{self.channel.name} = {sign}{self.entry.column!r}{shift} [{self.unit}]" + (notes and f" ({notes})")
 
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """What a mapping file says; `entries` by the key of a channel. `group`: of an HDF5 file."""
+    """What a mapping file says: an entry by the key of a channel; `group` of an HDF5 file."""
 
-    name: str
-    entries: Mapping[str, Mapping[str, Any]]
+    entries: Mapping[str, Entry]
     group: str = ""
 
 
-def read_mapping(columns: str | Path | Mapping[str, Any] | None, scene: Scene) -> ColumnMapping | None:
+def read_mapping(columns: str | os.PathLike[str] | Mapping[str, Any] | None, scene: Scene) -> ColumnMapping | None:
     """From a TOML file or a mapping of the same keys. Raises InputError with every fault, a line each."""
     if columns is None:
         return None
     name, tables = ("columns", columns) if isinstance(columns, Mapping) else (str(columns), read_toml(Path(columns))[1])
-    keys = [channel.key for channel in channels(scene)]
-    problems, entries = [], {}
-    for key, value in tables.items():
-        if key == "group":
-            continue
-        entry = {"column": value} if isinstance(value, str) else value
-        if key not in keys:
-            near = difflib.get_close_matches(key, keys, n=1)
-            problems.append(f"{name}: {key}: no such channel; allowed: {near[0] if near else ', '.join(keys)}")
-        elif not isinstance(entry, Mapping) or not isinstance(entry.get("column"), str):
-            problems.append(f"{name}: {key}: names no column; allowed: a column's name, or a table with `column`")
-        else:
-            problems += [f"{name}: {key}.{fault}" for fault in _faults(entry)]
-            entries[key] = entry
-    group = tables.get("group", "")
-    if not isinstance(group, str):
-        problems.append(f"{name}: group: {group!r}; allowed: the path of a group in the file")
-    if not problems and set(entries) <= {TIME}:
-        problems.append(f"{name}: no channel to compare; allowed: {', '.join(keys[1:])}")
-    if problems:
-        raise InputError(problems)
-    return ColumnMapping(name, entries, group)
-
-
-def _faults(entry: Mapping[str, Any]) -> list[str]:
-    faults = [f"{key}: no such key; allowed: {', '.join(_KEYS)}" for key in entry if key not in _KEYS]
-    if not isinstance(entry.get("unit", ""), str):
-        faults.append("unit: no text; allowed: a unit such as deg")
-    if entry.get("sign", 1) not in (1, -1):
-        faults.append(f"sign: {entry['sign']!r}; allowed: 1, -1")
-    offset = entry.get("offset", 0.0)
-    if isinstance(offset, bool) or not isinstance(offset, int | float) or not math.isfinite(offset):
-        faults.append(f"offset: {offset!r}; allowed: a number, in the column's unit")
-    if not isinstance(entry.get("wrapped", False), bool):
-        faults.append(f"wrapped: {entry['wrapped']!r}; allowed: true, false")
-    return faults
+    described = Field(None, description="a column's name, or a table with `column`")
+    keys: dict[str, Any] = {channel.key: (Annotated[Entry | None, _OfName], described) for channel in channels(scene)}
+    keys["group"] = (str, Field("", description="the path of a group in the file"))
+    try:
+        found = dict(validate(create_model("MappingTable", __base__=Table, **keys), tables))
+    except TableError as error:
+        raise InputError(f"{name}: {problem.message}" for problem in error.problems) from error
+    group = found.pop("group")
+    entries = {key: entry for key, entry in found.items() if entry is not None}
+    if entries.keys() <= {TIME}:
+        raise InputError(f"{name}: no channel to compare; allowed: {', '.join(found)}")
+    return ColumnMapping(entries, group)
 
 
 def sources(table: DataTable, scene: Scene, mapping: ColumnMapping | None) -> list[Source]:
@@ -118,8 +100,8 @@ def sources(table: DataTable, scene: Scene, mapping: ColumnMapping | None) -> li
     entries = mapping.entries if mapping else {}
     found = []
     for channel in known:
-        entry = entries.get(channel.key) or ({"column": guessed[channel.name]} if channel.name in guessed else None)
-        if entry is not None:
+        if channel.key in entries or channel.name in guessed:
+            entry = entries.get(channel.key) or Entry(column=guessed[channel.name])
             found.append(_source(table, channel, entry))
     shown = shown_names(list(table.columns))
     if not found or found[0].channel.name != TIME:
@@ -148,17 +130,13 @@ def _guesses(table: DataTable, known: Sequence[Channel], wanted: set[str]) -> di
     return found
 
 
-def _source(table: DataTable, channel: Channel, entry: Mapping[str, Any]) -> Source:
+def _source(table: DataTable, channel: Channel, entry: Entry) -> Source:
     """Raises InputError for a column that is not there, and a unit that is none of the channel."""
-    column = entry["column"]
-    stated = table[column].unit or split_unit(column)[1]
-    unit = entry.get("unit") or stated
+    stated = table[entry.column].unit or split_unit(entry.column)[1]
+    unit = entry.unit or stated
     if unit and unit.lower() not in UNITS[channel.kind]:
         raise InputError(
-            f"{table.source}: column {column!r} for {channel.name} is in {unit!r}; allowed: "
+            f"{table.source}: column {entry.column!r} for {channel.name} is in {unit!r}; allowed: "
             f"{ALLOWED_UNITS[channel.kind]}"
         )
-    return Source(
-        channel, column, unit or BASE_UNITS[channel.kind], float(entry.get("sign", 1)), float(entry.get("offset", 0.0)),
-        entry.get("wrapped", False), assumed=not unit,
-    )  # fmt: skip
+    return Source(channel, entry, unit or BASE_UNITS[channel.kind], assumed=not unit)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,7 @@ def load_data(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
 ) -> ForeignData:
     """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
-    mapping = read_mapping(columns if columns is None or isinstance(columns, Mapping) else Path(columns), scene)
+    mapping = read_mapping(columns, scene)
     if isinstance(data, Mapping):
         table = table_of("data", data)
     else:
@@ -69,14 +68,14 @@ def load_data(
 
 
 def _data(table: DataTable, found: Sequence[Source]) -> ForeignData:
-    lengths = {source.column: len(table[source.column].values) for source in found}
+    lengths = {source.entry.column: len(table[source.entry.column].values) for source in found}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
         raise InputError(f"{table.source}: columns of different lengths: {shown}; allowed: a row for every time")
     arrays = [_values(table, source) for source in found]
     time = arrays[0]
     _refuse_wrong_times(table.source, time)
-    used = {source.column for source in found}
+    used = {source.entry.column for source in found}
     return ForeignData(
         table.source,
         time,
@@ -84,22 +83,22 @@ def _data(table: DataTable, found: Sequence[Source]) -> ForeignData:
         tuple(source.channel for source in found[1:]),
         tuple(str(source) for source in found),
         tuple(name for name in table.columns if name not in used),
-        tuple(source.wrapped for source in found[1:]),
-        max(_digits(table[source.column].values) for source in found[1:]),
+        tuple(source.entry.wrapped for source in found[1:]),
+        max(_digits(table[source.entry.column].values) for source in found[1:]),
     )
 
 
 def _values(table: DataTable, source: Source) -> Array:
     """In s, rad or rad/s. Raises InputError where a number is not finite."""
-    values = table[source.column].values
+    values = table[source.entry.column].values
     bad = np.flatnonzero(~np.isfinite(values))
     if len(bad):
         raise InputError(
-            f"{table.source}: column {source.column!r} is {values[bad[0]]} in row {bad[0] + 1} of {len(values)}; "
+            f"{table.source}: column {source.entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of {len(values)}; "
             "allowed: finite numbers"
         )
-    found: Array = source.sign * (values + source.offset) * source.factor
-    return np.unwrap(found) if source.wrapped else found
+    found: Array = source.entry.sign * (values + source.entry.offset) * source.factor
+    return np.unwrap(found) if source.entry.wrapped else found
 
 
 def _digits(values: Array) -> int:
