@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,7 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
         if b"\x00" in head and not head.startswith(_UTF_16):
             raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
         return read_text(source, _decoded(path.read_bytes()))
-    except (OSError, ValueError, zipfile.BadZipFile, MemoryError, KeyError) as exc:
+    except (OSError, ValueError, zipfile.BadZipFile, struct.error, MemoryError, KeyError) as exc:
         raise InputError(f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}") from exc
 
 
@@ -97,17 +98,12 @@ def _netcdf3(path: Path) -> DataTable:
 
 def _openfast(path: Path) -> DataTable:
     """OpenFAST's binary output, by its own project's reader."""
-    import struct
-
     try:
         from openfast_io.FAST_output_reader import load_binary_output
     except ImportError as exc:
         hint = 'pip install "rotor_mbs[openfast]", or text output (OutFileFmt 1)'
         raise InputError(f"{path}: openfast_io is not installed; allowed: {hint}") from exc
-    try:
-        values, facts, _ = load_binary_output(str(path))
-    except struct.error as exc:
-        raise InputError(f"{path}: a damaged OpenFAST file: {_line(exc)}") from exc
+    values, facts, _ = load_binary_output(str(path))
     names, units = facts["attribute_names"], facts["attribute_units"]
     arrays = {name: values[:, i] for i, name in enumerate(names)}
     return table_of(str(path), arrays, dict(zip(names, units, strict=True)))

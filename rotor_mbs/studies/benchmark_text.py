@@ -58,12 +58,10 @@ def _bearing_row(scene: Scene, blade: int) -> str:
 
 def _loads(scene: Scene) -> str:
     """What drives rotor and pitches, a table over time each."""
-    tables = {"torque on the rotor about +y, N m": scene.rotor_torque}
+    names = ["torque on the rotor about +y, N m"]
     for number in range(1, 1 + len(scene.blades)):
-        torque, rest = scene.pitch_load(number - 1)
-        tables[f"torque on pitch {number}, N m"] = torque
-        tables[f"pitch {number} at which its spring is unloaded, rad"] = rest
-    given = {name: table for name, table in tables.items() if table}
+        names += [f"torque on pitch {number}, N m", f"pitch {number} at which its spring is unloaded, rad"]
+    given = {name: table for name, table in zip(names, scene.load_tables, strict=True) if table}
     if not given:
         return "None."
     parts = [

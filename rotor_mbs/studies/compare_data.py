@@ -33,7 +33,7 @@ from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 from rotor_mbs.store.layout import Column
 from rotor_mbs.store.records import Record
-from rotor_mbs.studies.data_causes import CauseSearch
+from rotor_mbs.studies.data_causes import CauseSearch, states_of
 from rotor_mbs.studies.scene_causes import likely_causes
 
 METHOD = "data"  # what takes the place of a method's name
@@ -66,24 +66,19 @@ class DataStudy:
 
     def record(self) -> Record:
         """As a record of a results file: of each channel data, reference, error, and error amplification."""
-        rows = self.verdict.rows
+        values = self.data.values[: self.verdict.rows]
         columns = {"time": Column(("time",), "s", "time")}
-        arrays: dict[str, Array] = {"time": self.data.time[:rows]}
+        arrays: dict[str, Array] = {"time": self.data.time[: self.verdict.rows]}
+        kinds = {
+            "": ("", values),
+            "_reference": (", reference", self.expected),
+            "_error": (", data less reference", values - self.expected),
+            "_growth": (", an error of 1 at the start by then", self.carried),
+        }
         for j, one in enumerate(self.data.channels):
-            values, expected = self.data.values[:rows, j], self.expected[:, j]
-            for ending, unit, long_name, array in (
-                ("", one.unit, one.name, values),
-                ("_reference", one.unit, f"{one.name}, reference", expected),
-                ("_error", one.unit, f"{one.name}, data less reference", values - expected),
-                (
-                    "_growth",
-                    one.unit,
-                    f"{one.name}, an error of 1 at the start by then",
-                    self.carried[:, j],
-                ),
-            ):
-                arrays[one.key + ending] = array
-                columns[one.key + ending] = Column(("time",), unit, long_name)
+            for ending, (what, array) in kinds.items():
+                arrays[one.key + ending] = array[:, j]
+                columns[one.key + ending] = Column(("time",), one.unit, one.name + what)
         verdict = replace(self.verdict, unused=self.verdict.unused[:_MOST_NAMES])  # an attribute has 64 kB
         facts = {
             "title": self.scene.title,
@@ -122,10 +117,10 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
         search = CauseSearch(scene, whole, exact, tolerance, worst, ends)
         with np.errstate(over="ignore", invalid="ignore"):  # data may be of any size
             likely, note = likely_causes(search)
-        start = "" if likely else _other_start(scene, cut, _states(at_rows)[0, cut.columns])
+        start = "" if likely else _other_start(scene, cut, states_of(at_rows)[0, cut.columns])
         notes = (*verdict.notes, *(line for line in (note, start) if line))
         verdict = replace(verdict, likely=tuple(likely), notes=notes)
-    return DataStudy(scene, cut, _states(at_rows)[:, cut.columns], carried, verdict)
+    return DataStudy(scene, cut, states_of(at_rows)[:, cut.columns], carried, verdict)
 
 
 def _reference(scene: Scene, time: Array) -> TimedReference:
@@ -136,14 +131,10 @@ def _reference(scene: Scene, time: Array) -> TimedReference:
     return reference_at(whole, times)
 
 
-def _states(trajectory: Trajectory) -> Array:
-    return np.hstack([trajectory.angles, trajectory.rates])
-
-
 def _with_whole_turns(data: ForeignData, reference: Trajectory) -> ForeignData:
     """Wrapped channels with as many turns as the reference has in the first row."""
     values = data.values.copy()
-    expected = _states(reference)[0, data.columns]
+    expected = states_of(reference)[0, data.columns]
     for j, wrapped in enumerate(data.wrapped):
         if wrapped:
             values[:, j] += 2.0 * np.pi * np.round((expected[j] - values[0, j]) / (2.0 * np.pi))
@@ -156,7 +147,7 @@ def _verdict(
 ) -> DataVerdict:  # fmt: skip
     rows, (horizon_s, until) = len(reference.time), rows_to_the_horizon(exact.trajectory, reference.time)
     compared = replace(data, time=data.time[:rows], values=data.values[:rows])
-    expected = _states(reference)[:, data.columns]
+    expected = states_of(reference)[:, data.columns]
     slopes = _slopes(exact, reference.time)[:, data.columns]
     names = [(channel.name, channel.unit) for channel in data.channels]
     errors = channel_errors(names, reference.time, compared.values, expected, slopes, carried, max(until, 1))
@@ -167,13 +158,10 @@ def _verdict(
         status, message, metrics = found.status, found.message, found.metrics
     worst = max(errors, key=lambda one: one.error_per_growth)
     if not worst.error_per_growth <= tolerance:
-        status, message = (
-            "inaccurate",
-            (
-                f"{worst.name}: error {worst.error_max:.1e} {worst.unit} up to the horizon, "
-                f"{worst.error_per_growth:.1e} per unit of error growth, allowed {tolerance:.0e}"
-            ),
-        )
+        status, message = "inaccurate", (
+            f"{worst.name}: error {worst.error_max:.1e} {worst.unit} up to the horizon, "
+            f"{worst.error_per_growth:.1e} per unit of error growth, allowed {tolerance:.0e}"
+        )  # fmt: skip
     if status in ("ok", "unchecked"):
         status, message = _uncovered(scene, compared, exact, until) or (status, message)
     return DataVerdict(
@@ -184,18 +172,14 @@ def _verdict(
 
 def _slopes(exact: TimedReference, time: Array) -> Array:
     """(n, 2 (1 + blades)) Time derivatives at the rows; of rates by differences."""
-    states = _states(exact.trajectory)
-    count = states.shape[1] // 2
-    rates = states[:, count:]
-    slopes = np.gradient(rates, exact.trajectory.time, axis=0) if len(rates) > 1 else 0.0 * rates
-    place = np.searchsorted(exact.trajectory.time, time)
-    found: Array = np.hstack([rates, slopes])[place]
-    return found
+    run = exact.trajectory
+    slopes = np.gradient(run.rates, run.time, axis=0) if len(run.time) > 1 else 0.0 * run.rates
+    return states_of(Trajectory(run.time, run.rates, slopes))[np.searchsorted(run.time, time)]
 
 
 def _as_run(scene: Scene, data: ForeignData, reference: Trajectory, tolerance: float) -> Solution:
     """The data as a run that can be judged; channels that they lack are the reference's and so add no error."""
-    states = _states(reference).copy()
+    states = states_of(reference).copy()
     states[:, data.columns] = data.values
     count = states.shape[1] // 2
     scene = replace(scene, duration=float(data.time[-1]), samples=len(data.time), outputs=("angles", "rates"))

@@ -111,7 +111,7 @@ class CauseSearch:
     def expected(self, time: Array) -> Array:
         """(n, 2 (1 + blades)) The reference at times of the data."""
         reference = self.exact.trajectory
-        return _states(reference)[np.searchsorted(reference.time, time)]
+        return states_of(reference)[np.searchsorted(reference.time, time)]
 
 
 def states_at(scene: Scene, time: Array, equations: Equations | None = None) -> Array | None:
@@ -122,10 +122,11 @@ def states_at(scene: Scene, time: Array, equations: Equations | None = None) -> 
     times = np.union1d([0.0], time)
     whole = replace(scene, duration=float(times[-1]), samples=len(times), outputs=("angles", "rates"))
     run = motion_at(whole, times, equations)
-    return _states(run)[len(times) - len(time) :] if len(run.time) == len(times) else None
+    return states_of(run)[len(times) - len(time) :] if len(run.time) == len(times) else None
 
 
-def _states(run: Trajectory) -> Array:
+def states_of(run: Trajectory) -> Array:
+    """(n, 2 (1 + blades)) Angles, then rates."""
     return np.hstack([run.angles, run.rates])
 
 

@@ -61,11 +61,9 @@ def _argument(key: str, value: Any) -> str:
         moment: Moment = value.__self__
         sums = (f"{'' if factor == 1.0 else f'{factor!r} * '}now({load}, time)" for load, factor in moment.terms)
         return f"lambda system, time, load: {' + '.join(sums)}"
-    return _TYPES.get(key, "{}").format(_joint_types(value) if key == "jointTypes" else _value(value))
-
-
-def _joint_types(names: Any) -> str:
-    return "[" + ", ".join(f"exu.JointType.{name}" for name in names) + "]"
+    if key == "jointTypes":
+        return f"[{', '.join(f'exu.JointType.{name}' for name in value)}]"
+    return _TYPES.get(key, "{}").format(_value(value))
 
 
 # What the engine wants in its own types, by the name of the argument.

@@ -46,11 +46,10 @@ def verdict_of(record: Record) -> DataVerdict:
 
 
 def _lead(verdict: DataVerdict) -> list[str]:
-    reach = f"{verdict.rows} rows until {number(verdict.compared_until, 4)} s; judged up to the horizon at "
-    reach += (
+    sentences = [
+        f"{verdict.rows} rows until {number(verdict.compared_until, 4)} s; judged up to the horizon at "
         f"{with_unit(verdict.horizon_s, 's', 4)}, tolerance {number(verdict.tolerance)} rad per unit of error growth."
-    )
-    sentences = [reach]
+    ]
     if verdict.message:
         sentences.append(f"{verdict.message[:1].upper()}{verdict.message[1:]}.")
     if verdict.energy_drift is not None:
@@ -96,18 +95,12 @@ def _legend(verdict: DataVerdict) -> list[LegendEntry]:
 
 def _errors(record: Record, verdict: DataVerdict) -> list[Picture]:
     worst = max(verdict.channels, key=lambda one: one.error_per_growth)
-    captions = (
-        "Error against the reference at the times of the data; vertical line: horizon",
-        "Error per unit of error growth, up to the horizon to be below the tolerance",
-    )
-    texts = (
-        f"Largest error up to the horizon of {worst.name}: {with_unit(worst.error_max, worst.unit)}.",
-        f"The largest is {number(worst.error_per_growth)}, {worst.name}.",
-    )
-    return [
-        picture(error_panels(record, per_growth=bool(i)), f"errors-{i}", caption, texts[i])
-        for i, caption in enumerate(captions)
-    ]
+    largest = f"Largest error up to the horizon of {worst.name}: {with_unit(worst.error_max, worst.unit)}."
+    caption = "Error against the reference at the times of the data; vertical line: horizon"
+    absolute = picture(error_panels(record), "errors-0", caption, largest)
+    largest = f"The largest is {number(worst.error_per_growth)}, {worst.name}."
+    caption = "Error per unit of error growth, up to the horizon to be below the tolerance"
+    return [absolute, picture(error_panels(record, per_growth=True), "errors-1", caption, largest)]
 
 
 def _motion(record: Record, verdict: DataVerdict) -> list[Picture]:
@@ -134,21 +127,17 @@ def _motion(record: Record, verdict: DataVerdict) -> list[Picture]:
 
 
 def _table(verdict: DataVerdict) -> PageTable:
-    head = (
-        "Channel",
-        "largest error",
-        "per unit of growth",
-        *(f"agrees to {number(level, 1)} until" for level in LEVELS),
-    )
+    until = (f"agrees to {number(level, 1)} until" for level in LEVELS)
+    head = ("Channel", "largest error", "per unit of growth", *until, "constant lag", "scale less 1", "offset")
     rows: list[Row] = []
     for one in verdict.channels:
         good = one.error_per_growth <= verdict.tolerance
-        until = [number(None) if np.isnan(time) else with_unit(time, "s", 3) for time in one.agrees_until]
+        times = [number(None) if np.isnan(time) else with_unit(time, "s", 3) for time in one.agrees_until]
         rows.append(
             [
                 one.name, with_unit(one.error_max, one.unit),
-                TableCell(number(one.error_per_growth), "good" if good else "bad"), *until,
+                TableCell(number(one.error_per_growth), "good" if good else "bad"), *times,
                 with_unit(one.lag_s, "s"), number(one.scale - 1.0), with_unit(one.offset, one.unit),
             ]
         )  # fmt: skip
-    return PageTable("", (*head, "constant lag", "scale less 1", "offset"), rows, tuple(range(1, 9)))
+    return PageTable("", head, rows, tuple(range(1, len(head))))
