@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from support.scenes import paper
-from support.stored import Made, rotor, store
+from support.stored import Arrays, Made, rotor, store
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import claims, rounds_to
@@ -55,6 +56,48 @@ def test_statistics_of_a_growing_oscillation(tmp_path: Path, statistic: str, exa
         value = measure(results.scenes["paper/fig11"].methods[PRINTED], of(statistic))
     # 50 samples a period: an extreme is missed by at most (2π/50)²/8 = 2e-3 of the amplitude of 10.
     assert value == pytest.approx(exact, abs=0.05)
+
+
+SERIES = {
+    "min": ((3.0, -2.0, 5.0), -2.0),
+    "max": ((3.0, -2.0, 5.0), 5.0),
+    "max_abs": ((3.0, -7.0, 5.0), 7.0),
+    "range": ((3.0, -2.0, 5.0), 7.0),
+    "max_abs_change": ((3.0, -2.0, 5.0), 5.0),
+    "net_change": ((3.0, -2.0, 5.0), 2.0),
+    "reversals": ((1.0, 0.0, -1.0, -2.0, 3.0), 2.0),
+    "growth": ((1.0, 3.0, -5.0), 3.0),  # of 2 by the middle of the time to 6
+    "swing_ratio": ((0.0, 2.0, 2.0, -1.0, 3.0, 0.0), 2.0),  # 2, 3, 4; the last is unfinished
+}
+
+
+@pytest.mark.parametrize("statistic", SERIES)
+def test_statistics_by_hand(statistic: str) -> None:
+    x, expected = SERIES[statistic]
+    series: Any = Arrays(PRINTED, time=np.arange(1.0, 1.0 + len(x)), angles=np.array([x]).T)
+    assert measure(series, of(statistic)) == pytest.approx(expected)
+    assert measure(series, of(statistic, 1)) is None  # no such coordinate
+    still: Any = Arrays(PRINTED, time=np.arange(1.0, 4.0), angles=np.ones((3, 1)))
+    if statistic in ("growth", "swing_ratio"):
+        assert measure(still, of(statistic)) is None
+        once: Any = Arrays(PRINTED, time=np.arange(3.0), angles=np.array([[0.0, 2.0, 1.0]]).T)
+        assert measure(once, of("swing_ratio")) is None
+        twice: Any = Arrays(PRINTED, time=np.arange(4.0), angles=np.array([[0.0, 2.0, -1.0, 3.0]]).T)
+        assert measure(twice, of("swing_ratio")) == pytest.approx(1.5)
+    else:
+        assert measure(still, of(statistic)) in (0.0, 1.0)
+
+
+def test_one_sample_has_no_growth_and_none_no_number() -> None:
+    one: Any = Arrays(PRINTED, time=np.ones(1), angles=np.ones((1, 1)))
+    assert measure(one, of("growth")) is None
+    none: Any = Arrays(
+        PRINTED, refined_time=np.ones(0), refined_angles=np.ones((0, 1)), time=np.ones(1), angles=np.ones((1, 1))
+    )
+    assert measure(none, of("max")) == 1.0
+    assert measure(none, of("max", quantity="rate")) is None
+    timeless: Any = Arrays(PRINTED, angles=np.ones((1, 1)))
+    assert measure(timeless, of("max")) is None
 
 
 def test_swings_are_counted_from_turning_point_to_turning_point(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from support.scenes import paper
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.scenario.scene import Scene
 
-ONE, THREE = paper("fig03", hub_inertia=1e6), paper("fig05", hub_inertia=1e6)
+RIGID = replace(paper("fig03").blades[0], inertia=(3e5, 4e5, 2e5, 0.0, 0.0, 0.0))
+ONE, THREE = (paper(name, hub_inertia=1e6, blades=(RIGID,) * n) for name, n in (("fig03", 1), ("fig05", 3)))
 TURNING: dict[str, Any] = {"initial_rates": (0.5, 0.0, 0.0, 0.0)}
 KNOWN = {
     "pendulum": ONE,

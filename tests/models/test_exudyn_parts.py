@@ -122,8 +122,10 @@ def test_a_wrong_setting_is_told_with_what_is_allowed(name, settings, said) -> N
 
 
 def test_samples_the_engine_cannot_tell_apart_are_refused() -> None:
+    settings = METHODS[TREE].settings()
+    METHODS[TREE].build(replace(FIG08, duration=1.001e-5), settings)  # 1000 intervals
     with pytest.raises(MethodRefusal, match="1e-08 s apart"):
-        solve(TREE, replace(FIG08, duration=1e-9), {})
+        METHODS[TREE].build(replace(FIG08, duration=0.999e-5), settings)
 
 
 # One blade runs into θ = π/2, where nothing holds the rotor: the rates go to infinity at about 0.06 s.
@@ -159,6 +161,9 @@ def test_a_solve_that_fails_is_counted_to_the_last_step_that_it_took(name) -> No
     found = solve(name, kinked, {"step": 1e-3}).integration
     assert found.time_reached < 0.1
     assert found.time_reached == pytest.approx(1e-3 * found.steps, rel=1e-9)
+    assert not found.out_of_time
+    first = solve(name, replace(SINGULAR, samples=2), {"step": 1.0}).integration
+    assert (first.steps, first.time_reached) == (0, 0.0)
 
 
 def test_a_failed_solve_leaves_the_next_alone() -> None:
@@ -187,7 +192,89 @@ def test_counts_of_steps_and_evaluations() -> None:
     assert alpha.rhs_evaluations >= 200
     dopri5 = solve("exudyn_tree/dopri5", scene, {}).integration
     assert dopri5.rhs_evaluations % 7 == 0
-    assert dopri5.rhs_evaluations >= 7 * dopri5.steps
+    assert (
+        7 * dopri5.steps < dopri5.rhs_evaluations < 7 * (dopri5.steps + 10)
+    )  # fewer are rejected than intervals begun
+    assert not dopri5.out_of_time
+    kinked = replace(scene, rotor_torque=((0.0, 0.0), (0.05, 0.0), (0.1, 1.0)))  # two intervals, of the same steps
+    assert solve("exudyn_tree/rk44", kinked, {"step": 3e-3}).integration.steps == 40
+    linear = replace(
+        BARE, blades=(POLE,) * 3, gravity=0.0, initial_rates=(1.0, 0.0, 0.0, 0.0), duration=0.1, samples=11
+    )
+    turning = solve("exudyn_tree/generalized_alpha", linear, {"step": 1e-3}).integration
+    assert (turning.steps, turning.rhs_evaluations) == (100, 200)  # an iteration a step, and the residual once more
+
+
+def test_a_row_stands_at_the_end_of_every_step_that_an_adaptive_scheme_takes() -> None:
+    scene = replace(FIG11, duration=0.1, samples=11, shaft_damping=100.0)
+    solver = METHODS["exudyn_tree/dopri5"].build(scene, METHODS["exudyn_tree/dopri5"].settings())
+    steps = solver.integrate().steps
+    assert len(np.unique(solver.system.rows("angles")[:, 0])) == 1 + steps
+
+
+def test_loads_at_the_start_are_those_of_the_start_whatever_intervals_follow() -> None:
+    scene = replace(FIG11, outputs=("angles", "rates", "loads"), duration=0.1, samples=11)
+    kinked = replace(scene, rotor_torque=((0.0, 0.0), (0.05, 0.0), (0.1, 1.0)))
+    plain, with_kink = (solve(TREE, one, {}).trajectory.quantities["blade_root_force"] for one in (scene, kinked))
+    np.testing.assert_allclose(with_kink[0], plain[0], rtol=1e-12)
+
+
+def test_the_cause_of_a_failure_is_found_behind_others() -> None:
+    from rotor_mbs.models.exudyn.adapter import _caused_by
+
+    outer, inner = RuntimeError(), KeyboardInterrupt()
+    assert _caused_by(inner, KeyboardInterrupt)
+    assert not _caused_by(outer, KeyboardInterrupt)
+    outer.__context__ = inner
+    assert _caused_by(outer, KeyboardInterrupt)
+    outer.__cause__, outer.__context__ = inner, None
+    assert _caused_by(outer, KeyboardInterrupt)
+    assert not _caused_by(outer, ValueError)
+
+
+def test_an_implicit_scheme_has_accelerations_anyway() -> None:
+    implicit, explicit = (METHODS[f"exudyn_tree/{name}"].settings().scheme() for name in ("generalized_alpha", "rk44"))
+    assert implicit.with_accelerations() == implicit
+    assert not explicit.lacks_initial_accelerations
+    assert explicit.with_accelerations().lacks_initial_accelerations
+    for outputs in (BARE.outputs, (*BARE.outputs, "loads")):
+        built = METHODS["exudyn_tree/rk44"].build(
+            replace(BARE, outputs=outputs), METHODS["exudyn_tree/rk44"].settings()
+        )
+        assert built._scheme.lacks_initial_accelerations == ("loads" in outputs)
+
+
+def test_loads_and_rotation_vectors_are_refused_together_alone() -> None:
+    settings, loads = METHODS[CHAIN].settings, replace(BARE, outputs=("angles", "rates", "loads"))
+    for scene, node in ((BARE, "rotation_vector"), (loads, "euler_parameters")):
+        assert METHODS[CHAIN].build(scene, settings(node=node)).system.counts() == listed(CHAIN, scene)
+    with pytest.raises(MethodRefusal, match="euler_parameters"):
+        METHODS[CHAIN].build(loads, settings(node="rotation_vector"))
+
+
+@pytest.mark.parametrize(
+    ("more", "rows"),
+    [
+        ({}, 11),
+        ({"shaft_damping": 100.0}, 161),  # the work of a damper is summed over steps: of at most 0.67 ms, 16 in 10 ms
+        ({"shaft_damping": 100.0, "outputs": ("angles", "rates")}, 11),
+    ],
+)
+def test_rows_between_samples_are_kept_where_work_needs_them(more, rows) -> None:
+    solver = METHODS[TREE].build(replace(FIG11, duration=0.1, samples=11, **more), METHODS[TREE].settings())
+    assert solver.integrate().success
+    assert len(solver.system.rows("angles")) == rows
+
+
+def test_a_scheme_that_chooses_its_steps_ends_one_at_every_sample() -> None:
+    """And goes on in the next interval with the step it had."""
+    scene = replace(FIG11, duration=0.1, samples=11)
+    loose = solve("exudyn_tree/dopri5", scene, {"absolute_tolerance": 1.0}).integration
+    assert loose.steps == 10
+    fixed = METHODS[TREE].build(scene, METHODS[TREE].settings())
+    begun = []
+    fixed.system.integrate(fixed._scheme, fixed._intervals, False, begun.append)
+    assert [(one.start, one.end, one.sample_intervals) for one in begun] == [(0.0, 0.1, 10)]
 
 
 def test_ctrl_c_inside_a_solve_is_an_interrupt() -> None:

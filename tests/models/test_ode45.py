@@ -118,6 +118,18 @@ def test_every_accepted_step_meets_the_tolerance(rel_tol):
     assert error.max() > 0.5 * rel_tol  # and is not held far below it
 
 
+def test_steps_without_failures_follow_from_the_errors_before_them():
+    """h / (1.25 (error / RelTol)^(1/5)), five times h at most: the rule that decides the digits of a chaotic run."""
+    result = ode45(harmonic, 10.0, [1.0, 0.0], 1e-8, 1e-11)
+    assert result.failed_steps == 0
+    h = np.diff(result.time)
+    raw = np.abs(np.einsum("s,ksn->kn", np.array([float(e) for e in ERROR]), result.stages))
+    scale = np.maximum(np.abs(result.state[:-1]), np.abs(result.state[1:]))
+    error = h * (raw / np.maximum(scale, 1e-3)).max(axis=1)
+    shrink = 1.25 * (error[:-2] / 1e-8) ** 0.2
+    np.testing.assert_allclose(h[1:-1], h[:-2] / np.maximum(shrink, 0.2), rtol=1e-6)
+
+
 def test_tolerance_controls_the_error():
     # Unit rate of error growth on a circle: the error at the end is a small multiple of the tolerance.
     for rel_tol in (1e-5, 1e-7, 1e-9):
@@ -160,6 +172,14 @@ def test_steps_after_failures_by_hand():
     # Wall at 0.45: 0.1 fails, 0.01 fits; no growth after it: 0.01 again; then 0.05 fails, 0.005 fits, and 0.005 again.
     result = ode45(wall(0.45), 1.0, [1.0])
     np.testing.assert_allclose(result.time[4:9], [0.4, 0.41, 0.42, 0.425, 0.43], rtol=1e-12)
+
+
+def test_what_is_not_a_number_in_any_component_fails():
+    """In the last one, too, which the largest of all would pass over."""
+    one = ode45(wall(0.4041), 1.0, [1.0])
+    for sign in (1, -1):
+        both = ode45(lambda t, y, sign=sign: [0.0, *wall(0.4041)(t, y)][::sign], 1.0, [1.0, 1.0])
+        assert both.time.tolist() == one.time.tolist()
 
 
 def test_a_wall_ends_the_run_with_what_was_reached():

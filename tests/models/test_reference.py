@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,11 +15,13 @@ from support.scenes import PAPER, general, paper
 
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange.reference import reference_at
+from rotor_mbs.models.lagrange import reference as reference_module
+from rotor_mbs.models.lagrange.reference import ReferenceSolver, reference_at, uncertainty
 from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.scene_file import parse_scene
+from rotor_mbs.solution.trajectory import Integration
 from rotor_mbs.store.read import open_results
 
 FROZEN = reference_folder() / "paper.h5"
@@ -109,6 +113,60 @@ def test_a_reference_that_its_time_limit_ends_is_ended() -> None:
     """Springs keep the errors from growing to where that breaks off: over the rest it would take hours."""
     (end,) = run_tasks(_limited, [1e6], 1, 60.0)
     assert end.value == (True, [1.0])
+
+
+def test_the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls() -> None:
+    """The rounding of 1 rad at least, and of 4 rad where an angle is that large."""
+    angles = np.array([[0.1, 0.2], [0.1, -4.0], [0.1, 0.2]])
+    found = uncertainty(np.array([1e-9, 0.0, 3e-9]), angles, 1e-9)
+    np.testing.assert_allclose(found, [2e-8, 4e-8, 4e-8], rtol=1e-12)
+
+
+@pytest.mark.parametrize("failing", ["", "best", "check"])
+def test_a_reference_that_fails_says_why_and_how_far_the_better_run_came(failing: str) -> None:
+    """`steps` and the time are those of the run that is kept, whichever fails."""
+    runs = {
+        name: Integration(name != failing, f"{name} failed" if name == failing else "", reached, steps)
+        for name, reached, steps in (("best", 2.0, 20), ("check", 1.0, 10))
+    }
+    solver: Any = object.__new__(ReferenceSolver)
+    solver._runs = [SimpleNamespace(run=lambda one=one: one) for one in runs.values()]
+    found = solver.integrate()
+    assert (found.success, found.time_reached, found.steps) == (not failing, 2.0, 20)
+    assert found.message == (f"{failing} failed" if failing else "")
+
+
+def test_a_reference_has_loads_where_they_are_asked_for() -> None:
+    pytest.importorskip("heyoka")
+    for outputs in (("angles", "rates"), ("angles", "rates", "loads")):
+        found = solve("reference", paper("fig03", duration=0.1, samples=3, outputs=outputs), {}).trajectory
+        assert ("blade_root_force" in found.quantities) == ("loads" in outputs)
+
+
+@pytest.mark.parametrize(("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)])
+def test_growth_is_known_as_far_as_the_variational_equations_went(
+    known: int, finite: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("heyoka")
+    matrices = np.full((known, 4, 4), 3.0)  # rows of norm 6, columns in units of 1
+    monkeypatch.setattr(reference_module, "_transition_matrices", lambda _scene, _times: matrices)
+    found = reference_at(paper("fig03", duration=0.1, samples=3), np.linspace(0.0, 0.1, 3))
+    assert found.growth.tolist() == [[6.0 if one else np.inf] * 4 for one in finite]
+    assert found.trajectory.error_growth is not None
+    assert np.isfinite(found.trajectory.error_growth).tolist() == finite
+
+
+def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reference_module, "is_available", lambda: False)
+    free = paper("fig03").blades[0]
+    blades = (replace(free, centre_of_mass=(0.0, 0.0, 5.0)), free)
+    scene = replace(paper("fig03"), blades=blades, initial_angles=(0.2, 0.0, 0.1), initial_rates=(0.5, 0.0, 0.2))
+    scene = replace(scene, bearing_stiffness=(0.0, 1e8), duration=0.1, samples=3)
+    assert list(scene.moving_coordinates) == [0, 2]
+    found = reference_at(scene, np.linspace(0.0, 0.1, 3))
+    assert (found.growth[:, [1, 4]] == 1.0).all()
+    assert (found.growth[1:, [0, 2, 3, 5]] != 1.0).all()
+    assert (found.units == 1.0).tolist() == [True] * 5 + [False]
 
 
 def test_amplification_of_a_stiff_oscillation_is_one() -> None:

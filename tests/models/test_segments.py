@@ -127,6 +127,9 @@ def test_the_unit_of_work_is_of_the_size_of_the_energies() -> None:
     """The power of two below their sum, and 1 where there is none that counts."""
     for part in ((1.2e6, 0.0, 0.0), (0.0, 1.2e6, 0.0), (0.0, 0.0, 1.2e6), (4e5, 4e5, 4e5)):
         assert _work_unit(*part) == 2.0**20
+        assert _work_unit(*(1.7 * size for size in part)) == 2.0**20
     assert _work_unit(9e5, 9e5, 9e5) == 2.0**21
+    growing = paper("fig03", gravity=0.0, rotor_torque=((0.0, 1e5), (1.0, 1.2e6), (2.0, 0.0)))
+    assert work_unit(growing) == 2.0**20
     assert _work_unit(0.0, 0.0, 0.0) == _work_unit(0.0, 0.0, 0.7) == _work_unit(0.0, 0.0, 1.5) == 1.0
     assert _work_unit(0.0, 0.0, 2.5) == 2.0

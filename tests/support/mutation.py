@@ -2,11 +2,12 @@
 
     python tests/support/mutation.py [GROUP...] [--only PATTERN] [--every N] [--jobs N]
 
-Each mutant lives in a process of its own, forked from one that has the engines loaded: there the package is imported
-anew with one function's text changed, a small set of scenes is computed and judged as `check` does it, and the first
-verdict that fails is told. A mutant that raises, or does not end in time, would leave a run that failed: `check` fails
-for that, too. What no run that is judged here can show (a turn missed between rows, the place of a quadrature's window)
-is put to a unit test of its own; the answer then begins with "test:".
+Each mutant lives in a process of its own, forked from one that has loaded the engines, the package and the tests: there
+one function gets its changed code, a small set of scenes is computed and judged as `check` does it, and the first
+verdict that fails is told. Where a constant is changed, or a function that was called while all that was loaded, the
+package is imported anew. A mutant that raises, or does not end in time, leaves a run that failed: `check` fails for
+that, too. What no run that is judged here can show (a turn missed between rows, the place of a quadrature's window) is
+put to a unit test of its own; the answer then begins with "test:".
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ import atexit
 import contextlib
 import copy
 import functools
+import gc
 import importlib
 import importlib.machinery
 import importlib.util
+import inspect
 import io
 import json
 import os
@@ -29,6 +32,8 @@ import shutil
 import sys
 import tempfile
 import time
+import types
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,6 +72,7 @@ class Mutant:
     scope: str
     what: str
     make: Callable[[], str]
+    line: int = 0  # the first of the function that is changed
 
     @property
     def name(self) -> str:
@@ -237,6 +243,7 @@ _RULES = (
     "solution/test_unchecked.py::test_a_start_turns_away_leaves_ten_units_in_its_last_place_open",
 )
 _CHECK = "studies/test_check.py::test_"
+_REFERENCE = "models/test_reference.py::test_"
 _TESTS = {
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
     f"{_M}.sensor_samples": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
@@ -260,16 +267,32 @@ _TESTS = {
         f"{_PITCH}work_of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
     ),
     "rotor_mbs.models.ode45": ("models/test_ode45.py",),
-    f"{_M}.schemes": (f"{_PARTS}counts_of_steps_and_evaluations",),
+    f"{_M}.schemes": (
+        f"{_PARTS}counts_of_steps_and_evaluations",
+        f"{_PARTS}an_implicit_scheme_has_accelerations_anyway",
+        f"{_PARTS}a_wrong_setting_is_told_with_what_is_allowed",
+    ),
     f"{_M}.methods": (
         f"{_PARTS}samples_the_engine_cannot_tell_apart_are_refused",
-        "models/test_loads.py::test_multipliers_of_rotation_vectors_are_refused",
+        f"{_PARTS}a_wrong_setting_is_told_with_what_is_allowed",
+        f"{_PARTS}an_implicit_scheme_has_accelerations_anyway",
+        f"{_PARTS}loads_and_rotation_vectors_are_refused_together_alone",
+        f"{_PARTS}rows_between_samples_are_kept_where_work_needs_them",
+        f"{_PARTS}a_scheme_that_chooses_its_steps_ends_one_at_every_sample",
         "models/test_extrapolation.py::test_steps_are_those_of_all_runs_and_fit_each_other",
     ),
     f"{_M}.adapter": (
         f"{_PARTS}counts_of_steps_and_evaluations",
         f"{_PARTS}a_solve_that_fails_is_counted_to_the_last_step_that_it_took",
         f"{_PARTS}samples_stand_exactly_at_their_times",
+        f"{_PARTS}a_row_stands_at_the_end_of_every_step_that_an_adaptive_scheme_takes",
+        f"{_PARTS}loads_at_the_start_are_those_of_the_start_whatever_intervals_follow",
+        f"{_PARTS}the_cause_of_a_failure_is_found_behind_others",
+        f"{_PARTS}a_hopeless_solve_ends_soon_and_says_so_in_one_line[exudyn_tree/dopri5]",
+        "solution/test_judgement.py::test_a_long_run_keeps_its_samples_when_ended[exudyn_tree/rk67]",
+        f"{_PARTS}a_scheme_that_chooses_its_steps_ends_one_at_every_sample",
+        "models/test_linearization.py::test_joint_forces_stiffen_the_chain",
+        "models/test_linearization.py::test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies[paper/fig08-0.0]",
         f"{_PARTS}ctrl_c_inside_a_solve_is_an_interrupt",
         "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization",
     ),
@@ -284,11 +307,23 @@ _TESTS = {
         "models/test_segments.py",
     ),
     f"{_L}.reference": (
+        f"{_REFERENCE}the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls",
+        f"{_REFERENCE}a_reference_that_fails_says_why_and_how_far_the_better_run_came",
+        f"{_REFERENCE}a_reference_has_loads_where_they_are_asked_for",
+        f"{_REFERENCE}a_pitch_that_is_fixed_has_no_growth_and_no_unit",
+        f"{_REFERENCE}amplification_of_a_stiff_oscillation_is_one",
+        f"{_REFERENCE}growth_is_known_as_far_as_the_variational_equations_went",
+        "studies/test_compare_data.py::test_growth_of_each_channel_is_at_most_that_of_all",
         "models/test_lagrange.py::test_the_fallback_reference_states_its_uncertainty",
         "studies/test_compare_data.py::test_the_reference_at_the_times_of_the_data_is_the_frozen_one",
     ),
     f"{_A}.exact": ("analysis/test_exact.py",),
-    f"{_A}.verdicts": (f"{_CHECK}a_tampered_run_fails", f"{_CHECK}a_touched_reference_in_the_file_fails"),
+    f"{_A}.verdicts": (
+        "analysis/test_verdicts.py",
+        f"{_CHECK}a_tampered_run_fails",
+        f"{_CHECK}a_touched_reference_in_the_file_fails",
+    ),
+    f"{_A}.run_integrity": ("analysis/test_run_integrity.py",),
     f"{_A}.trajectory_numbers": ("analysis/test_analysis.py",),
     f"{_A}.claims": ("analysis/test_analysis.py",),
 }
@@ -302,12 +337,14 @@ def mutants(target: Target) -> list[Mutant]:
     tree = ast.parse(_source(target.module))
     found = []
     for name, scope in _scopes(tree):
+        first = min(node.lineno for node in (scope, *getattr(scope, "decorator_list", ())))
+        line = first if isinstance(scope, ast.FunctionDef) else 0
         if name in target.names or target.names == ("*",):
             for number, (node, parents) in enumerate(_walk(scope)):
                 for what, change in _changes(node, parents, scope, target):
                     where = f"line {getattr(node, 'lineno', 0)}:{getattr(node, 'col_offset', 0)}: {what}"
                     source = functools.partial(_changed, tree, scope, number, change)
-                    found.append(Mutant(target.group, target.module, name, where, source))
+                    found.append(Mutant(target.group, target.module, name, where, source, line))
     return found
 
 
@@ -510,8 +547,8 @@ def _verdicts_of(group: str) -> Iterator[list[Any]]:
     if group in ("schemes", "ode45"):
         yield check.judge_defaults(load_bounds())
     kinds = {"rules": ("rules",), "reference": ("reference",), "lagrange": ("printed",), "printed": ("printed",)}
-    for probe in check_probes.probes():
-        if probe.study in kinds.get(group, ()) and probe.scene.name != "paper/fig11":
+    for probe in check_probes.probes() if group in kinds else ():
+        if probe.study in kinds[group] and probe.scene.name != "paper/fig11":
             for one in check_probes.measure(probe):
                 yield [check.judge_measured(one, load_bounds())]
     batches = {
@@ -547,16 +584,21 @@ def _verdicts_of(group: str) -> Iterator[list[Any]]:
 
 @functools.cache
 def _good_file() -> Path:
-    """Runs of every kind of verdict; made once, before the first mutant."""
+    folder = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, folder)
+    return folder / "good.h5"
+
+
+def _make_good_file() -> None:
+    """Runs of every kind of verdict."""
     from support.checking import results_file
 
-    path = Path(tempfile.mkdtemp()) / "good.h5"
-    atexit.register(shutil.rmtree, path.parent)
+    path = _good_file()
     results_file(path, ["check/held", "check/general", "check/pitch-loads", "check/loads"],
                  ["lagrange/dop853", "exudyn_tree/rk67"])  # fmt: skip
     results_file(path, ["paper/fig03", "paper/fig04b", "paper/fig05", "paper/fig06", "paper/fig15-100kNm"],
                  ["lagrange/dop853", "printed/ode45"])  # fmt: skip
-    return results_file(path, ["paper/fig11", "paper/fig13b"], ["printed/ode45"])
+    results_file(path, ["paper/fig11", "paper/fig13b"], ["printed/ode45"])
 
 
 class _Changed(importlib.machinery.SourceFileLoader):
@@ -583,24 +625,61 @@ class _Finder:
 
 def _forget(group: str) -> None:
     kept = _KEPT.get(group, _KEPT_ELSE)
-    for name in [name for name in sys.modules if name.startswith(("rotor_mbs.", "support."))]:
+    for name in [name for name in sys.modules if name.startswith(("rotor_mbs", "support.", "test_"))]:
         if not name.startswith(kept):
             del sys.modules[name]
 
 
+def _put_in_place(mutant: Mutant) -> None:
+    """The changed code into the function that is loaded, if nothing was made with it yet; else all is imported anew."""
+    function = _loaded_function(mutant)
+    if function is None or function.__code__ in _RUN_ALREADY:
+        _forget(mutant.group)
+        sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
+        return
+    old = function.__code__
+    code = compile(mutant.make(), old.co_filename, "exec")
+    (new,) = (one for one in _codes(code) if one.co_qualname == old.co_qualname)
+    function.__code__ = new
+
+
+def _loaded_function(mutant: Mutant) -> types.FunctionType | None:
+    own = vars(importlib.import_module(mutant.module))
+    members = [
+        *own.values(),
+        *(one for value in own.values() if isinstance(value, type) for one in vars(value).values()),
+    ]
+    for member in members:
+        for name in ("fget", "__func__", "func"):
+            member = getattr(member, name, member)
+        found = inspect.unwrap(member) if callable(member) else None
+        if isinstance(found, types.FunctionType) and (found.__module__, found.__code__.co_firstlineno) == (
+            mutant.module, mutant.line,
+        ):  # fmt: skip
+            return found
+    return None
+
+
+def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+    yield code
+    for one in code.co_consts:
+        if isinstance(one, types.CodeType):
+            yield from _codes(one)
+
+
 def _outcome(mutant: Mutant) -> str:
-    """Which verdict failed first, or which test; "" where none did."""
+    """Which verdict failed first, or which test; "" where none did. Of verdicts themselves the tests are quicker."""
+    _put_in_place(mutant)
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            return _verdict_that_fails(mutant) or _test_that_fails(mutant.module)
+            judges = (lambda: _verdict_that_fails(mutant.group)), (lambda: _test_that_fails(mutant.module))
+            return next(filter(None, (judge() for judge in judges[:: -1 if mutant.group == "analysis" else 1])), "")
     except BaseException as exc:
         return f"raised {type(exc).__name__}: {str(exc)[:60]}"
 
 
-def _verdict_that_fails(mutant: Mutant) -> str:
-    _forget(mutant.group)
-    sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
-    for verdicts in _verdicts_of(mutant.group):
+def _verdict_that_fails(group: str) -> str:
+    for verdicts in _verdicts_of(group):
         for verdict in verdicts:
             if not verdict.passed:
                 return f"{verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}"
@@ -618,11 +697,13 @@ class _FirstFailure:
     pytest_collectreport = pytest_runtest_logreport  # a module that cannot be imported
 
 
+_PYTEST = ("-q", "-x", "-p", "no:cacheprovider")
+
+
 def _test_that_fails(module: str) -> str:
     tests, first = [str(ROOT / "tests" / test) for test in _TESTS.get(module, ())], _FirstFailure()
-    if tests:
-        pytest.main(["-q", "-x", "-p", "no:cacheprovider", *tests], [first])
-    return f"test: {first.name}" if first.name else ""
+    failed = tests and pytest.main([*_PYTEST, *tests], [first])
+    return f"test: {first.name or 'interrupted'}" if failed else ""
 
 
 def _in_a_child(mutant: Mutant) -> tuple[int, int]:
@@ -633,22 +714,39 @@ def _in_a_child(mutant: Mutant) -> tuple[int, int]:
         os.close(write)
         return process, read
     resource.setrlimit(resource.RLIMIT_CPU, (_CPU_LIMIT_S, _CPU_LIMIT_S))
-    with os.fdopen(write, "w") as pipe:
-        pipe.write(_outcome(mutant) or "survived")
-    os._exit(0)
+    answer = _NOT_TRIED
+    try:
+        answer = _outcome(mutant) or "survived"
+    finally:
+        with os.fdopen(write, "w") as pipe:
+            pipe.write(answer)
+        os._exit(0)
 
 
-def prove_control(target: Target) -> None:
-    """Raises SystemExit where a module with its own text, imported anew like a mutant, does not pass every verdict."""
-    if target.group == "analysis":
-        _good_file()
-    unchanged = Mutant(target.group, target.module, "*", "unchanged", lambda: _source(target.module))
+_NOT_TRIED = "could not be put in place"
+
+
+def prove_control(group: str) -> None:
+    """Raises SystemExit where a group does not pass every verdict unchanged: as it is loaded, or imported anew."""
+    if group == "analysis" and (not _good_file() or not _in_order(_make_good_file)):
+        raise SystemExit("no file to judge")
+    own = {target.module: None for target in TARGETS if target.group == group}
+    unchanged = Mutant(group, next(iter(own)), "*", "unchanged", lambda: _source(next(iter(own))))
+    for prepare in (lambda: None, functools.partial(_put_in_place, unchanged)):
+        if not _in_order(lambda prepare=prepare: (prepare(), _verdict_that_fails(group))[1]):
+            raise SystemExit(f"{group}, unchanged, does not pass")
+
+
+def _in_order(act: Callable[[], Any]) -> bool:
+    """Whether `act` ends in a process of its own, without an answer."""
     process = os.fork()
-    if not process:
-        noticed = _verdict_that_fails(unchanged)
-        os._exit(bool(noticed))
-    if os.waitpid(process, 0)[1]:
-        raise SystemExit(f"{target.module}, imported anew and unchanged, does not pass")
+    if process:
+        return os.waitpid(process, 0)[1] == 0
+    status = 1
+    try:
+        status = int(bool(act()))
+    finally:
+        os._exit(status)
 
 
 def run(chosen: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
@@ -662,7 +760,10 @@ def run(chosen: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
         process, _ = os.wait()
         mutant, pipe = going.pop(process)
         with os.fdopen(pipe) as answer:
-            yield mutant, answer.read() or "did not end, or took its process with it"
+            noticed = answer.read() or "did not end, or took its process with it"
+        if noticed == _NOT_TRIED:
+            raise SystemExit(f"{mutant.name}: {noticed}")
+        yield mutant, noticed
 
 
 def all_mutants(groups: Sequence[str] = (), every: int = 1, only: str = "") -> list[Mutant]:
@@ -670,15 +771,27 @@ def all_mutants(groups: Sequence[str] = (), every: int = 1, only: str = "") -> l
     return [mutant for mutant in found if re.search(only, mutant.name)][::every]
 
 
-def warm_up() -> None:
-    """Loads the engines and what else is not imported anew."""
+_RUN_ALREADY: set[types.CodeType] = set()
+
+
+def warm_up(modules: Sequence[str]) -> None:
+    """Loads what mutants are judged with, and notes which functions that has called."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
-    for name in (
-        "rotor_mbs.models.exudyn.adapter", "mujoco", "heyoka", "scipy.integrate", "scipy.special", "h5py",
-        "rotor_mbs.scenario.schema", "rotor_mbs.scenario.scene_file",
-    ):  # fmt: skip
+    os.environ["XDG_CACHE_HOME"] = str(ROOT / ".pytest_cache" / "compiled")  # as in conftest.py
+    for name in ("exudyn", "mujoco", "heyoka", "scipy.integrate", "scipy.special", "h5py"):
         if importlib.util.find_spec(name):
             importlib.import_module(name)
+    sys.setprofile(lambda frame, event, _: _RUN_ALREADY.add(frame.f_code) if event == "call" else None)
+    for name in ("support.checking", *dict.fromkeys(target.module for target in TARGETS)):
+        importlib.import_module(name)
+    sys.modules["rotor_mbs.execution.provenance"].versions()
+    sys.modules["rotor_mbs.studies.stored_references"].frozen_file("")
+    tests = [str(ROOT / "tests" / test) for module in modules for test in _TESTS.get(module, ())]
+    with contextlib.redirect_stdout(io.StringIO()):
+        if tests and pytest.main([*_PYTEST, "--collect-only", *tests]):
+            raise SystemExit("a test that mutants are judged by is not there")
+    sys.setprofile(None)
+    gc.freeze()  # else every child's collections go through all of it
 
 
 def main() -> None:
@@ -689,20 +802,22 @@ def main() -> None:
     parser.add_argument("--only", default="", metavar="PATTERN", help="those alone whose name has it")
     arguments = parser.parse_args()
     start = time.monotonic()
-    warm_up()
     chosen = all_mutants(arguments.groups, arguments.every, arguments.only)
+    warm_up(list(dict.fromkeys(mutant.module for mutant in chosen)))
     for group in dict.fromkeys(mutant.group for mutant in chosen):
-        prove_control(next(target for target in TARGETS if target.group == group))
-    rows = []
+        prove_control(group)
+    ways: Counter[str] = Counter()
     for mutant, noticed in run(chosen, arguments.jobs):
-        rows.append({"mutant": mutant.name, "group": mutant.group, "noticed": noticed})
-        if noticed == "survived":
-            print(f"survived: {mutant.name}", file=sys.stderr, flush=True)
-    survived = sum(row["noticed"] == "survived" for row in rows)
-    tested = sum(row["noticed"].startswith("test:") for row in rows)
-    seconds = time.monotonic() - start
-    print(f"{len(rows)} mutants, {tested} seen by a test alone, {survived} survived; {seconds:.0f} s", file=sys.stderr)
-    json.dump(rows, sys.stdout, indent=1)
+        print(json.dumps({"mutant": mutant.name, "group": mutant.group, "noticed": noticed}), flush=True)
+        ways[noticed.split(":")[0].split()[0]] += 1
+    by_verdict = len(chosen) - sum(ways[way] for way in ("test", "survived", "raised", "did"))
+    cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    print(
+        f"{len(chosen)} mutants: {by_verdict} made a verdict fail, {ways['raised']} raised, {ways['did']} did not end, "
+        f"{ways['test']} made a test alone fail, {ways['survived']} survived; "
+        f"{time.monotonic() - start:.0f} s, {cpu:.0f} s of processor time",
+        file=sys.stderr,
+    )
 
 
 if __name__ == "__main__":

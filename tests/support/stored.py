@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.errors import StoreError
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.solution import Solution
@@ -88,3 +89,21 @@ def rotor(curve: Callable[[Any], Any], *pitches: Callable[[Any], Any]) -> Curve:
     """Angles of the rotor and of as many pitches as are given; the rest are zero, for three blades."""
     curves = [curve, *pitches] + [np.zeros_like] * (3 - len(pitches))
     return lambda time: np.stack([one(time) for one in curves], axis=1)
+
+
+class Arrays:
+    """Arrays by name in place of a stored run; None is one that cannot be read."""
+
+    def __init__(
+        self, method: str, status: str = "ok", attributes: Any = (), settings: Any = (), **arrays: Any
+    ) -> None:
+        self.scene, self.method, self.status, self.arrays = "scene", method, status, arrays
+        self.attributes, self.settings = dict(attributes), dict(settings)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.arrays
+
+    def array(self, name: str) -> Any:
+        if self.arrays[name] is None:
+            raise StoreError(f"{name} changed after it was written")
+        return self.arrays[name]

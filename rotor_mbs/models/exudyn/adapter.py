@@ -155,7 +155,7 @@ class System:
             if failure:
                 break
             data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
-            settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, interval.end - interval.start)
+            settings.timeIntegration.initialStepSize = solver.it.currentStepSize
         return total
 
     def _find_initial_accelerations(self) -> None:
@@ -166,7 +166,7 @@ class System:
             solver.InitializeSolver(self._mbs, settings)
             for name in self._of_accelerations:
                 values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
-                self._initial_values[name] = np.array(values, dtype=float, ndmin=1)
+                self._initial_values[name] = np.array(values, dtype=float)
             solver.FinalizeSolver(self._mbs, settings)
 
     def _solve(self, solver: Any, settings: Any) -> str:

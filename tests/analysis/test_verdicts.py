@@ -1,0 +1,315 @@
+"""Verdicts by hand: an array that is off by a known number gives the value that follows from it, and no other one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from support.references import reference
+from support.scenes import general, paper
+from support.stored import Arrays, Made, rotor, store
+
+from rotor_mbs.analysis import verdicts
+from rotor_mbs.analysis.rehydrate import Rehydrated
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.judgement import energy_slack, start_slack
+from rotor_mbs.solution.metrics import energy_scale, metrics_of
+from rotor_mbs.solution.quantities import Quantity, QuantityMetric
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store.read import open_results
+
+METHOD, BOUNDS = "lagrange/dop853", load_bounds()
+
+
+def stored(method: str = METHOD, **more: Any) -> Any:
+    return Arrays(method, **more)
+
+
+def run_of(**changes: Any) -> Solution:
+    return solve(METHOD, general(duration=0.2, samples=5, **changes), {})
+
+
+def values(found: Any) -> dict[tuple[str, str], float]:
+    return {(one.check, one.channel): one.value for one in found}
+
+
+def of_samples(run: Solution) -> dict[tuple[str, str], float]:
+    return values(verdicts._of_samples(stored(), BOUNDS, run.scene, run))
+
+
+def test_right_samples_are_off_by_rounding_alone() -> None:
+    found = of_samples(run_of(bearing_stiffness=(), initial_rates=(0.0,) * 4))
+    assert set(found) == {
+        ("times", "time"), ("start", "angles, rates"), ("tip", "tip"), ("energies", "kinetic energy"),
+        ("energies", "potential energy"), ("energies", "work"), ("energies", "work at the start"),
+    }  # fmt: skip
+    assert max(found.values()) < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("array", "place", "off", "channel", "size"),
+    [
+        ("time", 3, 1e-3, ("times", "time"), 0.2),
+        ("angles", (0, 2), 1e-3, ("start", "angles, rates"), 5.0),
+        ("rates", (0, 3), 1e-3, ("start", "angles, rates"), 5.0),
+        ("tip", (4, 1, 2), 1e-3, ("tip", "tip"), 11.5),
+        ("energy_error", 2, 1.0, ("energies", "energy error"), None),
+        ("kinetic_energy", 2, 1.0, ("energies", "kinetic energy"), None),
+        ("potential_energy", 2, 1.0, ("energies", "potential energy"), None),
+        ("work", 0, 1.0, ("energies", "work at the start"), None),
+        ("work", 3, 1.0, ("energies", "work"), None),
+    ],
+)
+def test_a_sample_off_is_seen_in_its_channel(array: str, place: Any, off: float, channel: Any, size: float) -> None:
+    """Relative to the duration, to the largest start (5 rad), to the longest tip, or to the scene's energy."""
+    tips = [
+        replace(blade, tip=(0.0, 0.0, length)) for blade, length in zip(general().blades, (9.0, 11.5, 3.0), strict=True)
+    ]
+    run = run_of(initial_angles=(5.0, 0.2, -0.4, 0.6), rotor_torque=((0.0, 30.0),), blades=tuple(tips))
+    run.trajectory.energy_error = verdicts.energy_error(run.trajectory)
+    before = of_samples(run)
+    getattr(run.trajectory, array)[place] += off
+    if array not in ("energy_error", "tip", "time"):
+        run.trajectory.energy_error = verdicts.energy_error(run.trajectory)
+    after = of_samples(run)
+    size = size or max(energy_scale(run.scene, run.trajectory), float(run.trajectory.kinetic_energy.max()))
+    assert after[channel] == pytest.approx(off / size, rel=1e-6)
+    assert before[channel] < 1e-6 * after[channel]
+
+
+def test_what_a_scene_does_not_ask_for_is_not_judged() -> None:
+    assert set(of_samples(run_of(outputs=("rates",)))) == {("times", "time")}
+    assert set(of_samples(run_of(outputs=("angles",)))) == {("times", "time"), ("start", "angles, rates")}
+    damped = of_samples(run_of(outputs=("angles", "rates", "energy"), shaft_damping=1.0))  # no function of the angles
+    assert ("energies", "work") not in damped
+    assert damped["energies", "work at the start"] == 0.0
+    without_rates = of_samples(run_of(outputs=("angles", "energy")))
+    assert {channel for check, channel in without_rates if check == "energies"} <= {"energy error"}
+
+
+def test_the_rate_of_a_pitch_without_inertia_is_no_start() -> None:
+    scene = paper("fig04b", initial_rates=(0.0, 7.0), duration=0.2, samples=3)
+    assert not scene.blades[0].has_pitch_inertia
+    assert of_samples(solve(METHOD, scene, {}))["start", "angles, rates"] == 0.0
+
+
+def test_energies_of_rest_are_absolute() -> None:
+    """Without weight and motion there is no scale; without a tip no length."""
+    blades = tuple(replace(blade, tip=(0.0, 0.0, 0.0)) for blade in general().blades)
+    run = run_of(gravity=0.0, bearing_stiffness=(), initial_rates=(0.0,) * 4, blades=blades)
+    assert energy_scale(run.scene, run.trajectory) == 0.0
+    run.trajectory.energy_error = np.array([0.0, 3.0, 0.0, 0.0, 0.0])
+    run.trajectory.tip[2, 1, 0] += 2.0
+    found = of_samples(run)
+    assert (found["energies", "energy error"], found["tip", "tip"]) == (3.0, 2.0)
+
+
+def of_model(run: Solution, scene: Scene, bounds: Any = BOUNDS) -> dict[tuple[str, str], float]:
+    found = Rehydrated(scene, run, reference("paper/fig11"), [])
+    return values(verdicts._of_corrected_model(stored(), bounds, found, run.trajectory))
+
+
+def test_numbers_of_a_model_are_its_metrics_less_what_its_start_leaves_open() -> None:
+    """Whole turns away and past π/2 in pitch, digits are lost that no model has."""
+    scene = paper("fig11", duration=0.5, samples=51)
+    run = solve(METHOD, scene, {})
+    run.trajectory.angles[20, 1] += 1e-3
+    run.trajectory.kinetic_energy[30] += 1e3
+    away = replace(scene, initial_angles=(scene.initial_angles[0] + 1e7 * np.pi, *scene.initial_angles[1:]))
+    for one in (scene, away):
+        metrics, found = metrics_of(one, run.trajectory, reference("paper/fig11")), of_model(run, one)
+        assert found["agreement", "angles"] == pytest.approx(metrics["angle_error_per_growth"] - start_slack(one))
+        drift = metrics["energy_drift_max"] - energy_slack(one, run.trajectory)
+        assert found["energy", "balance"] == pytest.approx(drift, rel=1e-12)
+        assert found["impulse", "angular"] == metrics["angular_impulse_error_max"]
+    assert 0.0 < start_slack(away) < found["agreement", "angles"]
+    assert ("horizon", "angles") not in found
+    assert of_model(run, scene, BOUNDS.for_scene("paper/fig11")).get(("horizon", "angles")) in (None, 1e-3)
+    assert of_model(run, replace(scene, outputs=("rates",))).keys() & {("agreement", "angles"), ("exact", "x")} == set()
+
+
+def test_slacks_are_not_given_back_below_zero() -> None:
+    scene = paper("fig11", duration=0.1, samples=11)
+    away = replace(scene, initial_angles=(scene.initial_angles[0] + 1e9 * np.pi, *scene.initial_angles[1:]))
+    found = of_model(solve(METHOD, scene, {}), away)
+    assert found["agreement", "angles"] == found["energy", "balance"] == 0.0
+
+
+def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
+    scene = paper("fig03", duration=0.5, samples=51)
+    run = solve(METHOD, scene, {})
+    run.trajectory.angles[7, 0] += 1e-3
+    found = Rehydrated(scene, run, None, [])
+    judged = values(verdicts._of_corrected_model(stored(), BOUNDS, found, run.trajectory))
+    assert judged["exact", "rotor angle"] == pytest.approx(1e-3, rel=1e-6)
+    blind = replace(found, scene=replace(scene, outputs=("rates", "energy")))
+    judged = values(verdicts._of_corrected_model(stored(), BOUNDS, blind, run.trajectory))
+    assert ("exact", "rotor angle") not in judged
+
+
+@pytest.mark.parametrize(
+    ("method", "status", "motion_ends", "has_run", "complete"),
+    [
+        (METHOD, "ok", True, True, 1.0),  # says that it got to the end
+        (METHOD, "singular", True, True, 0.0),
+        (METHOD, "singular", False, True, 1.0),
+        ("printed/ode45", "diverged", False, True, 0.0),
+        ("printed/ode45", "diverged", False, False, 1.0),  # arrays that cannot be used are no early end
+    ],
+)
+def test_an_early_end_is_excused_where_the_motion_ends(
+    method: str, status: str, motion_ends: bool, has_run: bool, complete: float
+) -> None:
+    run = replace(run_of(), method=method)
+    one, faults = stored(method, status=status, attributes={"message": "over π/2"}), ["angles has 4 rows, not 5"]
+    found = Rehydrated(run.scene, run if has_run else None, None, faults)
+    given = list(verdicts._of_run(one, BOUNDS, found, motion_ends))
+    assert values(given)["complete", "all"] == complete
+    assert (f"stored as {status}: over π/2" in given[0].look_at) == (complete == 1.0 and status != "ok")
+    assert ("stored as" in given[0].look_at) == (complete == 1.0 and status != "ok")
+    assert (len(given) > 1) == has_run
+    assert (("energy", "balance") in values(given)) == (has_run and method == METHOD)
+
+
+def test_a_run_without_samples_has_none_judged() -> None:
+    run = run_of()
+    run.trajectory.time = run.trajectory.time[:0]
+    given = values(verdicts._of_run(stored(status="diverged"), BOUNDS, Rehydrated(run.scene, run, None, []), False))
+    assert set(given) == {("complete", "all"), ("status", "status"), ("settings", "settings")}
+
+
+@pytest.mark.parametrize(
+    ("status", "claimed", "faults"), [("ok", 0, 1), ("unchecked", 0, 0), ("unchecked", 1, 1), ("ok", 1, 2)]
+)
+def test_a_status_and_a_claim_are_a_fault_each(status: str, claimed: int, faults: int) -> None:
+    run = run_of(outputs=("angles",))  # nothing to compare it with
+    one, found = stored(status=status, attributes={"false_success": claimed}), Rehydrated(run.scene, run, None, [])
+    judged = verdicts._status(one, BOUNDS, found, run)
+    assert judged.value == faults
+    assert ("the engine's claim of success is not false" in judged.look_at) == bool(claimed)
+
+
+def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
+    scene: Any = SimpleNamespace(name="scene", reference=own)
+    return values(verdicts._of_reference(scene, shipped, BOUNDS))
+
+
+def test_a_reference_is_compared_with_the_shipped_one() -> None:
+    two = np.array([[1.0, 4.0], [0.5, -8.0]])
+    shipped = stored(
+        REFERENCE, angles=two, rates=two, error_growth=np.array([1.0, 0.0, np.inf, 8.0]), angle_uncertainty=np.ones(2)
+    )
+    assert list(of_reference(shipped, shipped).values()) == [0.0] * 4
+    own = stored(
+        REFERENCE,
+        angles=two + np.array([[0.25, 0.0], [0.0, 1.0]]),  # of at least 1 rad: 0.25; of 8 rad: 0.125
+        rates=two[:1],
+        error_growth=np.array([np.e, 1.0, 1.0, 8.0]),
+        angle_uncertainty=np.array([np.exp(-3.0), 1.0]),
+    )
+    found = of_reference(own, shipped)
+    assert found["reference", "angles"] == 0.25
+    assert np.isnan(found["reference", "rates"])
+    assert found["growth", "error growth"] == pytest.approx(1.0)
+    assert found["uncertainty", "angle uncertainty"] == pytest.approx(3.0)
+    assert np.isnan(of_reference(stored(REFERENCE, angles=two), shipped)["growth", "error growth"])
+    whole = of_reference(stored(REFERENCE, angles=two.astype(int), error_growth=np.ones(4, int)), shipped)
+    assert np.isnan([whole["reference", "angles"], whole["growth", "error growth"]]).all()
+    assert ("reference", "rates") not in whole
+    assert set(of_reference(own, stored(REFERENCE, angles=two, rates=two))) == {
+        ("reference", "angles"),
+        ("reference", "rates"),
+    }
+    assert of_reference(own, None) == {}
+    assert np.isnan(of_reference(None, shipped)["reference", "all"])
+    empty = stored(REFERENCE, angles=np.empty((0, 2)), rates=np.empty((0, 2)), error_growth=np.empty(0))
+    assert set(of_reference(empty, empty).values()) == {0.0}
+
+
+@pytest.mark.parametrize(
+    ("status", "arrays", "ends"), [("singular", {"time": 1}, True), ("ok", {"time": 1}, False), ("singular", {}, False)]
+)
+def test_the_motion_ends_where_the_reference_does(status: str, arrays: Any, ends: bool) -> None:
+    assert verdicts._motion_ends(SimpleNamespace(reference=stored(REFERENCE, status=status, **arrays))) is ends
+    assert not verdicts._motion_ends(SimpleNamespace(reference=None))
+
+
+BENT = np.sin(np.linspace(0.0, 3.0, 100))[:, None] * [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("runs", "found"),
+    [
+        ({"a": BENT}, {}),
+        ({"a": BENT, "b": BENT + 1e-9}, {("copied", "all"): 0.0}),
+        ({METHOD: BENT, "b": BENT}, {("copied", "angles 1"): 1.0}),
+        ({"a": BENT, "b": None}, {}),  # one that cannot be read fails elsewhere
+    ],
+)
+def test_copies_are_a_verdict_each(runs: dict[str, Any], found: dict[tuple[str, str], float]) -> None:
+    scene: Any = SimpleNamespace(
+        name="scene", runs={name: stored(name, angles=angles) for name, angles in runs.items()}
+    )
+    assert values(verdicts._copies(scene, BOUNDS)) == found
+
+
+def test_damage_is_told_by_its_parts() -> None:
+    assert [verdicts._integrity("s", METHOD, parts, BOUNDS).value for parts in ((), ("angles",), ("angles", "x"))] == [
+        0,
+        1,
+        2,
+    ]
+    assert verdicts._integrity("s", METHOD, (), BOUNDS).look_at == "as written"
+    assert "angles, x changed" in verdicts._integrity("s", METHOD, ("angles", "x"), BOUNDS).look_at
+    assert "no digests" in verdicts._integrity("s", METHOD, (verdicts.DIGESTS,), BOUNDS).look_at
+
+
+@pytest.mark.parametrize(
+    ("value", "passed", "margin"),
+    [(0.5, True, 4.0), (2.0, True, 1.0), (2.1, False, 2.0 / 2.1), (0.0, True, np.inf), (np.nan, False, 0.0)],
+)
+def test_the_margin_is_bound_over_value(value: float, passed: bool, margin: float) -> None:
+    one = verdicts.Verdict("energy", "s", "m", "c", value, 2.0, "J", "")
+    assert (one.passed, one.margin) == (passed, pytest.approx(margin))
+
+
+def test_the_papers_numbers_are_judged_of_the_printed_equations_alone(tmp_path: Path) -> None:
+    """Of the rotor's 2.7315 rad, in units of the last digit."""
+    fig11 = paper("fig11", samples=501)
+    runs = [
+        Made(fig11, REFERENCE, rotor(np.zeros_like)),
+        Made(fig11, "printed/ode45", rotor(lambda t: 2.7313 * np.sin(np.pi * t / 10.0))),
+    ]
+    for count, expected in ((1, []), (2, [2.0])):
+        with open_results(store(tmp_path / f"{count}.h5", runs[:count])) as results:
+            assert [one.value for one in verdicts._of_paper(results, BOUNDS)] == pytest.approx(expected)
+
+
+def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:
+    made = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), REFERENCE, rotor(np.zeros_like))])
+    with open_results(made) as results, open_results(reference_folder() / "paper.h5") as shipped:
+        found = {one.check for one in verdicts.verdicts(results, [shipped], BOUNDS)}
+    assert "complete" in found
+    assert not found & {"reference", "growth", "uncertainty"}
+
+
+def test_a_quantity_is_told_by_its_rule_or_by_its_own_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    quantity = Quantity("lift", ("time",), "N", "force upwards")
+    bare = QuantityMetric("lift_error", bound=2.0)
+    full = QuantityMetric("lift_error", bound=2.0, check="gap", channel="up", unit="kN", look_at="the wing")
+    none = QuantityMetric("lift_error", check="nothing", bound=None)
+    monkeypatch.setattr(verdicts, "quantity_errors", lambda *_: [(quantity, rule, 0.5) for rule in (bare, full, none)])
+    found = list(verdicts._of_quantities(stored(), BOUNDS, general(), {}))
+    assert [(one.check, one.channel, one.unit, one.look_at) for one in found] == [
+        ("lift", "lift", "N", "force upwards"),
+        ("gap", "up", "kN", "the wing"),
+    ]
+    assert (found[0].value, found[0].bound) == (0.5, 2.0)
