@@ -623,8 +623,9 @@ class _Finder:
         return importlib.util.spec_from_file_location(name, place, loader=_Changed(name, place, self._mutant.make()))
 
 
-def _forget(group: str) -> None:
-    kept = _KEPT.get(group, _KEPT_ELSE)
+def _forget(mutant: Mutant) -> None:
+    kept = _KEPT.get(mutant.group, _KEPT_ELSE)
+    kept = _KEPT_ELSE[:1] if mutant.module.startswith(kept) else kept
     for name in [name for name in sys.modules if name.startswith(("rotor_mbs", "support.", "test_"))]:
         if not name.startswith(kept):
             del sys.modules[name]
@@ -634,7 +635,7 @@ def _put_in_place(mutant: Mutant) -> None:
     """The changed code into the function that is loaded, if nothing was made with it yet; else all is imported anew."""
     function = _loaded_function(mutant)
     if function is None or function.__code__ in _RUN_ALREADY:
-        _forget(mutant.group)
+        _forget(mutant)
         sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
         return
     old = function.__code__

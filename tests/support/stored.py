@@ -103,6 +103,9 @@ class Arrays:
     def __contains__(self, name: str) -> bool:
         return name in self.arrays
 
+    def get(self, name: str) -> Any:
+        return self.arrays.get(name)
+
     def array(self, name: str) -> Any:
         if self.arrays[name] is None:
             raise StoreError(f"{name} changed after it was written")
