@@ -219,6 +219,16 @@ LOADS = (
     ),
 )  # fmt: skip
 
+
+def named_loads(
+    roots: Iterable[tuple[Array, Array]], shaft_force: Array, shaft_moment: Array, actuators: Array
+) -> dict[str, Array]:
+    """The arrays of `LOADS` by name, from force and moment at the root of each blade; all (n, 3) but actuators."""
+    forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
+    arrays = forces, moments, shaft_force, shaft_moment, actuators
+    return {load.name: np.asarray(values, dtype=float) for load, values in zip(LOADS, arrays, strict=True)}
+
+
 BUILT_IN = (
     Quantity("angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"),
     Quantity("rates", ("time", "coordinate"), "rad/s", "rotor rate and pitch rates", "rates"),

@@ -15,6 +15,7 @@ from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, fixed_blade_rota
 from rotor_mbs.models.exudyn.moments import ROTOR, is_driven
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, values_before
+from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
 
 # (name of a sensor) -> (samples, k) values
@@ -66,13 +67,8 @@ def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: 
     actuators = np.zeros((len(time), len(blades)))
     for i in pitching(scene):
         actuators[:, i] = blades[i][1][:, 2]
-    return {
-        "blade_root_force": np.stack([force for force, _, _ in blades], axis=1),
-        "blade_root_moment": np.stack([moment for _, moment, _ in blades], axis=1),
-        "shaft_force": np.asarray(shaft_force),
-        "shaft_moment": shaft_moment,
-        "pitch_actuator_moment": actuators,
-    }
+    roots = ((force, moment) for force, moment, _ in blades)
+    return named_loads(roots, np.asarray(shaft_force), shaft_moment, actuators)
 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
@@ -128,13 +124,7 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
     force, moment = _joint_reaction("shaft bearing", ground, hub @ ALONG_SHAFT, sampled)
     if scene.shaft_damping:
         moment[:, 1] -= sampled("shaft damper torque")[:, 0]
-    return {
-        "blade_root_force": np.stack([force for force, _ in roots], axis=1),
-        "blade_root_moment": np.stack([moment for _, moment in roots], axis=1),
-        "shaft_force": force,
-        "shaft_moment": moment,
-        "pitch_actuator_moment": actuators,
-    }
+    return named_loads(roots, force, moment, actuators)
 
 
 def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> tuple[Array, Array]:

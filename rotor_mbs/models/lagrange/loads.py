@@ -17,6 +17,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import quad_arithmetic
 from rotor_mbs.models.lagrange.parameters import Convert, load_segments, phase_of, rotor_form
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import values_before
+from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array, all_coordinates
 
 # (n,) or (n, 3) numbers of one kind: doubles, or quad numbers as objects.
@@ -53,26 +54,17 @@ def _loads(
         (stiffness, damping), torque, rest = scene.bearing(column - 1), applied[i], applied[len(moving) - 1 + i]
         actuators[:, column - 1] = torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
-    forces, moments, in_base = [], [], []
+    roots, in_base = [], []
     for i, blade in enumerate(scene.blades):
         cos_phase, sin_phase = map(convert, phase_of(i, len(scene.blades)))
         azimuth = sin_q * cos_phase + cos_q * sin_phase, cos_q * cos_phase - sin_q * sin_phase
         pitch = sin(angles[:, 1 + i]), cos(angles[:, 1 + i])
         turning = rates[:, 0], rates[:, 1 + i], accelerations[:, 0], accelerations[:, 1 + i]
-        force, moment = root_load(blade, azimuth, pitch, turning, scene.gravity)
-        forces.append(force)
-        moments.append(moment)
-        in_base.append([_in_base_frame(vectors, azimuth, pitch) for vectors in (force, moment)])
+        roots.append(root_load(blade, azimuth, pitch, turning, scene.gravity))
+        in_base.append([_in_base_frame(vectors, azimuth, pitch) for vectors in roots[-1]])
     shaft_force, shaft_moment = (sum(vectors) for vectors in zip(*in_base, strict=True))
     shaft_moment[:, 1] += scene.hub_inertia * accelerations[:, 0] - applied[0]
-    quantities = {
-        "blade_root_force": np.stack(forces, axis=1),
-        "blade_root_moment": np.stack(moments, axis=1),
-        "shaft_force": shaft_force,
-        "shaft_moment": shaft_moment,
-        "pitch_actuator_moment": actuators,
-    }
-    return {name: np.asarray(values, dtype=float) for name, values in quantities.items()}
+    return named_loads(roots, shaft_force, shaft_moment, actuators)
 
 
 def root_load(

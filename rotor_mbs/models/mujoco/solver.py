@@ -14,6 +14,7 @@ from rotor_mbs.models.mujoco.adapter import Engine, Poses
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
 from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
+from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import (
     Array,
     Integration,
@@ -135,18 +136,13 @@ class MujocoSolver:
     def _loads(self, poses: Poses, values: Array) -> dict[str, Array]:
         """What each body's parent does to it; the moment of an actuator is the part about the pitch axis."""
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
-        in_frame = [np.einsum("nbij,nbi->nbj", poses.frame, vectors)[:, 1:] for vectors in (force, moment)]
+        roots = [np.einsum("nbij,nbi->bnj", poses.frame, vectors)[1:] for vectors in (force, moment)]
         shaft_moment = moment[:, 0].copy()
         if self._scene.has_torque:
             shaft_moment[:, 1] -= values[:, 0]  # the first of `mjcf.loads_of`
         pitching = np.isin(np.arange(1, 1 + len(self._scene.blades)), self._moving)
-        return {
-            "blade_root_force": in_frame[0],
-            "blade_root_moment": in_frame[1],
-            "shaft_force": force[:, 0],
-            "shaft_moment": shaft_moment,
-            "pitch_actuator_moment": np.where(pitching, in_frame[1][:, :, 2], 0.0),
-        }
+        actuators = np.where(pitching, roots[1][:, :, 2].T, 0.0)
+        return named_loads(zip(*roots, strict=True), force[:, 0], shaft_moment, actuators)
 
     def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
         """(n,) J of the actuators, less what the dampers took; from rows of rad, rad/s, rad/s², (n, loads) N m or rad.

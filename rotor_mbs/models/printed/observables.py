@@ -16,6 +16,7 @@ import numpy as np
 from rotor_mbs.models.printed import matrices
 from rotor_mbs.models.printed.matrices import CORRECTED
 from rotor_mbs.scenario.time_table import Segment, Table, segments
+from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
 
 # Gauss's three points in [0, 1]: exact to degree five, so for a quartic interpolant.
@@ -86,13 +87,8 @@ class PointMassRotor:
             shaft_force += force
             shaft_moment += np.cross(place, force)
         shaft_moment[:, 1] -= torque
-        return {
-            "blade_root_force": np.stack(forces, axis=1),
-            "blade_root_moment": np.stack(moments, axis=1),
-            "shaft_force": shaft_force,
-            "shaft_moment": shaft_moment,
-            "pitch_actuator_moment": np.stack([moment[:, 2] for moment in moments], axis=1),
-        }
+        actuators = np.stack([moment[:, 2] for moment in moments], axis=1)
+        return named_loads(zip(forces, moments, strict=True), shaft_force, shaft_moment, actuators)
 
     def _acceleration(self, sines: tuple[Array, Array, Array, Array], rates: Array, accelerations: Array) -> Array:
         """(n, 3) m/s² of the mass: the last columns of (8), (9), (16)-(19), E1 and E2 corrected."""
