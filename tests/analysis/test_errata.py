@@ -13,7 +13,7 @@ import pytest
 
 from rotor_mbs.models.printed import entries, literal, matrices
 from rotor_mbs.models.printed.errata import NAMES, TOLERANCE, check_errata, random_states
-from rotor_mbs.models.printed.symbols import Symbol
+from rotor_mbs.models.symbols import Symbol
 
 REFERENCE = Path(__file__).parents[2] / "reference" / "errata.toml"
 

@@ -5,65 +5,13 @@ The closed form takes numbers of any kind; here a number is a piece of text. Imp
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
 from string import Template
 
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.parameters import load_segments, load_tables, rotor_form
+from rotor_mbs.models.symbols import CodeSymbol
 from rotor_mbs.scenario.scene import Scene
-
-
-class _Term:
-    """A piece of an expression: its text, and its value where it is a constant. Zeros and ones vanish from products."""
-
-    def __init__(self, text: str, value: float | None = None) -> None:
-        self.text, self.value = text, value
-
-    def __add__(self, other: object) -> _Term:
-        return _joined(self, "+", _term(other))
-
-    def __radd__(self, other: object) -> _Term:
-        return _joined(_term(other), "+", self)
-
-    def __sub__(self, other: object) -> _Term:
-        return _joined(self, "-", _term(other))
-
-    def __mul__(self, other: object) -> _Term:
-        return _product(self, _term(other))
-
-    def __rmul__(self, other: object) -> _Term:
-        return _product(_term(other), self)
-
-
-def _term(value: object) -> _Term:
-    return value if isinstance(value, _Term) else _constant(float(value))  # type: ignore[arg-type]
-
-
-def _constant(value: float | Fraction) -> _Term:
-    number = float(value)
-    return _Term(repr(number) if math.copysign(1.0, number) > 0.0 else f"({number!r})", number)
-
-
-def _joined(one: _Term, sign: str, other: _Term) -> _Term:
-    if one.value is not None and other.value is not None:
-        return _constant(one.value + other.value if sign == "+" else one.value - other.value)
-    if other.value == 0.0:
-        return one
-    if one.value == 0.0 and sign == "+":
-        return other
-    return _Term(f"({one.text} {sign} {other.text})")
-
-
-def _product(one: _Term, other: _Term) -> _Term:
-    if one.value is not None and other.value is not None:
-        return _constant(one.value * other.value)
-    if 0.0 in (one.value, other.value):
-        return _constant(0.0)
-    if one.value == 1.0:
-        return other
-    return one if other.value == 1.0 else _Term(f"{one.text}*{other.text}")
 
 
 def sympy_text(scene: Scene) -> str:
@@ -73,15 +21,15 @@ def sympy_text(scene: Scene) -> str:
     the kinetic and potential energy T and V (J), the torque tau (N m) over time t (s), the generalized forces Q (N m)
     of torques and dampers, the mass matrix M and the right-hand side f by Lagrange's equations, and the initial state.
     """
-    form = rotor_form(scene, _constant)
+    form = rotor_form(scene)
     moving = scene.moving_coordinates
-    q, w = ([_Term(f"{name}{i}") for i in moving] for name in "qw")
+    q, w = ([CodeSymbol(f"{name}{i}") for i in moving] for name in "qw")
     tables = load_tables(scene)
     names = ["tau", *(f"tau{i}" for i in moving[1:]), *(f"rest{i}" for i in moving[1:])]
-    values = [_Term(name) if table else _constant(0.0) for name, table in zip(names, tables, strict=True)]
-    loads = load_values([_Term("tau"), *values[1:]])
+    values = [CodeSymbol(name) if table else 0.0 for name, table in zip(names, tables, strict=True)]
+    loads = load_values([CodeSymbol("tau"), *values[1:]])
     kinetic, potential = closed_form.energies(
-        q, w, form, loads, lambda x: _Term(f"sin({x.text})"), lambda x: _Term(f"cos({x.text})")
+        q, w, form, loads, lambda x: CodeSymbol(f"sin({x})"), lambda x: CodeSymbol(f"cos({x})")
     )
     dampings = [form.shaft_damping, *(blade.damping for blade in form.blades)]
     moments = [loads.rotor, *loads.pitches]
@@ -94,9 +42,9 @@ def sympy_text(scene: Scene) -> str:
         q=", ".join(f"q{i}" for i in moving),
         w=", ".join(f"w{i}" for i in moving),
         loads="\n".join(f"{name} = {_over_time(scene, i)}" for i, name in enumerate(names) if i == 0 or tables[i]),
-        kinetic=kinetic.text,
-        potential=potential.text,
-        forces=", ".join(force.text for force in forces),
+        kinetic=kinetic,
+        potential=potential,
+        forces=", ".join(map(str, forces)),
         initial_angles=[float(scene.initial_angles[i]) for i in moving],
         initial_rates=[float(scene.initial_rates[i]) for i in moving],
         duration=repr(float(scene.duration)),

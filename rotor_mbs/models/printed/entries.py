@@ -17,7 +17,7 @@ import numpy as np
 from rotor_mbs.models.printed import literal, matrices
 from rotor_mbs.models.printed.derivation import BladeTerms, blade_terms
 from rotor_mbs.models.printed.matrices import Errata
-from rotor_mbs.models.printed.symbols import Symbol
+from rotor_mbs.models.symbols import Symbol
 from rotor_mbs.solution.trajectory import Array
 
 Key = tuple[str, str]
