@@ -155,7 +155,8 @@ class System:
             if failure:
                 break
             data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
-            settings.timeIntegration.initialStepSize = solver.it.currentStepSize
+            # The engine would cut a longer step itself, with another rounding.
+            settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, interval.end - interval.start)
         return total
 
     def _find_initial_accelerations(self) -> None:
