@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from rotor_mbs.report.core.looks import GREY, Look, class_of
 
+_BESIDE = 14  # rows of tables beside a picture
 _DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
 # Paths of markers around a point, in relative steps: several can stand in one path.
 MARKS = {
@@ -114,8 +115,8 @@ class Section:
 
     @property
     def tables_beside(self) -> bool:
-        """Whether the tables stand in the free place beside the last picture."""
-        return bool(self.tables) and len(self.pictures) % 2 == 1
+        """Whether the tables stand in the free place beside the last picture, and are no longer than it is high."""
+        return 0 < sum(len(table.rows) for table in self.tables) <= _BESIDE and len(self.pictures) % 2 == 1
 
     @property
     def is_single(self) -> bool:

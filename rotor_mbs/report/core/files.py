@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import numbers
@@ -111,8 +111,17 @@ def _environment() -> jinja2.Environment:
         scripts=scripts,
         hashes=hashes,
     )
-    environment.filters.update(number=numbers.number, with_unit=numbers.with_unit)
+    environment.filters.update(
+        number=numbers.number, with_unit=numbers.with_unit, typeset=numbers.typeset, breakable=_breakable
+    )
     return environment
+
+
+def _breakable(text: str) -> Markup:
+    """A name such as exudyn_tree/rk67 may be broken after a slash or an underscore; a sentence is typeset."""
+    if " " in text:
+        return escape(numbers.typeset(text))
+    return Markup(re.sub("([/_])", r"\1<wbr>", str(escape(text))))
 
 
 def _script(path: Path) -> Markup:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 
 NOTHING = "–"  # a number that does not exist
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 SPACE = "\N{NO-BREAK SPACE}"
+_COMPUTED = re.compile(r"(?<![\w./-])(\d+(?:\.\d+)?)e([+-]?\d+)\b")
 
 
 def power(exponent: int) -> str:
@@ -67,6 +69,15 @@ def apart(*values: float) -> list[str]:
 def scaled(largest: float) -> tuple[float, str]:
     """What an axis up to `largest` is divided by, and the prefix of its unit for that."""
     return next(((scale, prefix) for scale, prefix in _PREFIXES[2:4] if largest >= scale), (1.0, ""))
+
+
+def typeset(text: str) -> str:
+    """A sentence with its numbers such as 8.1e+00 and 1e-06 as 8.1 and 10⁻⁶; names such as torque-1e9 stay."""
+    return _COMPUTED.sub(lambda found: power(int(found[2])) if found[1] == "1" else _shortest(found), text)
+
+
+def _shortest(found: re.Match[str]) -> str:
+    return number(float(found[0]), len(found[1].replace(".", "")))
 
 
 def minus(text: str) -> str:

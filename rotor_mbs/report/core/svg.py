@@ -224,11 +224,12 @@ def _label(axis: Any) -> str:
     """The axis' label, with what its tick labels leave out: "rate − 0.3 (10⁻³ rad/s)" for 0.3 and times 1e-3."""
     label, offset = str(axis.get_label_text()), str(axis.get_major_formatter().get_offset()).replace("−", "-")
     found = re.fullmatch(r"(?:1e(-?\d+))?([-+].+)?", offset)
-    if found is None or "(" not in label:
+    if not offset or found is None:
         return f"{label} {offset}".strip()
-    name, unit = label.split("(", 1)
-    shift = f"{'−' if float(found[2]) > 0.0 else '+'} {abs(float(found[2])):g} " if found[2] else ""
-    return f"{name}{shift}({power(int(found[1])) + SPACE if found[1] else ''}{unit}"
+    name, _, unit = label.partition(" (")
+    shift = f" {'−' if float(found[2]) > 0.0 else '+'} {abs(float(found[2])):g}" if found[2] else ""
+    inside = SPACE.join(filter(None, [power(int(found[1])) if found[1] else "", unit.rstrip(")")]))
+    return f"{name}{shift} ({inside})" if inside else name + shift
 
 
 def _words(x: float, y: float, words: str, anchor: str, size: float = _FONT, colour: str = INK) -> str:

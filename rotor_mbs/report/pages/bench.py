@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from markupsafe import Markup
 
-from rotor_mbs.analysis.work_precision import TARGETS_RAD, by_scene, fastest, left_out
-from rotor_mbs.methods.catalogue import model_label
+from rotor_mbs.analysis.rehydrate import scene_of
+from rotor_mbs.analysis.work_precision import by_scene, left_out
+from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.methods.catalogue import find_method, ladders
 from rotor_mbs.report.core.elements import Section
 from rotor_mbs.report.core.files import Site, page_names, render
-from rotor_mbs.report.core.looks import label_of
-from rotor_mbs.report.core.numbers import number, prefixed
+from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import bench_tables as tables
-from rotor_mbs.report.pages.bench_tables import target_text
-from rotor_mbs.report.pages.cost import cost_legend
+from rotor_mbs.report.pages.cost import cheapest, cost_legend
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import OpenResults
+from rotor_mbs.store.read import OpenResults, StoredScene
 from rotor_mbs.store.records import COST_SCALING, Record, read_records
 
 Curves = Sequence[Record]
@@ -36,12 +36,12 @@ def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
     pages["bench.csv"] = tables.csv_text([curve for curves in scenes.values() for curve in curves])
     for name, curves in scenes.items():
         csv = files[name].removesuffix(".html") + ".csv"
-        pages[files[name]] = render("bench_scene", _scene(name, curves, csv), site)
+        pages[files[name]] = render("bench_scene", _scene(name, results.scenes.get(name), curves, csv), site)
         pages[csv] = tables.csv_text(curves)
     return pages
 
 
-def _scene(name: str, curves: Curves, csv: str) -> dict[str, object]:
+def _scene(name: str, stored: StoredScene | None, curves: Curves, csv: str) -> dict[str, object]:
     captions = {
         False: "Integration alone: its run time over the whole scene; marks on the left failed.",
         True: "The cost of one run: also building the model, compiling everything anew, and reading out samples.",
@@ -53,7 +53,7 @@ def _scene(name: str, curves: Curves, csv: str) -> dict[str, object]:
     ]
     return {
         "scene": name,
-        "summary": summary(name, curves),
+        "summary": [cheapest(curves), *omissions(curves), *refusals(stored)],
         "facts": curves[0].attributes,
         "diagram": Section(pictures, cost_legend(curves)),
         "reach": Section(tables=[tables.reach_table(curves)]),
@@ -76,7 +76,7 @@ def _index(
         pictures.append(replace(shown, caption=link))
     one_of_each = {curve.name: curve for curves in scenes.values() for curve in curves}
     return {
-        "summary": overview(scenes),
+        "summary": omissions([curve for curves in scenes.values() for curve in curves]),
         "fastest": Section(tables=[tables.overview_table(scenes, files)]),
         "scenes": Section(pictures, cost_legend(list(one_of_each.values()))),
         "scaling": [
@@ -88,60 +88,6 @@ def _index(
     }
 
 
-def summary(scene: str, curves: Curves) -> list[str]:
-    """For each target accuracy each model's fastest method, by increasing time: "paper/fig11, 10⁻⁹ rad: closed form,
-    Taylor 4 ms; Exudyn tree, RK67 50 ms (13 times)."."""
-    sentences = []
-    for target in TARGETS_RAD:
-        best: dict[str, tuple[str, float]] = {}
-        for curve, reach in fastest(curves, target):
-            best.setdefault(curve.name.partition("/")[0], (label_of(curve.name), reach.seconds))
-        ranked = sorted(best.values(), key=lambda item: item[1])
-        parts = [
-            f"{label} {prefixed(time, 's', 2)}"
-            + (f" ({number(time / ranked[0][1])} times)" if time > ranked[0][1] else "")
-            for label, time in ranked
-        ]
-        reached = "; ".join(parts) or "reached by no method within the budget"
-        sentences.append(f"{scene}, {target_text(target)}: {reached}.")
-    return [*sentences, *omissions(curves)]
-
-
-def overview(scenes: Mapping[str, Curves]) -> list[str]:
-    """For each target accuracy the fastest methods over all scenes, and how much longer the other models take."""
-    sentences = [_overview(list(scenes.values()), target) for target in TARGETS_RAD]
-    return [*filter(None, sentences), *omissions([curve for curves in scenes.values() for curve in curves])]
-
-
-def _overview(scenes: Sequence[Curves], target: float) -> str:
-    wins: dict[str, list[float]] = {}
-    ratios: dict[str, list[float]] = {}
-    for curves in scenes:
-        best: dict[str, float] = {}
-        for place, (curve, reach) in enumerate(fastest(curves, target)):
-            if not place:
-                wins.setdefault(label_of(curve.name), []).append(reach.seconds)
-            best.setdefault(curve.name.partition("/")[0], reach.ratio)
-        for model, ratio in best.items():
-            if ratio > 1.0:
-                ratios.setdefault(model, []).append(ratio)
-    first = [
-        f"{label} in {len(seconds)} of {len(scenes)} scenes ({_range(seconds, lambda s: prefixed(s, 's', 2))})"
-        for label, seconds in sorted(wins.items(), key=lambda item: -len(item[1]))
-    ]
-    slower = [
-        f"the best {model_label(model)} method takes {_range(found, number)} times as long "
-        f"({len(found)} of {len(scenes)})"
-        for model, found in ratios.items()
-    ]
-    return f"To {target_text(target)} the fastest is {'; '.join([' and '.join(first), *slower])}." if first else ""
-
-
-def _range(values: Sequence[float], shown: Callable[[float], str]) -> str:
-    low, high = shown(min(values)), shown(max(values))
-    return low if low == high else f"{low} to {high}"
-
-
 def omissions(curves: Curves) -> list[str]:
     """A sentence on the settings that the time budget left out, where there are any."""
     count, total = sum(map(left_out, curves)), sum(len(curve.statuses) for curve in curves)
@@ -151,3 +97,16 @@ def omissions(curves: Curves) -> list[str]:
         f"The budget left out {count} of {total} settings, always the finest of their ladders: what they would reach "
         "is given as not measured."
     ]
+
+
+def refusals(stored: StoredScene | None) -> list[str]:
+    """A sentence for each method with a ladder that cannot represent the scene."""
+    scene, found = None if stored is None else scene_of(stored), []
+    if scene is None:
+        return []
+    for name in dict.fromkeys(ladder.method for ladder in ladders()):
+        try:
+            find_method(name).items(scene)
+        except MethodRefusal as exc:
+            found.append(f"{with_capital(label_of(name))} is left out: {exc}.")
+    return found

@@ -138,24 +138,20 @@ def _point_rows(curve: Record) -> Iterator[Row]:
 
 
 def failure_table(curves: Sequence[Record]) -> PageTable:
-    """Every point that is not on a curve, with the reason."""
-    rows = [
-        [
-            method_cell(curve.name),
-            _setting(curve, i),
-            prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3),
-            "left out" if status == "left_out" else status_text(status),
-            "yes" if curve.arrays["false_success"][i] else "",
-            message,
-        ]
-        for curve in curves
-        for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True))
-        if status != "ok"
-    ]
+    """Every point that is not on a curve, with the reason; one row for all that the budget left out of a curve."""
+    rows = []
+    for curve in curves:
+        cut = [i for i, status in enumerate(curve.statuses) if status == "left_out"]
+        for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True)):
+            if status == "ok" or i in cut[1:]:
+                continue
+            setting = _setting(curve, i) + (f" and {len(cut) - 1} finer" if [i] == cut[:1] != cut else "")
+            seconds = prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3)
+            claimed = "yes" if curve.arrays["false_success"][i] else ""
+            rows.append([method_cell(curve.name), setting, seconds, status_text(status), claimed, message])
     head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
-    return PageTable(
-        "Runs that failed, found from their state, and settings that the budget left out.", head, rows, numeric=(1, 2)
-    )
+    caption = "Runs that failed, found from their state, and settings that the budget left out."
+    return PageTable(caption, head, rows, numeric=(1, 2)).without_empty_columns()
 
 
 def scaling_table(curves: Sequence[Record]) -> PageTable:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
-from rotor_mbs.report.core.numbers import number, with_unit
+from rotor_mbs.report.core.numbers import number, power, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.time_histories import Series
@@ -127,7 +128,7 @@ def _motion(record: Record, verdict: DataVerdict) -> list[Picture]:
 
 
 def _table(verdict: DataVerdict) -> PageTable:
-    until = (f"agrees to {number(level, 1)} until" for level in LEVELS)
+    until = (f"agrees to {power(round(math.log10(level)))} until" for level in LEVELS)
     head = ("Channel", "largest error", "per unit of growth", *until, "constant lag", "scale less 1", "offset")
     rows: list[Row] = []
     for one in verdict.channels:

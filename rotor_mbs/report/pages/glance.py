@@ -23,7 +23,7 @@ from rotor_mbs.store.records import Record
 
 Scenes = Mapping[str, StoredScene]
 # Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
-_SHADES = (-12, -10, -8, -6, -4, -2)
+_SHADES = (-12, -10, -8, -6, -4, -2, 0)
 _MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
 _FAILED = "✗"
 _NAMED = 4  # methods at most in the sentence on agreement; of more, the best and the worst

@@ -177,7 +177,7 @@ def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
         numbers = [number(x) for x in (cell.angle_error, cell.energy_drift, cell.run_time_s or None, cell.step)]
         rows.append([method_cell(cell.method), outcome, *numbers, f"{cell.time_reached:.4g}"])
     head = (
-        "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 1e-6 rad (s)",
+        "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 10⁻⁶ rad (s)",
         "reached (s)",
     )  # fmt: skip
     return PageTable("", head, rows, (2, 3, 4, 5, 6))

@@ -169,7 +169,7 @@
       }
       document.querySelectorAll(".now").forEach((line) => {
         const [zero, scale, last] = line.dataset.time.split(" ").map(Number);
-        line.style.visibility = now > last ? "hidden" : "visible";
+        line.style.visibility = now > 0 && now <= last ? "visible" : "hidden";
         line.style.transform = `translateX(${zero + scale * now}px)`;
       });
       part("time").value = Math.round((1000 * now) / end);
