@@ -119,10 +119,6 @@ def _names(quantity: Quantity, scene: Scene) -> list[str]:
     return [f"{label} rate" for label in scene.coordinate_labels] if quantity.name == "rates" else names
 
 
-def _reference_csv(scene: Scene) -> str:
-    return trajectory_csv(scene, rebuilt_reference(scene))
-
-
 def _benchmark(scene: Scene) -> dict[str, str]:
     """Texts of a benchmark problem by file name: description, reference, error and acceptance as a program, models."""
     trajectory = rebuilt_reference(scene)
@@ -148,7 +144,7 @@ def _results(scene: Scene, trajectory: Trajectory) -> str:
 _TEXTS: dict[str, Callable[[Scene], str]] = {
     "mjcf": mjcf_file,
     "exudyn": exudyn_script,
-    "csv": _reference_csv,
+    "csv": lambda scene: trajectory_csv(scene, rebuilt_reference(scene)),
     "sympy": sympy_text,
 }
 # By format: what is written, and the ending of its name ("": a folder).

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import partial
@@ -43,6 +44,7 @@ _SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the 
 _MOST = 6  # parameters that are named
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}  # zeros that people choose, by degrees
 
+Path = tuple[int | str, ...]  # names of fields, numbers of entries
 Parameter = tuple[str, str, Callable[[float], Motion]]  # key, unit or "" for a share, motion by its change
 
 
@@ -52,10 +54,7 @@ def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
     Beside it what a reader must know where the time of the search was over before all had been tried, else "".
     """
     motions, parameters = list(_motions(search)), list(_parameters(search.scene))
-    found: list[str] = []
-    both: list[str] = []
-    fitted: list[tuple[float, str]] = []
-    tried = 0
+    found, both, fitted, tried = list[str](), list[str](), list[tuple[float, str]](), 0
     try:
         found = causes_in_the_data(search)
         if found or search.worst <= search.tolerance:
@@ -73,7 +72,7 @@ def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
             tried += 1
     except OutOfTimeError:
         count = len(motions) + len(parameters)
-        return found, f"the search for causes was ended by its time limit: {tried} of {count} scenes tried"
+        return found or both, f"the search for causes was ended by its time limit: {tried} of {count} scenes tried"
     return found or both or [*_best(fitted, search.tolerance), *factors(search)], ""
 
 
@@ -220,19 +219,19 @@ def _parameters(scene: Scene) -> Iterator[Parameter]:
         key, value = one.metadata["key"], getattr(scene, one.name)
         if one.metadata["part"] == "start":
             for i in scene.moving_coordinates:
-                yield f"{key}[{i}]", one.metadata["unit"], _runs(_moved_entry, scene, one.name, i)
-        elif one.name != "blades" and _scaled(value, 2.0) != value:
-            yield key, "", _runs(_scaled_field, scene, one.name)
+                yield f"{key}[{i}]", one.metadata["unit"], _runs(_changed, scene, [(one.name, i)], operator.add)
+        elif one.name != "blades" and _scaled(value, 1.0) != value:
+            yield key, "", _runs(_changed, scene, [(one.name,)], _scaled)
     blades = range(len(scene.blades))
     for chosen in [list(blades), *([i] for i in blades if len(blades) > 1)]:
         alone = len(chosen) == 1 < len(blades)
         for field in fields(Blade):
             value = getattr(scene.blades[chosen[0]], field.name)
-            entries = range(len(value)) if isinstance(value, tuple) else [-1]
-            for i in entries if field.name != "tip" else []:
-                if value[i] if i >= 0 else value:
-                    path = f"blade{chosen * alone or ''}.{field.name}{[i] if i >= 0 else ''}"
-                    yield path, "", _runs(_scaled_blades, scene, chosen, field.name, i)
+            entries = [(i,) for i, x in enumerate(value) if x] if isinstance(value, tuple) else [()] * bool(value)
+            for entry in entries if field.name != "tip" else []:
+                paths = [("blades", b, field.name, *entry) for b in chosen]
+                key = f"blade{chosen * alone or ''}.{field.name}{list(entry) or ''}"
+                yield key, "", _runs(_changed, scene, paths, _scaled)
         which = f"blade {chosen[0] + 1}" if len(chosen) == 1 else "all blades"
         yield f"azimuth of {which}", "rad", partial(_azimuth_moved, scene, chosen)
         yield f"zero of the pitch of {which}", "rad", _runs(_pitch_turned, scene, chosen)
@@ -264,33 +263,26 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
     return replace(scene, blades=tuple(blades))
 
 
-def _moved_entry(scene: Scene, name: str, i: int, change: float) -> Scene:
-    values = list(getattr(scene, name))
-    values[i] += change
-    changed: dict[str, Any] = {name: tuple(values)}
-    return replace(scene, **changed)
+def _changed(scene: Scene, paths: Sequence[Path], how: Callable[[Any, float], Any], change: float) -> Scene:
+    """The scene with `how(value, change)` in place of the values at some paths."""
+    for path in paths:
+        scene = _with_value(scene, path, lambda value: how(value, change))
+    return scene
 
 
-def _scaled_field(scene: Scene, name: str, change: float) -> Scene:
-    changed: dict[str, Any] = {name: _scaled(getattr(scene, name), 1.0 + change)}
-    return replace(scene, **changed)
+def _with_value(whole: Any, path: Path, new: Callable[[Any], Any]) -> Any:
+    if not path:
+        return new(whole)
+    first, rest = path[0], path[1:]
+    if isinstance(first, int):
+        return (*whole[:first], _with_value(whole[first], rest, new), *whole[first + 1 :])
+    return replace(whole, **{first: _with_value(getattr(whole, first), rest, new)})
 
 
-def _scaled_blades(scene: Scene, chosen: Sequence[int], name: str, i: int, change: float) -> Scene:
-    """i: the entry; -1 where it is a number."""
-    blades = list(scene.blades)
-    for b in chosen:
-        old, factor = getattr(blades[b], name), 1.0 + change
-        new = old * factor if i < 0 else (*old[:i], old[i] * factor, *old[i + 1 :])
-        changed: dict[str, Any] = {name: new}
-        blades[b] = replace(blades[b], **changed)
-    return replace(scene, blades=tuple(blades))
-
-
-def _scaled(value: Any, factor: float) -> Any:
-    """Numbers times a factor; of a table over time, not the times."""
+def _scaled(value: Any, share: float) -> Any:
+    """Numbers larger by a share; of a table over time, not the times."""
     if not isinstance(value, tuple):
-        return value * factor if isinstance(value, float) else value
+        return value * (1.0 + share) if isinstance(value, float) else value
     if value and all(isinstance(row, tuple) and len(row) == 2 and not isinstance(row[0], tuple) for row in value):
-        return tuple((row[0], row[1] * factor) for row in value)
-    return tuple(_scaled(entry, factor) for entry in value)
+        return tuple((row[0], row[1] * (1.0 + share)) for row in value)
+    return tuple(_scaled(entry, share) for entry in value)

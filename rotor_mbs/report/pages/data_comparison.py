@@ -27,6 +27,7 @@ _ALLOWED = Look(GREY, ":", "")
 def comparison_page(record: Record) -> dict[str, object]:
     """What the template has: verdict, pictures, tables."""
     verdict = verdict_of(record)
+    legend = [*(LegendEntry(one.name, _look(one)) for one in _drawn(verdict)), line_entry("tolerance", GREY, ":")]
     return {
         "scene": verdict.scene,
         "title": record.attributes["title"],
@@ -34,7 +35,7 @@ def comparison_page(record: Record) -> dict[str, object]:
         "agrees": verdict.agrees,
         "status": verdict.status,
         "lead": _lead(verdict),
-        "errors": Section([*_motion(record, verdict), *_errors(record, verdict)], _legend(verdict)),
+        "errors": Section([*_motion(record, verdict), *_errors(record, verdict)], legend),
         "channels": Section(tables=[_table(verdict)]),
         "read": verdict.read,
         "unused": verdict.unused,
@@ -88,10 +89,6 @@ def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
 def _look(channel: ChannelErrors) -> Look:
     """The look of the channel's coordinate: 0 the rotor, 1 the pitch of blade 1, ..."""
     return coordinate_look(int("".join(filter(str.isdigit, channel.name)) or 0))
-
-
-def _legend(verdict: DataVerdict) -> list[LegendEntry]:
-    return [*(LegendEntry(one.name, _look(one)) for one in _drawn(verdict)), line_entry("tolerance", GREY, ":")]
 
 
 def _errors(record: Record, verdict: DataVerdict) -> list[Picture]:
