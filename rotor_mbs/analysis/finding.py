@@ -59,7 +59,6 @@ class Finding:
     numbers: Tally | None
     numbers_corrected: Tally | None
     claims_printed: Tally | None
-    claims_corrected: Tally | None
     energy: PrintedEnergy | None
     agreement: tuple[Agreement, ...]
 
@@ -74,7 +73,6 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
         _tally(claim.printed.holds for claim in numbers),
         _tally(claim.corrected.holds for claim in numbers),
         _tally(claim.printed.holds for claim in others),
-        _tally(claim.corrected.holds for claim in others),
         _printed_energy(scenes),
         _agreement(scenes),
     )

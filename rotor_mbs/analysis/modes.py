@@ -3,12 +3,11 @@
 Knows matrices and blade counts; no model, no scene, no file.
 
 Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd = |Im λ| damped frequency (rad/s),
-ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier, ln(μ)/T characteristic exponent (1/s).
+ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -200,12 +199,6 @@ def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> Fl
     values = np.linalg.eigvals(scaled).astype(complex)
     others = np.linalg.eigvals(rest.T @ scaled @ rest).astype(complex)
     return Floquet(values[np.argsort(-np.abs(values))], others[np.argsort(-np.abs(others))])
-
-
-def characteristic_exponents(multipliers: Complex, speed: float) -> Complex:
-    """1/s: ln(μ)/T with T = 2π/speed; the imaginary part is known but for multiples of the speed."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(multipliers.astype(complex)) * (speed / (2.0 * math.pi)))
 
 
 def _shape(vector: Complex, n: int, first: int) -> Complex:

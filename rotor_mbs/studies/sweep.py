@@ -7,7 +7,7 @@ import json
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.execution.dask_cluster import open_task_pool
-from rotor_mbs.execution.pool import Finished, TaskPool, run_in
+from rotor_mbs.execution.pool import Finished, T, TaskPool, run_in
 from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
-from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected
+from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
 from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.layout import KEYWORDS, SWEEP_IDENTITY
 from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns, row_type
@@ -47,11 +46,13 @@ OnProgress = Callable[[int, int, Counter[str]], None]
 class SweepPlan:
     """The runs of a sweep, or of one part of several, by its methods.
 
+    settings      by method, those of the sweep that it has
     first, last   of its runs; run r is row r mod rows of the design, by method r div rows
     """
 
     sweep: Sweep
     methods: tuple[str, ...]
+    settings: Mapping[str, Mapping[str, object]]
     first: int
     last: int
     time_limit_s: float
@@ -70,36 +71,22 @@ class SweepPlan:
         return open_sweep(output, self.sweep, self.methods, numbers, self._attributes(), self.time_limit_s)
 
     def chunks(self, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
-        """The runs of `gaps`, cut into what one of `workers` does at once."""
-        variants, row = self.sweep.variants(), row_type(self.sweep)
+        """The runs of `gaps`, cut into what one of `workers` does at once, by one method."""
+        variants, row, design = self.sweep.variants(), row_type(self.sweep), self.sweep.design
         for first, _ in gaps[:1]:
-            variants.scene(self.sweep.design.rows(first, first + 1)[0].tolist())
+            variants.scene(design.rows(first, first + 1)[0].tolist())
         left = sum(last - first for first, last in gaps)
-        for gap in gaps:
-            for first, last in self._by_method(*gap):
-                method = self.methods[first // self.rows]
-                while first < last:
-                    end = min(first + self._chunk_size(method, row.itemsize, left // (2 * workers)), last)
-                    yield self._chunk(variants, method, row, first, end)
-                    first, left = end, left - (end - first)
-
-    def _chunk(self, variants: Variants, method: str, row: np.dtype[np.void], start: int, end: int) -> Chunk:
-        known = find_method(method).defaults
-        settings = {key: value for key, value in self.sweep.table.settings.items() if key in known}
-        return Chunk(variants, method, settings, row, start, self.sweep.design.rows(start, end), self.time_limit_s)
-
-    @staticmethod
-    def _chunk_size(method: str, row_bytes: int, share: int) -> int:
-        if find_method(method).solve_many is None:
-            return 1
-        return max(min(_CHUNK_BYTES // row_bytes, share, _MOST_RUNS) // _LEAST_RUNS, 1) * _LEAST_RUNS
-
-    def _by_method(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Spans of runs cut where the method changes."""
-        while first < last:
-            end = min(last, (first // self.rows + 1) * self.rows)
-            yield first, end
-            first = end
+        for first, last in gaps:
+            while first < last:
+                number = first // self.rows
+                method, size = find_method(self.methods[number]), 1
+                if method.solve_many is not None:
+                    most = min(_CHUNK_BYTES // row.itemsize, left // (2 * workers), _MOST_RUNS)
+                    size = max(most // _LEAST_RUNS, 1) * _LEAST_RUNS
+                end = min(first + size, last, (number + 1) * self.rows)
+                values, settings = design.rows(first, end), self.settings[method.name]
+                yield Chunk(variants, method.name, settings, row, first, values, self.time_limit_s)
+                first, left = end, left - (end - first)
 
     def _identity(self) -> str:
         sweep, table = self.sweep, self.sweep.table
@@ -152,29 +139,26 @@ class SweepPlan:
         }
 
 
-def _chosen(sweep: Sweep, methods: Sequence[str]) -> tuple[str, ...]:
-    """Those of the command line, else those of the file. Raises InputError."""
-    if methods:
-        return check_names(methods)
-    try:
-        return check_names(sweep.table.methods)
-    except InputError as exc:
-        raise InputError([sweep.problem(("methods",), f"methods: {words}") for words in exc.problems]) from exc
-
-
 def plan_sweep(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> SweepPlan:
-    """The runs of part k of n (1, 1 for all). Raises InputError, MethodRefusal where a method cannot do them."""
-    chosen = _chosen(sweep, methods)
-    known = {key for method in chosen for key in find_method(method).defaults}
-    unknown = [key for key in sweep.table.settings if key not in known]
-    if unknown:
-        words = f"is no setting of {', '.join(chosen)}; allowed: {', '.join(sorted(known)) or 'none'}"
-        raise InputError([sweep.problem(("settings", key), f"settings.{key}: {words}") for key in unknown])
+    """The runs of part k of n (1, 1 for all) by `methods`, else by those of the file.
+
+    Raises InputError for a method or a setting that is not there, MethodRefusal where a method cannot do them.
+    """
+    chosen = check_names(methods) if methods else _of_the_file(sweep, "methods", check_names, sweep.table.methods)
+    settings = _of_the_file(sweep, "settings", settings_for, chosen, sweep.table.settings)
     for method in chosen:
         find_method(method).items(sweep.base)
     total = sweep.design.count * len(chosen)
     number, parts = part
-    return SweepPlan(sweep, chosen, (number - 1) * total // parts, number * total // parts, time_limit_s)
+    return SweepPlan(sweep, chosen, settings, (number - 1) * total // parts, number * total // parts, time_limit_s)
+
+
+def _of_the_file(sweep: Sweep, key: str, read: Callable[..., T], *values: object) -> T:
+    """What `read` makes of values of the sweep's file; its errors name the line of `key`."""
+    try:
+        return read(*values)
+    except InputError as exc:
+        raise InputError([sweep.problem((key,), f"{key}: {words}") for words in exc.problems]) from exc
 
 
 @dataclass(frozen=True)
@@ -211,29 +195,16 @@ def run_sweep(
 ) -> SweepResult:
     """Computes the runs that `output` misses. However it is interrupted, the same call continues from there.
 
-    Parameters
-    ----------
-    methods
-        Instead of those of the sweep.
-    workers
-        Number of processes, for the engine "local"; default: one per core.
-    engine
-        "local", "dask:tcp://host:port", or a pool that is open.
-    part
-        (k, n): part k of n alone, counted from 1.
-    timeout_s
-        Time limit of a run in s.
-    on_progress
-        Called when runs have been stored, first with those that were there.
-    work
-        What is done with a chunk of runs in a worker.
+    methods       instead of those of the sweep
+    workers       number of processes, for the engine "local"; default: one per core
+    engine        "local", "dask:tcp://host:port", or a pool that is open
+    part          (k, n): part k of n alone, counted from 1
+    timeout_s     time limit of a run in s
+    on_progress   called when runs have been stored, first with those that were there
+    work          what is done with a chunk of runs in a worker
 
-    Raises
-    ------
-    InputError, MethodRefusal
-        Where the sweep cannot be done, or the output is another file.
-    StoreError
-        Where the output cannot be written; what was stored stays.
+    Raises InputError, MethodRefusal where the sweep cannot be done, or the output is another file; StoreError where the
+    output cannot be written: what was stored stays.
     """
     plan = plan_sweep(sweep, methods, part, timeout_s)
     start = time.monotonic()

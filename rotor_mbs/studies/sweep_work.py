@@ -41,7 +41,7 @@ class Chunk:
 
     variants: Variants
     method: str
-    settings: Mapping[str, float]
+    settings: Mapping[str, object]
     row: np.dtype[np.void]
     first: int
     values: NDArray[np.float64]

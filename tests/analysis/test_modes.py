@@ -99,19 +99,6 @@ def test_modes_that_cross_are_tracked_by_their_shapes():
     assert np.argsort(tracked[0].undamped_frequencies)[1] != np.argsort(tracked[-1].undamped_frequencies)[1]
 
 
-def test_multipliers_of_a_harmonic_oscillator_lie_on_the_unit_circle():
-    speed, frequency = 0.9, 2.3
-    phase = frequency * 2.0 * math.pi / speed
-    transition = np.array(
-        [[math.cos(phase), math.sin(phase) / frequency], [-frequency * math.sin(phase), math.cos(phase)]]
-    )
-    values = np.linalg.eigvals(transition).astype(complex)
-    exponents = modes.characteristic_exponents(values, speed)
-    assert np.abs(exponents.real).max() < 1e-14
-    turns = (np.abs(exponents.imag)[:, None] + np.array([-1.0, 1.0]) * frequency) / speed
-    assert np.abs(turns - np.round(turns)).min() < 1e-12
-
-
 def test_what_is_1_for_every_motion_is_left_out_of_the_verdict():
     """A double eigenvalue 1 with one eigenvector, as a free rotor has, beside a stable oscillation."""
     transition = np.eye(4)
