@@ -17,6 +17,7 @@ from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.analysis.rehydrate import Rehydrated, reference_of, rehydrate
 from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
+from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
 from rotor_mbs.scenario.accuracy_bounds import Bounds
@@ -59,6 +60,13 @@ class Verdict:
         if math.isnan(self.value):
             return 0.0
         return self.bound / self.value if self.value else math.inf
+
+
+def judged(
+    bounds: Bounds, check: str, scene: str, method: str, channel: str, value: float, unit: str, look_at: str
+) -> Verdict:
+    """A value against the bound of its check that counts for the method."""
+    return Verdict(check, scene, method, channel, float(value), bounds.of(check, method).value, unit, look_at)
 
 
 def verdicts(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Verdict]:
@@ -106,8 +114,7 @@ def _integrity(scene: str, method: str, parts: Sequence[str], bounds: Bounds) ->
     look = f"{', '.join(parts)} changed after it was written" if parts else "as written"
     if list(parts) == [DIGESTS]:
         look = "it has no digests: they were removed, or an earlier version wrote it"
-    bound = bounds.of("integrity", method).value
-    return Verdict("integrity", scene, method, "digests", float(len(parts)), bound, "parts", look)
+    return judged(bounds, "integrity", scene, method, "digests", len(parts), "parts", look)
 
 
 def _readable_reference(scene: StoredScene) -> Trajectory | None:
@@ -140,8 +147,7 @@ def _copies(scene: StoredScene, bounds: Bounds) -> list[Verdict]:
     except StoreError:
         return []  # the run that cannot be read has failed already
     if not found:
-        bound = bounds.of("copied", "*").value
-        return [Verdict("copied", scene.name, "*", "all", 0.0, bound, "columns", "no two runs have the same bits")]
+        return [judged(bounds, "copied", scene.name, "*", "all", 0.0, "columns", "no two runs have the same bits")]
     look = "{} is that of {} bit for bit: data stored, or read, under another method's name"
     return [
         _make("copied", run, place, 1.0, bounds, "columns", look.format(place, other))
@@ -150,9 +156,7 @@ def _copies(scene: StoredScene, bounds: Bounds) -> list[Verdict]:
 
 
 def _make(check: str, run: StoredRun, channel: str, value: float, bounds: Bounds, unit: str, look_at: str) -> Verdict:
-    """A verdict with the bound that counts for the run's method."""
-    bound = bounds.of(check, run.method).value
-    return Verdict(check, run.scene, run.method, channel, value, bound, unit, look_at)
+    return judged(bounds, check, run.scene, run.method, channel, value, unit, look_at)
 
 
 def _motion_ends(scene: StoredScene) -> bool:
@@ -333,9 +337,8 @@ def _of_paper(results: OpenResults, bounds: Bounds) -> Iterator[Verdict]:
         if item.of is None or value is None:
             continue
         off = abs(round(value, item.decimals) - item.value) * 10**item.decimals
-        bound = bounds.of("published", "printed/ode45").value
         look = f"the paper prints {item.value}, the run gives {value:.6f}: the printed entries, g, ode45"
-        yield Verdict("published", item.of.scene, "printed/ode45", item.id, off, bound, "last digits", look)
+        yield judged(bounds, "published", item.of.scene, PRINTED, item.id, off, "last digits", look)
 
 
 def regressions(new: Sequence[Verdict], old: Sequence[Verdict], factor: float) -> list[Verdict]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rotor_mbs.analysis.run_integrity import defaults_faults
-from rotor_mbs.analysis.verdicts import Verdict, verdicts
+from rotor_mbs.analysis.verdicts import Verdict, judged, verdicts
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import OnProgress, Outcome, compute, ignore_progress
@@ -58,9 +59,11 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
 
     Raises StoreError, InputError.
     """
-    with _damage_reported(path):
-        found = judge_file(path, bounds)
-    return [*found, *_judge_presence(found, required)]
+    found = judge_file(path, bounds)
+    there = {(one.scene, one.method) for one in found}
+    scenes = dict.fromkeys(one.scene for one in found if one.check == _OF_EVERY_RUN)
+    wanted = [(scene, method) for scene in scenes for method in required]
+    return [*found, *(_required(*one, "not in the file", is_missing=one not in there) for one in wanted)]
 
 
 def check_default_set(
@@ -73,7 +76,7 @@ def check_default_set(
         report = run_scenes(
             chosen.scenes, chosen.methods, path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress
         )
-        found += [_missing(one.case.scene.name, one.case.method, one.result.message) for one in report.not_computed]
+        found += [_required(one.case.scene.name, one.case.method, one.result.message) for one in report.not_computed]
         found += judge_file(path, bounds)
     return found + judge_probes(chosen.probes, bounds, workers)
 
@@ -83,23 +86,17 @@ def check_speed(bounds: Bounds) -> list[Verdict]:
     return judge_probes(speed_probes(), bounds, 1)
 
 
-@contextmanager
-def _damage_reported(path: Path) -> Iterator[None]:
-    """What HDF5 finds wrong in a file, at whatever place, is a StoreError."""
-    try:
-        yield
-    except (RuntimeError, OSError) as exc:
-        raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
-
-
 def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
     """Verdicts on what is there: runs, or a sweep. Raises StoreError, InputError."""
     if is_sweep(path):
         return _judge_sweep(StoredSweep(path, allow_damaged_runs=True), bounds)
-    with ExitStack() as stack:
-        results = stack.enter_context(open_results(path, verify=False))
-        shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
-        return verdicts(results, shipped, bounds)
+    try:
+        with ExitStack() as stack:
+            results = stack.enter_context(open_results(path, verify=False))
+            shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
+            return verdicts(results, shipped, bounds)
+    except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
+        raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
 
 
 def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Verdict]:
@@ -110,32 +107,18 @@ def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Verdict]:
     look = f"{missing} runs missing; the sweep's own command computes them"
     changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
     return [
-        Verdict("complete", scene, "*", "runs", float(missing), bounds.of("complete", "*").value, "runs", look),
-        Verdict("integrity", scene, "*", "runs", float(damaged), bounds.of("integrity", "*").value, "runs", changed),
+        judged(bounds, "complete", scene, "*", "runs", missing, "runs", look),
+        judged(bounds, "integrity", scene, "*", "runs", damaged, "runs", changed),
     ]
 
 
-def _judge_presence(found: Sequence[Verdict], required: Sequence[str]) -> list[Verdict]:
-    there = {(verdict.scene, verdict.method) for verdict in found}
-    scenes = dict.fromkeys(verdict.scene for verdict in found if verdict.check == _OF_EVERY_RUN)
-    return [
-        _missing(scene, method, "not in the file", is_missing=(scene, method) not in there)
-        for scene in scenes
-        for method in required
-    ]
-
-
-def _missing(scene: str, method: str, look: str, *, is_missing: bool = True) -> Verdict:
+def _required(scene: str, method: str, look: str, *, is_missing: bool = True) -> Verdict:
     return Verdict("required", scene, method, "run", float(is_missing), 0.0, "missing", look)
 
 
-def judged_runs(found: Iterable[Verdict]) -> dict[str, int]:
+def judged_runs(found: Iterable[Verdict]) -> Counter[str]:
     """How many runs of each method were judged, so that a run that is not there is missed by whoever reads."""
-    counts: dict[str, int] = {}
-    for one in found:
-        if one.check == _OF_EVERY_RUN and one.method != REFERENCE:
-            counts[one.method] = counts.get(one.method, 0) + 1
-    return counts
+    return Counter(one.method for one in found if one.check == _OF_EVERY_RUN and one.method != REFERENCE)
 
 
 def judge_bounds(bounds: Bounds) -> list[Verdict]:
@@ -153,26 +136,24 @@ def judge_defaults(bounds: Bounds) -> list[Verdict]:
     for method in expected_settings():
         faults = defaults_faults(method)
         look = "; ".join(faults) or "those that the bounds were found with"
-        bound = bounds.of("settings", method).value
-        found.append(Verdict("settings", "defaults", method, "defaults", float(len(faults)), bound, "faults", look))
+        found.append(judged(bounds, "settings", "defaults", method, "defaults", len(faults), "faults", look))
     return found
 
 
 def judge_frozen(bounds: Bounds) -> list[Verdict]:
     """Every shipped reference against its digests, one verdict a scene."""
-    bound = bounds.of("frozen", REFERENCE).value
     found = []
     for path in shipped_files():
         with open_results(path) as results:
             try:
                 scenes = changed_arrays(results)
             except StoreError as exc:
-                found.append(Verdict("frozen", path.stem, REFERENCE, "all", math.nan, bound, "arrays", str(exc)))
+                found.append(judged(bounds, "frozen", path.stem, REFERENCE, "all", math.nan, "arrays", str(exc)))
                 continue
         for scene, names in scenes.items():
             look = f"{path.name}: {', '.join(names)} not as frozen" if names else "as frozen"
             channel = ", ".join(names) or "all"
-            found.append(Verdict("frozen", scene, REFERENCE, channel, float(len(names)), bound, "arrays", look))
+            found.append(judged(bounds, "frozen", scene, REFERENCE, channel, len(names), "arrays", look))
     return found
 
 
