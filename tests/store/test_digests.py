@@ -235,7 +235,7 @@ def test_a_changed_number_of_a_finished_sweep_is_found(
         with pytest.raises(StoreError, match="runs 0 changed"):
             StoredSweep(copy)
         assert main(["report", str(copy), "-o", str(tmp_path / "report")]) == 2
-        data = rm.SweepData(copy, {})
+        data = rm.SweepData(copy)
         for read in (partial(data.column, "time"), partial(data.at, "angles", 0), data.to_xarray):
             with pytest.raises(StoreError, match="runs 0 changed"):
                 read()
