@@ -8,14 +8,22 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from rotor_mbs.analysis.verdicts import Verdict, regressions
+from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.studies.check import check_default_set, check_file, check_speed, default_set, judge_file, judged_runs
+from rotor_mbs.studies.check import (
+    check_default_set,
+    check_file,
+    check_speed,
+    default_set,
+    judge_file,
+    judged_runs,
+    regressions,
+)
 
 _STANDARD_OUTPUT = Path("-")
 

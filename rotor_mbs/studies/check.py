@@ -31,6 +31,8 @@ from rotor_mbs.studies.stored_references import shipped_files
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
 _TIMEOUT_S = 60.0
 _OF_EVERY_RUN = "status"  # a check that each run has one verdict of
+# A value below a few units in the last place of a double is rounding: its change says nothing.
+_ROUNDING = 2.0**-50
 
 
 @dataclass(frozen=True)
@@ -173,3 +175,47 @@ def measurements(outcome: Outcome) -> list[Verdict]:
 def judge_measured(one: Verdict, bounds: Bounds) -> Verdict:
     """A measured number against its bound."""
     return replace(one, bound=bounds.of(one.check, one.method).value)
+
+
+def regressions(new: Sequence[Verdict], old: Sequence[Verdict], factor: float) -> list[Verdict]:
+    """A verdict "against" for every earlier one, in their order: how many times its margin has shrunk.
+
+    new, old   verdicts of the same checks, made with the same bounds
+    factor     allowed ratio of the earlier margin to the present one, at least 1
+
+    The value is NaN, which fails, where `new` lacks the verdict, and infinite where a verdict that passed fails. A
+    verdict that failed before and fails now is no regression.
+
+    >>> from dataclasses import replace
+    >>> was = Verdict("energy", "paper/fig08", "exudyn_tree/rk67", "balance", 1e-12, 1e-9, "of scale", "")
+    >>> [found] = regressions([replace(was, value=6.4e-11)], [was], factor=10.0)
+    >>> round(found.value), found.passed
+    (64, False)
+    """
+    present = {_key(verdict): verdict for verdict in new}
+    return [_compared(present.get(_key(verdict)), verdict, factor) for verdict in old]
+
+
+def _key(verdict: Verdict) -> tuple[str, str, str, str]:
+    return verdict.check, verdict.scene, verdict.method, verdict.channel
+
+
+def _compared(new: Verdict | None, old: Verdict, factor: float) -> Verdict:
+    if new is None:
+        value, look = math.nan, "was judged in the earlier file and is not in this one"
+    else:
+        value = _shrinkage(new, old)
+        look = f"{old.value:.2e} before, {new.value:.2e} now, bound {new.bound:.2e} {new.unit}; {new.look_at}"
+    channel = f"{old.check}: {old.channel}"
+    return replace(
+        old, check="against", channel=channel, value=value, bound=factor, unit="times the margin", look_at=look
+    )
+
+
+def _shrinkage(new: Verdict, old: Verdict) -> float:
+    if not new.passed:
+        return math.inf if old.passed else 1.0
+    if not old.passed:
+        return 0.0
+    before, now = max(old.value, _ROUNDING), max(new.value, _ROUNDING)
+    return (now / before) * (old.bound / new.bound if new.bound and old.bound else 1.0)

@@ -15,9 +15,10 @@ import pytest
 import yaml
 from support.checking import results_file, shipped
 
-from rotor_mbs.analysis.verdicts import Verdict, regressions
+from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli import main
 from rotor_mbs.report import verdict_formats
+from rotor_mbs.studies.check import regressions
 from rotor_mbs.studies.run import run_scenes
 
 ROOT = Path(__file__).parents[2]
