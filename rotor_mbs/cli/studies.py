@@ -100,12 +100,10 @@ def claims(arguments: argparse.Namespace) -> int:
     from rotor_mbs.analysis.number_trials import count_of_rows
     from rotor_mbs.studies.claims import study_claims
 
-    def report(done: int, total: int, what: str) -> None:
-        print(f"[{done:{len(str(total))}d}/{total}] {what}", file=sys.stderr, flush=True)
-
-    study = study_claims(
-        arguments.output, runs=arguments.runs, seed=arguments.seed, workers=arguments.jobs, on_sweep=report
-    )
+    with ProgressLine() as progress:
+        study = study_claims(
+            arguments.output, runs=arguments.runs, seed=arguments.seed, workers=arguments.jobs, on_sweep=progress.stage
+        )
     print(study.shares, f"\n{RULE}\n", sep="\n")
     for duration in sorted({one.duration for one in study.numbers.conditions}):
         count, of = count_of_rows(study.numbers, duration)

@@ -148,21 +148,16 @@ def _measure_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
 
 
 def facts_of(case: Case, short: Scene, reference: Trajectory) -> dict[str, Any]:
-    """Attributes that all curves of a scene have."""
+    """Attributes that all curves of a scene have; the uncertainty over the samples that errors are taken at."""
+    uncertainty = reference.angle_uncertainty
+    compared = max(horizon_samples(reference), 1)
     return {
         "scene_hash": case.scene_hash,
         "horizon_s": horizon(reference),
-        "uncertainty_rad": _uncertainty(reference),
+        "uncertainty_rad": 0.0 if uncertainty is None else float(uncertainty[:compared].max()),
         "duration_s": case.scene.duration,
         "samples": short.samples,
     }
-
-
-def _uncertainty(reference: Trajectory) -> float:
-    """rad: the reference's own, over the samples that errors are taken at."""
-    if reference.angle_uncertainty is None:
-        return 0.0
-    return float(reference.angle_uncertainty[: max(horizon_samples(reference), 1)].max())
 
 
 def points_of(ladder: Ladder, interval: float) -> list[Point]:

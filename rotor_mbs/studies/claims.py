@@ -45,8 +45,8 @@ SPREAD = 1e-15  # rad
 _SAMPLES_PER_SECOND = 100
 _TIMEOUT_S = 600.0  # a run that ends by its own doing is never cut off: the table does not depend on the machine
 
-# From (sweeps done, sweeps in all, what was done).
-OnSweep = Callable[[int, int, str], None]
+# From (what was done, sweeps done, sweeps in all).
+OnSweep = Callable[[str, int, int], None]
 
 
 def claims(*, runs: int | None = None, seed: int = SEED, workers: int = 0) -> ClaimStudy:
@@ -137,7 +137,7 @@ def claim_shares(
                 for method, found in _by_method(StoredSweep(file), runs + 1):
                     measured[method].add(scene.name, found, asked)
                 done += 1
-                on_sweep(done, total, f"{scene.name} {duration:g} s: {result.made} runs made")
+                on_sweep(f"{scene.name} {duration:g} s: {result.made} runs made", done, total)
             for item in wanted:
                 shares += [ClaimShare(item.id, name, duration, found.marks(item)) for name, found in measured.items()]
     return ClaimShares(tuple(shares), SPREAD, runs)

@@ -125,7 +125,9 @@ def limit_record(job: Job) -> Record:
     scene, method = job.case.scene, job.case.method
     function = find_method(method).stability_function
     assert function is not None  # see has_limit
-    modes = [mode for i in range(len(scene.blades)) for mode in _modes(scene, i)]
+    # Of a pitch about zero, the rotor fixed: gravity and rotation are negligible beside such a spring.
+    inertias = [(blade.pitch_inertia, *scene.bearing(i)) for i, blade in enumerate(scene.blades)]
+    modes = [mode for numbers in inertias for mode in oscillator_modes(*numbers)]
     window = _WINDOW_RADIANS / max(abs(mode) for mode in modes)
     short = replace(scene, duration=window, samples=_INTERVALS + 1, outputs=("angles", "rates"))
     theory = largest_stable_step(function, modes, window, _GROWTH)
@@ -145,11 +147,6 @@ def limit_record(job: Job) -> Record:
         "mode_damping_ratio": min(1.0, *(abs(mode.real) / abs(mode) for mode in modes)),
     }
     return Record("limits", scene.name, method, attributes)
-
-
-def _modes(scene: Scene, blade: int) -> tuple[complex, complex]:
-    """Eigenvalues of a pitch about zero, the rotor fixed: gravity and rotation are negligible beside such a spring."""
-    return oscillator_modes(scene.blades[blade].pitch_inertia, *scene.bearing(blade))
 
 
 def _stays(scene: Scene, method: str, steps: int) -> bool:
