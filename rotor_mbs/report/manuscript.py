@@ -40,7 +40,7 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
     is_paths = figure.kind == PATHS
     with canvas.style(for_print=True):
         rows, height, heading = (len(letters), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
-        panels = canvas.grid(rows, len(keys), height, for_print=True)
+        panels = canvas.print_grid(rows, len(keys), height)
         table = [panels.axes[i : i + len(keys)] for i in range(0, len(panels.axes), len(keys))]
         for letter, key, runs in pictures:
             column = [row[keys.index(key)] for row in table]

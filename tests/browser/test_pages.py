@@ -166,6 +166,32 @@ def test_the_viewer_obeys_the_keyboard(page: Page, pages: list[Path]) -> None:
     assert page.run(clock) == f"{step:.2f} s"  # one frame
 
 
+_LINES = """[...document.querySelectorAll('figure>svg:has(>.now)')].map(svg => {
+  const middle = e => { const b = e.getBoundingClientRect(); return (b.left + b.right) / 2; };
+  const line = svg.querySelector('.now');
+  const tick = [...svg.querySelectorAll('text')].filter(t => t.textContent === '6').pop();
+  return [getComputedStyle(line).visibility, tick ? middle(line) - middle(tick) : null]; })"""
+
+
+def test_a_line_in_the_time_plots_follows_the_viewer(page: Page, pages: list[Path]) -> None:
+    page.open(_scene(pages), 1440)
+    height = page.run("document.documentElement.scrollHeight")
+    assert {seen for seen, _ in page.run(_LINES)} == {"hidden"}
+    page.run("document.querySelector('.viewer canvas').focus(); document.querySelector('[data-part=time]').value = 600;"
+             "document.querySelector('[data-part=time]').dispatchEvent(new Event('input'))")  # fmt: skip
+    time.sleep(0.3)
+    found = page.run(_LINES)  # at 6 s, where the tick of 6 s is
+    assert {seen for seen, _ in found} == {"visible"}
+    gaps = [gap for _, gap in found if gap is not None]
+    assert len(gaps) > 5
+    assert max(map(abs, gaps)) < 1.0  # px
+    page.key("End", number=35)
+    time.sleep(0.3)
+    shown = [seen for seen, _ in page.run(_LINES)]
+    assert {*shown} == {"visible", "hidden"}  # runs that broke off at 7 s
+    assert page.run("document.documentElement.scrollHeight") == height
+
+
 def _fast() -> list[Made]:
     """A rotor at 4 rad/s for 300 s, which 361 frames and the shorter way round drew backwards."""
     long = replace(paper("fig11"), duration=300.0, samples=6001, name="fast")

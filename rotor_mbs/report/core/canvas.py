@@ -72,16 +72,14 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     return Panels(figure, axes)
 
 
-def grid(rows: int, columns: int, height: float, *, for_print: bool = False) -> Panels:
-    """Axes row by row, `height` inches each; for_print: at a journal's page width, in the style for manuscripts."""
-    with style(for_print=for_print):
-        top, bottom = (0.5, 0.75) if for_print else (0.28, 0.45)
-        width = PRINT_WIDTH if for_print else WIDTH
-        figure = Figure(figsize=(width, rows * height + top + bottom), facecolor="white")
+def print_grid(rows: int, columns: int, height: float) -> Panels:
+    """Axes row by row, `height` inches each, at a journal's page width, in the style for manuscripts."""
+    with style(for_print=True):
+        whole = rows * height + 1.25
+        figure = Figure(figsize=(PRINT_WIDTH, whole), facecolor="white")
         made = figure.subplots(rows, columns, squeeze=False)
-        whole = float(figure.get_figheight())
         figure.subplots_adjust(
-            left=0.8 / width, right=1.0 - 0.12 / width, bottom=bottom / whole, top=1.0 - top / whole,
+            left=0.8 / PRINT_WIDTH, right=1.0 - 0.12 / PRINT_WIDTH, bottom=0.75 / whole, top=1.0 - 0.5 / whole,
             hspace=0.26 / height, wspace=0.34,
         )  # fmt: skip
     return Panels(figure, list(made.flat))

@@ -74,11 +74,7 @@ def _claim_row(claim: Claim, shares: ClaimShares | None) -> Row:
     quoted = TableCell(item.statement, note=f"«{item.quote}»", note_language="es")
     if shares is None or item.id not in shares.claims:
         return [item.figure, quoted, _stored_verdict(claim.printed), _stored_verdict(claim.corrected)]
-    cells = []
-    for method, stored in zip(shares.methods, (claim.printed, claim.corrected), strict=True):
-        cell = claim_study.verdict_cell(shares.of(item.id, method))
-        alone = _stored_verdict(stored)
-        cells.append(replace(cell, note=f"{cell.note}. The run stored here: {alone.text}. {alone.note}".strip()))
+    cells = (claim_study.verdict_cell(shares.of(item.id, method)) for method in shares.methods)
     return [item.figure, quoted, *cells]
 
 

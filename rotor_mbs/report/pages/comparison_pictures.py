@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.published import Published
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
@@ -61,9 +60,9 @@ def key_picture(
         for i in shown
     ]
     parted, largest = parting(runs[0], runs[1]) if len(runs) > 1 else (None, 0.0)
-    marks = published_marks(claims, shown)
-    panels = comparisons.departure(panels_of, marks, horizon, parted)
-    caption = " ".join([_parting_text(runs, parted, largest), *_published_texts(claims, shown)])
+    published = _published(claims, shown)
+    panels = comparisons.departure(panels_of, [mark for mark, _ in published], horizon, parted)
+    caption = " ".join([_parting_text(runs, parted, largest), *(text for _, text in published)])
     ranges = [
         f"{label_of(r.method)}: {labels[i]} from {number(float(r.array('angles')[:, i].min()), 3)} to "
         f"{number(float(r.array('angles')[:, i].max()), 3)} rad"
@@ -72,7 +71,7 @@ def key_picture(
     legend = [LegendEntry(label_of(r.method), side_look(r), 2.4 if side_look(r).line == "-" else 1.3) for r in runs]
     if horizon is not None and horizon < float(runs[-1].array("time")[-1]):
         legend.append(line_entry(f"horizon {with_unit(horizon, 's', 3)}", line="--"))
-    if marks:
+    if published:
         legend.append(line_entry("published", line=":"))
     return picture(panels, name, caption, f"{caption} {'; '.join(ranges)}.", legend=legend)
 
@@ -98,31 +97,18 @@ def _parting_text(runs: Sequence[StoredRun], parted: float | None, largest: floa
     return f"The models are {VISIBLE:g} rad apart {at_time(parted)}; their angles differ by up to {most}."
 
 
-def _published_texts(claims: Sequence[Claim], shown: Sequence[int]) -> list[str]:
-    """A sentence per published number on the picture: what each model has."""
+def _published(claims: Sequence[Claim], shown: Sequence[int]) -> list[tuple[Mark, str]]:
+    """Published extremes of the angles of the coordinates `shown`: heights in their panels, what each model has."""
     found = []
     for claim in claims:
-        item = claim.published
-        if _is_height(item, shown):
-            values = (fixed(value, item.decimals) for value in (item.value, claim.printed.value, claim.corrected.value))
-            published, printed, corrected = values
-            what = f"{with_capital(description_of(item.of))}, rad" if item.of else item.id
-            found.append(f"{what}: published {published}, as printed {printed}, corrected {corrected}.")
-    return found[:_PUBLISHED]
-
-
-def _is_height(item: Published, shown: Sequence[int]) -> bool:
-    return item.is_number and item.of is not None and item.of.quantity == "angle" and item.of.coordinate in shown
-
-
-def published_marks(claims: Sequence[Claim], shown: Sequence[int]) -> list[Mark]:
-    """Published extremes of the angles of the coordinates `shown`, as heights in their panels."""
-    found = []
-    for claim in claims:
-        item = claim.published
-        if _is_height(item, shown) and item.of is not None:
-            text = f"published {fixed(item.value, item.decimals)} rad"
-            found.append(Mark(shown.index(item.of.coordinate), item.value, text))
+        item, of = claim.published, claim.published.of
+        if not item.is_number or of is None or of.quantity != "angle" or of.coordinate not in shown:
+            continue
+        values = (fixed(value, item.decimals) for value in (item.value, claim.printed.value, claim.corrected.value))
+        published, printed, corrected = values
+        mark = Mark(shown.index(of.coordinate), item.value, f"published {published} rad")
+        text = f"{with_capital(description_of(of))}, rad: published {published}, as printed {printed}"
+        found.append((mark, f"{text}, corrected {corrected}."))
     return found[:_PUBLISHED]
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, fastest, own_points, succeeded
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, line_entry, mark_entry
+from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
 from rotor_mbs.report.core.looks import label_of, look_of
-from rotor_mbs.report.core.numbers import NOTHING, number, prefixed
+from rotor_mbs.report.core.numbers import prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.bench_tables import target_text
-from rotor_mbs.report.pages.scene_tables import method_cell
 from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
 from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
@@ -25,7 +24,7 @@ def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
     notes = [cheapest(known)]
     if not curves:
         notes.append("Each point is a run of this file, timed while others ran beside it: good to a factor of two.")
-    return Section([shown], cost_legend(known), [_times_table(known)], notes)
+    return Section([shown], cost_legend(known), notes=notes)
 
 
 def cost_picture(curves: Sequence[Record], caption: str) -> Picture | None:
@@ -58,19 +57,3 @@ def cheapest(curves: Sequence[Record]) -> str:
             best = f"{label_of(curve.name)} ({curve.name}), {prefixed(reach.seconds, 's', 2)}"
         parts.append(f"within {target_text(target)}: {best}")
     return f"Cheapest method {'; '.join(parts)}."
-
-
-def _times_table(curves: Sequence[Record]) -> PageTable:
-    """A row per method: its most accurate point."""
-    rows: list[Row] = []
-    for curve in curves:
-        good = succeeded(curve)
-        cell = method_cell(curve.name)
-        if not good.any():
-            rows.append([cell, NOTHING, NOTHING])
-            continue
-        errors = curve.arrays["angle_error_max"][good]
-        best = int(errors.argmin())
-        seconds = float(curve.arrays["run_time_s"][good][best])
-        rows.append([cell, number(float(errors[best])), prefixed(seconds, "s", 2)])
-    return PageTable("Most accurate run of each method", ("Method", "Angle error (rad)", "Run time"), rows, (1, 2))

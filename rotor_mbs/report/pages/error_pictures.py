@@ -58,16 +58,15 @@ def angle_difference(one: StoredRun, other: StoredRun) -> histories.Array:
     return found
 
 
-def energy_errors(runs: Runs) -> tuple[Curves, bool]:
-    """|energy error| of each run, and whether it is relative to the scene's energy scale (else in J)."""
-    known = {method: run for method, run in runs.items() if "energy_error" in run}
-    scales = {method: float(run.attributes.get("energy_scale_J", 0.0)) for method, run in known.items()}
-    relative = all(scales.values())
-    return {
-        method: Series(
-            run.array("time"),
-            np.abs(run.array("energy_error")) / (scales[method] if relative else 1.0),
-            look_of(method),
-        )
-        for method, run in known.items()
-    }, relative
+def energy_picture(runs: Runs, horizon: float | None = None) -> tuple[Picture | None, list[str]]:
+    """Total energy less work, from its start (J), of each run that has it; None without. The methods that are drawn."""
+    curves = {
+        method: Series(run.array("time"), run.array("energy_error"), look_of(method))
+        for method, run in runs.items()
+        if "energy_error" in run
+    }
+    caption = (
+        "Energy that comes from nothing (total energy less work, from its start): filled marks gained, open ones lost"
+    )
+    shown = error_picture(curves, "|energy from nothing| (J)", "energy", caption, horizon, signed=True)
+    return shown, list(visible(curves))

@@ -77,9 +77,10 @@ def _turned(run: StoredRun, torque: str) -> str:
 
 
 def _picture(figure: PaperFigure, letter: str, key: str, runs: Mapping[str, StoredRun], message: str) -> Picture:
-    panels = canvas.grid(1, 1, 3.6) if figure.kind == PATHS else canvas.grid(2, 1, 1.7)
-    with canvas.style():
-        paper_figures.draw(figure, panels.axes, runs)
+    panels = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
+    if figure.kind != PATHS:
+        panels.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
+    paper_figures.draw(figure, panels.axes, runs)
     heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
     caption = with_capital(label) if label.startswith(heading.lower()) else f"{heading}: {label}"
     return svg.picture(panels, f"f{figure.number}{letter}-{key}", caption, message)

@@ -222,23 +222,17 @@ def difference_section(drawn: DrawnRuns) -> Section:
         curves, "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", drawn.horizon, others,
     )  # fmt: skip
-    table = scene_tables.difference_table(runs)
-    return Section([shown] if shown else [], [*legend, *_horizon_entry(drawn)], [table], notes)
+    return Section([shown] if shown else [], [*legend, *_horizon_entry(drawn)], notes=notes)
 
 
 def energy_section(drawn: DrawnRuns) -> Section:
     """Energy less work from its start, of every run."""
     runs = {name: run for name, run in drawn.all.items() if "energy_error" in run}
-    curves = {n: Series(run.array("time"), run.array("energy_error"), look_of(n)) for n, run in runs.items()}
-    shown = error_pictures.error_picture(
-        curves, "|energy from nothing| (J)", "energy",
-        "Energy that comes from nothing (total energy less work, from its start): filled marks gained, open ones lost",
-        drawn.horizon, signed=True,
-    )  # fmt: skip
+    shown, methods = error_pictures.energy_picture(runs, drawn.horizon)
     if shown is None:
         return Section()
-    legend = error_pictures.run_legend(list(error_pictures.visible(curves)))
-    return Section([shown], [*legend, *_horizon_entry(drawn)], [scene_tables.energy_table(runs)])
+    legend = [*error_pictures.run_legend(methods), *_horizon_entry(drawn)]
+    return Section([shown], legend, [scene_tables.energy_table(runs)])
 
 
 def _path_tables(drawn: DrawnRuns) -> list[PageTable]:

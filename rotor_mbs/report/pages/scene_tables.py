@@ -140,15 +140,6 @@ def _finest(run: StoredRun, name: str) -> Array:
     return run.array(refined if refined in run else name)
 
 
-def difference_table(runs: Mapping[str, StoredRun]) -> PageTable:
-    """Errors of each run against the reference."""
-    head = ("Method", "Up to the horizon (rad)", "Whole run (rad)", "At the end (rad)")
-    names = ("angle_error_max", "angle_error_whole", "angle_error_end")
-    rows = [[method_cell(name), *(number(metric(run, n)) for n in names)] for name, run in runs.items()]
-    caption = "Largest difference from the reference, over all angles"
-    return PageTable(caption, head, rows, numeric=(1, 2, 3)).without_empty_columns()
-
-
 def energy_table(runs: Mapping[str, StoredRun]) -> PageTable:
     """Each run's energies and how well it conserves them."""
     head = ("Method", "Largest kinetic energy", "Work at the end", "Largest gain", "Drift (relative)")

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, is_number, reached_by, suite_runs
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
 from rotor_mbs.report.core.numbers import number
@@ -202,24 +202,19 @@ def _unresolved(run: StoredRun) -> list[str]:
 
 
 def _errors(scene: StoredScene, runs: error_pictures.Runs) -> Section:
-    energy, relative = error_pictures.energy_errors(runs)
-    energy_axis = "energy error / energy scale" if relative else "energy error (J)"
-    kinds = [
-        (error_pictures.differences(runs, scene.reference), "largest angle difference (rad)", "difference",
-         "Largest angle difference from the reference", horizon(scene)),
-        (energy, energy_axis, "energy", "Energy error", None),
-    ]  # fmt: skip
+    differences = error_pictures.differences(runs, scene.reference)
+    caption = "Largest angle difference from the reference"
+    kinds = [(differences, "largest angle difference (rad)", "difference", caption, horizon(scene))]
     kinds += [
         (sizes(quantity, runs), plot.axis, quantity.name, plot.title, None)
         for quantity, plot in plotted_quantities(scene)
         if plot.logarithmic
     ]
-    pictures: list[Picture] = []
-    for curves, axis, name, caption, end in kinds:
-        shown = error_pictures.error_picture(curves, axis, name, caption, end)
-        pictures += [shown] if shown is not None and error_pictures.visible(curves) else []
-    drawn = [name for name in runs if any(name in error_pictures.visible(kind[0]) for kind in kinds)]
-    return Section(pictures, error_pictures.run_legend(drawn))
+    energy, drawn = error_pictures.energy_picture(runs)
+    pictures = [error_pictures.error_picture(*kind) for kind in kinds if error_pictures.visible(kind[0])]
+    drawn += [name for kind in kinds for name in error_pictures.visible(kind[0])]
+    legend = error_pictures.run_legend([name for name in runs if name in drawn])
+    return Section([one for one in (*pictures, energy) if one is not None], legend)
 
 
 def _error_over_step(ladders: Sequence[Record]) -> Section:
