@@ -132,50 +132,33 @@ def _crate(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
     others = [one for one in known if one["@type"] == "File" and one["@id"] != path.name]
     kept = [one for one in known if one["@type"] == "PropertyValue" and not one["@id"].startswith(f"#{path.name}/")]
     measured = [
-        {
-            "@id": f"#{path.name}/{name}",
-            "@type": "PropertyValue",
-            "name": name,
-            "unitText": one.units,
-            "description": one.long_name,
-        }
+        _entity(f"#{path.name}/{name}", "PropertyValue", name=name, unitText=one.units, description=one.long_name)
         for name, one in stored.columns.items()
     ]
-    file = {
-        "@id": path.name,
-        "@type": "File",
-        "name": stored.attributes["title"],
-        "description": stored.attributes["summary"],
-        "encodingFormat": ["application/x-hdf5", "application/netcdf"],
-        "contentSize": str(path.stat().st_size),
-        "sha256": content,
-        "keywords": KEYWORDS,
-        "variableMeasured": [{"@id": one["@id"]} for one in measured],
-    }
+    about = {"name": stored.attributes["title"], "description": stored.attributes["summary"], "keywords": KEYWORDS}
+    file = _entity(
+        path.name,
+        "File",
+        **about,
+        encodingFormat=["application/x-hdf5", "application/netcdf"],
+        contentSize=str(path.stat().st_size),
+        sha256=content,
+        variableMeasured=[{"@id": one["@id"]} for one in measured],
+    )
     files = sorted([*others, file], key=lambda one: str(one["@id"]))
-    descriptor = {
-        "@id": _CRATE,
-        "@type": "CreativeWork",
-        "about": {"@id": "./"},
-        "conformsTo": {"@id": _CRATE_PROFILE},
-        "creator": {"@id": "#rotor_mbs"},
-    }
-    root = {
-        "@id": "./",
-        "@type": "Dataset",
-        "name": "Parameter studies of a wind turbine rotor" if others else stored.attributes["title"],
-        "description": "Datasets of rotor_mbs" if others else stored.attributes["summary"],
-        "keywords": KEYWORDS,
-        "datePublished": date.today().isoformat(),
-        "hasPart": [{"@id": one["@id"]} for one in files],
-    }
-    program = {
-        "@id": "#rotor_mbs",
-        "@type": "SoftwareApplication",
-        "name": "rotor_mbs",
-        "softwareVersion": str(stored.attributes.get("rotor_mbs", "")),
-    }
+    if others:
+        about |= {"name": "Parameter studies of a wind turbine rotor", "description": "Datasets of rotor_mbs"}
+    parts = [{"@id": one["@id"]} for one in files]
+    root = _entity("./", "Dataset", **about, datePublished=date.today().isoformat(), hasPart=parts)
+    program = _entity("#rotor_mbs", "SoftwareApplication", name="rotor_mbs")
+    program["softwareVersion"] = str(stored.attributes.get("rotor_mbs", ""))
+    links = {"about": {"@id": "./"}, "conformsTo": {"@id": _CRATE_PROFILE}, "creator": {"@id": "#rotor_mbs"}}
+    descriptor = _entity(_CRATE, "CreativeWork", **links)
     return {"@context": f"{_CRATE_PROFILE}/context", "@graph": [descriptor, root, program, *files, *kept, *measured]}
+
+
+def _entity(identity: str, kind: str, **facts: object) -> dict[str, Any]:
+    return {"@id": identity, "@type": kind, **facts}
 
 
 def _crate_entities(place: Path) -> list[dict[str, Any]]:
