@@ -126,7 +126,7 @@ _TARGETS = (
     Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
     Target("multibody", f"{_M}.tree", ("_node", "_tree", "_torque", "_tip_sensor")),
     Target("multibody", f"{_M}.energy", ("*",)),
-    Target("multibody", f"{_M}.moments", ("at", "pitch_terms")),
+    Target("multibody", f"{_M}.moments", ("at", "drives", "moment_on")),
     Target("multibody", f"{_M}.sensor_samples", ("_fields", "_add_energies")),
     Target("chain", f"{_M}.geometry", ("quaternion", "quaternion_rate"), 1e-2),
     Target(

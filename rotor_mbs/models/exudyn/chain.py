@@ -28,7 +28,7 @@ from rotor_mbs.models.exudyn.geometry import (
     rotation_z,
 )
 from rotor_mbs.models.exudyn.loads import chain_sensors
-from rotor_mbs.models.exudyn.moments import ROTOR, Loads, Moment, is_driven, pitch_terms
+from rotor_mbs.models.exudyn.moments import Loads, Moment, is_driven, moment_on
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
@@ -82,7 +82,7 @@ def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
     if scene.shaft_damping:
         built.append(_spring("shaft damper", "ground at shaft", "hub at shaft", damping=scene.shaft_damping))
     if scene.has_torque:
-        built.append(_rotor_torque(scene, Moment(loads, ((ROTOR, 1.0),))))
+        built.append(_rotor_torque(scene, moment_on(scene, loads, 0)))
     return built + _sensors(scene, [hub, *blades])
 
 
@@ -141,7 +141,7 @@ def _bearing(name: str, first: Part, second: Part) -> list[Part]:
 def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) -> list[Part]:
     """Spring, damper and torque between hub and blade; the engine adds `torque` to what resists."""
     stiffness, damping = scene.bearing(blade)
-    name, moment = f"pitch spring {blade + 1}", Moment(loads, pitch_terms(scene, blade))
+    name, moment = f"pitch spring {blade + 1}", moment_on(scene, loads, 1 + blade)
     constants = {"stiffness": stiffness, "damping": damping, "offset": constant_value(scene.pitch_load(blade)[1])}
     if all(map(is_constant, scene.pitch_load(blade))):
         constants["torque"] = -moment.at(0.0)

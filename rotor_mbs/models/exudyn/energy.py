@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.models.exudyn.geometry import pitching
-from rotor_mbs.models.exudyn.moments import ROTOR, pitch_terms
+from rotor_mbs.models.exudyn.moments import drives
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, is_constant, values_at
 from rotor_mbs.solution.trajectory import Array, sample_times
@@ -43,15 +43,12 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
 
     A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `work_of_rests`.
     """
-    drives = _drives(scene)
-    if not work_needs_rows(scene):
-        exact: Array = scene.torque_at(0.0) * (angles[:, 0] - angles[:1, 0])
-        for column, terms in drives[1:]:
-            for load, _ in terms:
-                exact = exact + segments[0].values[load] * (angles[:, column] - angles[:1, column])
-        return exact
-    losses = _losses(scene, rates)
     out, done = np.zeros(len(time)), 0.0
+    if not work_needs_rows(scene):
+        for column, load, _ in drives(scene):
+            out += segments[0].values[load] * (angles[:, column] - angles[:1, column])
+        return out
+    losses = _losses(scene, rates)
     slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in segments:
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
@@ -59,18 +56,11 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
             break
         inside = slice(first, last)
         power = -losses[inside]
-        for column, terms in drives:
-            for load, factor in terms:
-                power = power + factor * segment.at(load, time[inside]) * rates[inside, column]
+        for column, load, factor in drives(scene):
+            power = power + factor * segment.at(load, time[inside]) * rates[inside, column]
         out[inside] = done + cumulative_integral(time[inside], power)
         done = out[last - 1]
     return out
-
-
-def _drives(scene: Scene) -> list[tuple[int, tuple[tuple[int, float], ...]]]:
-    """(coordinate, (load, factor) of what drives it)."""
-    rotor: tuple[tuple[int, float], ...] = ((ROTOR, 1.0),) if scene.has_torque else ()
-    return [(0, rotor), *((1 + i, pitch_terms(scene, i)) for i in pitching(scene))]
 
 
 def work_of_rests(scene: Scene, angles: Array) -> Array:

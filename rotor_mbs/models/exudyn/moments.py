@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, is_constant, segments
 
-# Places in `Scene.load_tables`.
-ROTOR = 0
+ROTOR = 0  # the rotor's torque in `Scene.load_tables`
 
 
-def torque_of(blade: int) -> int:
-    """Number of the pitch torque of a blade; blades are counted from 0."""
-    return 1 + 2 * blade
+class Drive(NamedTuple):
+    """What drives a coordinate (0: rotor): `factor` times the load at a place in `Scene.load_tables`."""
+
+    coordinate: int
+    load: int
+    factor: float
 
 
-def rest_of(blade: int) -> int:
-    """Number of the rest angle of a blade's spring."""
-    return 2 + 2 * blade
+def drives(scene: Scene) -> list[Drive]:
+    """Torques, and the moments k r of springs whose rest angle r changes over time; one that is constant is the
+    spring's own."""
+    found = [Drive(0, ROTOR, 1.0)] if scene.has_torque else []
+    for column in scene.moving_coordinates[1:]:
+        torque, rest = scene.pitch_load(column - 1)
+        if torque:
+            found.append(Drive(column, 2 * column - 1, 1.0))
+        if not is_constant(rest):
+            found.append(Drive(column, 2 * column, scene.bearing(column - 1)[0]))
+    return found
 
 
 class Loads:
@@ -54,16 +65,11 @@ class Moment:
         return [0.0, self.at(time), 0.0]
 
 
-def pitch_terms(scene: Scene, blade: int) -> tuple[tuple[int, float], ...]:
-    """The terms that drive a pitch: its torque, and the moment k r of a spring whose rest angle r changes over time.
-
-    A rest angle that is constant is the spring's own.
-    """
-    torque, rest = scene.pitch_load(blade)
-    terms = [(torque_of(blade), 1.0)] if torque else []
-    return (*terms, (rest_of(blade), scene.bearing(blade)[0])) if not is_constant(rest) else tuple(terms)
+def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
+    """Of all that drives a coordinate (0: rotor)."""
+    return Moment(loads, tuple((one.load, one.factor) for one in drives(scene) if one.coordinate == coordinate))
 
 
 def is_driven(scene: Scene, blade: int) -> bool:
     """Whether a spring, a damper or a torque acts on the pitch of a blade."""
-    return any(scene.bearing(blade)) or bool(pitch_terms(scene, blade))
+    return any(scene.bearing(blade)) or any(one.coordinate == 1 + blade for one in drives(scene))

@@ -17,7 +17,7 @@ from rotor_mbs.models.exudyn.geometry import (
     pitching,
 )
 from rotor_mbs.models.exudyn.loads import tree_sensors
-from rotor_mbs.models.exudyn.moments import ROTOR, Loads, Moment, pitch_terms
+from rotor_mbs.models.exudyn.moments import Loads, Moment, moment_on
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
@@ -29,12 +29,12 @@ _NODE = Ref("node", "joint angles")
 def parts(scene: Scene, loads: Loads) -> list[Part]:
     """Everything the engine holds for this scene, in the order it is built."""
     built = [_node(scene), _tree(scene)]
-    if scene.has_torque:
-        built += _torque("rotor torque", "rotor angle", 0, Moment(loads, ((ROTOR, 1.0),)), scene.has_constant_torque)
-    for number, blade in enumerate(pitching(scene), start=1):
-        if terms := pitch_terms(scene, blade):
-            name, is_fixed = f"{blade + 1}", all(map(is_constant, scene.pitch_load(blade)))
-            built += _torque(f"pitch torque {name}", f"pitch angle {name}", number, Moment(loads, terms), is_fixed)
+    for number, column in enumerate(scene.moving_coordinates):
+        moment = moment_on(scene, loads, column)
+        if moment.terms:
+            what, which = ("pitch", f" {column}") if column else ("rotor", "")
+            is_fixed = all(is_constant(scene.load_tables[load]) for load, _ in moment.terms)
+            built += _torque(f"{what} torque{which}", f"{what} angle{which}", number, moment, is_fixed)
     built += [
         sensor("angles", "SensorNode", "Coordinates", "joint angles", nodeNumber=_NODE),
         sensor("rates", "SensorNode", "Coordinates_t", "joint rates", nodeNumber=_NODE),
