@@ -45,9 +45,9 @@ def writing(output: Path, kind: str) -> Iterator[Path]:
         _prepare(parts, kind)
         lock.acquire()
     except Timeout:
-        raise InputError(
-            f"{output}: another process is writing it now{_owner(parts)}; allowed: wait for its end, or another output"
-        ) from None
+        owner = _noted(parts, 1)
+        writer = f"another process is writing it now{f' ({owner})' if owner else ''}"
+        raise InputError(f"{output}: {writer}; allowed: wait for its end, or another output") from None
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
     _held[own] = kind
@@ -88,7 +88,7 @@ def _prepare(parts: Path, kind: str) -> None:
     foreign = sorted(name for name in names if not _OWN.fullmatch(name))
     if foreign:
         raise InputError(f"{parts}: has {foreign[0]}, a foreign file; allowed: another output, or remove it")
-    found = _first_line(parts)
+    found = _noted(parts, 0)
     if found not in ("", kind) and any(name.endswith(".h5") for name in names):
         raise InputError(
             f"{parts}: has unfinished work of `{_COMMANDS.get(found, found)}`; allowed: to finish that, "
@@ -96,15 +96,10 @@ def _prepare(parts: Path, kind: str) -> None:
         )
 
 
-def _first_line(parts: Path) -> str:
-    with suppress(OSError, UnicodeDecodeError):
-        return (parts / _KIND).read_text().partition("\n")[0]
-    return ""
-
-
-def _owner(parts: Path) -> str:
-    with suppress(OSError, UnicodeDecodeError):
-        return f" ({(parts / _KIND).read_text().splitlines()[1]})"
+def _noted(parts: Path, line: int) -> str:
+    """A line of what the writer of the output notes: its kind, its process; "" where there is none."""
+    with suppress(OSError, UnicodeDecodeError, IndexError):
+        return (parts / _KIND).read_text().splitlines()[line]
     return ""
 
 

@@ -187,48 +187,47 @@ def damages_of(group: Any) -> list[str]:
     if not known:
         return [digests.DIGESTS]
     unfilled = digests.unfilled_in(known)
-    found = {digests.ATTRIBUTES: _proved(lambda: digests.attributes_digest(group.attrs))}
+    found = {digests.ATTRIBUTES: _proved(digests.attributes_digest, group.attrs)}
     for name in group:
-        found |= _digests_of_member(group, name, name in unfilled)
+        item = _member(group, name)
+        if item is None:
+            found[name] = ""
+        elif name in unfilled and not hdf5.is_group(item):
+            found[digests.unfilled(name)] = _proved(digests.attributes_digest, item.attrs)
+        elif not hdf5.is_group(item):
+            found[name] = _proved(_digest, item)
     return [name for name in {**known, **found} if known.get(name) != found.get(name)]
 
 
-def _digests_of_member(group: Any, name: str, is_unfilled: bool) -> dict[str, str]:
+def _member(group: Any, name: str) -> Any:
+    """None where it is a link, or cannot be read."""
     try:
-        item = hdf5.member(group, name)
+        return hdf5.member(group, name)
     except (KeyError, StoreError):
-        return {name: ""}
-    if hdf5.is_group(item):
-        return {}
-    if is_unfilled:
-        return {digests.unfilled(name): _proved(lambda: digests.attributes_digest(item.attrs))}
-    return {name: _proved(lambda: digests.dataset_digest(hdf5.values_of(item), item.attrs))}
+        return None
 
 
-def _proved(digest: Callable[[], str]) -> str:
+def _digest(dataset: Any) -> str:
+    return digests.dataset_digest(hdf5.values_of(dataset), dataset.attrs)
+
+
+def _proved(digest: Callable[[Any], str], content: Any) -> str:
     """ "" where the content cannot be read."""
     try:
         with hdf5.reading(""):
-            return digest()
+            return digest(content)
     except StoreError:
         return ""
 
 
-def all_damages(group: Any) -> Iterator[tuple[str, str]]:
+def all_damages(group: Any, seen: set[int] | None = None) -> Iterator[tuple[str, str]]:
     """(path, part) of whatever is damaged in a group and the groups below it; at most once each."""
-    seen: set[int] = set()
-
-    def visit(inner: Any) -> Iterator[tuple[str, str]]:
-        if hdf5.address(inner) in seen:
-            return
-        seen.add(hdf5.address(inner))
-        yield from ((str(inner.name).strip("/"), part) for part in damages_of(inner))
-        for name in inner:
-            try:
-                item = hdf5.member(inner, name)
-            except (KeyError, StoreError):
-                continue  # told above
-            if hdf5.is_group(item):
-                yield from visit(item)
-
-    return visit(group)
+    seen = set() if seen is None else seen
+    if hdf5.address(group) in seen:
+        return
+    seen.add(hdf5.address(group))
+    yield from ((str(group.name).strip("/"), part) for part in damages_of(group))
+    for name in group:
+        item = _member(group, name)
+        if item is not None and hdf5.is_group(item):
+            yield from all_damages(item, seen)
