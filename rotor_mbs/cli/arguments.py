@@ -180,6 +180,7 @@ _COMMANDS = (
     Command("stability", "stiff and extreme scenes by every method: where each holds, and the map of it",
             "studies:stability", ("", "stiff/bearing-1e8 -o stiff.h5"), (
         _argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)"),
+        _method(),
         _SET,
         _output(file, "FILE", Path("stability.h5")),
         _REPORT,

@@ -58,7 +58,7 @@ def stability(arguments: argparse.Namespace) -> int:
     with ProgressLine() as progress:
         report = run_suite(
             arguments.scenes, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
-            settings=dict(arguments.set or ()), on_progress=progress,
+            methods=check_names(arguments.method or ()), settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
     print(*advice_lines(report.runs), sep="\n")
     seconds = time.monotonic() - start

@@ -44,29 +44,30 @@ def run_suite(
     *,
     workers: int,
     timeout_s: float,
+    methods: Sequence[str] = (),
     settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> SuiteReport:
     """The suite on the scenes of these names (all of it where there are none) into the results file `output`.
 
-    settings: of the methods that have them, for the runs of the map; the step ladders vary the step by themselves.
+    methods: all corrected ones where none is named; settings: of the methods that have them, for the runs of the map; the step ladders vary the step by themselves.
     What the file has already is kept; records of these scenes that are no longer wanted are dropped. Raises InputError,
     StoreError.
     """
     scenes = find_scenes(names or SUITE)
-    methods = {scene.name: able_methods(scene, method_names(is_corrected=True))[0] for scene in scenes}
-    none: Mapping[str, Sequence[str]] = dict.fromkeys(methods, ())  # references, some of which take long, first
-    patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in methods.items()}
-    every = dict.fromkeys(method for able in methods.values() for method in able)
+    asked = {scene.name: able_methods(scene, methods or method_names(is_corrected=True))[0] for scene in scenes}
+    none: Mapping[str, Sequence[str]] = dict.fromkeys(asked, ())  # references, some of which take long, first
+    patient = {name: [method for method in able if method == _PATIENT_METHOD] for name, able in asked.items()}
+    every = dict.fromkeys(method for able in asked.values() for method in able)
     chosen_settings = settings_for(list(every), settings or {})
     made: list[Outcome] = []
-    for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (methods, timeout_s)):
+    for chosen, limit_s in ((none, timeout_s), (patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
         own = {k: v for able in chosen.values() for method in able for k, v in chosen_settings[method].items()}
         report = run_scenes(
             scenes, chosen, output, workers=workers, timeout_s=limit_s, settings=own, on_progress=on_progress
         )
         made += report.made
-    made += complete_records(scenes, methods, output, workers, on_progress)
+    made += complete_records(scenes, asked, output, workers, on_progress)
     return SuiteReport(len(scenes), suite_runs(output), made)
 
 
@@ -81,9 +82,9 @@ def complete_records(
     cases = [*_step_cases(scenes, suite_runs(output)), *_conservation_cases(scenes, methods)]
     store = ResultsStore(output)
     made = execute(cases, in_pool(perform_record, workers, _RECORD_LIMIT_S), store, on_progress)
-    names, wanted = {scene.name for scene in scenes}, {case.key for case in cases}
     records = read_records(output, "steps", "limits", "conservation")
-    stale = {record.key for record in records if record.scene in names} - wanted
+    stale = {record.key for record in records if record.method in methods.get(record.scene, ())}
+    stale -= {case.key for case in cases}
     if stale:
         store.merge((), without=stale)
     return made

@@ -124,3 +124,5 @@ def test_an_interrupted_suite_goes_on_with_its_records(tmp_path: Path) -> None:
         assert made == methods
         assert [record.method for record in read_records(path)] == sorted(methods)
     assert [file.name for file in tmp_path.iterdir()] == ["s.h5"]
+    complete_records(scenes, {"extreme/zero-gravity": methods[:1]}, path, 0)  # of one method alone: the others' stay
+    assert [record.method for record in read_records(path)] == sorted(methods)
