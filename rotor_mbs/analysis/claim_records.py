@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,7 @@ def stored_claims(results: OpenResults | None = None) -> ClaimStudy | None:
     if len(found) < 2 and shipped_claims().exists():
         with open_results(shipped_claims()) as shipped:
             found = _records(shipped)
-    return _study(found) if len(found) == 2 else None
+    return ClaimStudy(_shares(found[SHARES]), _numbers(found[NUMBERS])) if len(found) == 2 else None
 
 
 def records_of(study: ClaimStudy, seed: int, made_with: Mapping[str, str]) -> list[Record]:
@@ -54,16 +54,12 @@ def _hashed(record: Record, facts: Mapping[str, object]) -> Record:
     attributes = {**record.attributes, **facts}
     content = [attributes, {name: np.asarray(values).tolist() for name, values in record.arrays.items()}]
     key = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-    return Record(record.kind, record.scene, record.name, {KEY_ATTRIBUTE: key, **attributes}, record.arrays)
+    return replace(record, attributes={KEY_ATTRIBUTE: key, **attributes})
 
 
 def _records(results: OpenResults) -> dict[str, Record]:
     found = [read_record(path, group) for path, group in records_in(results.root, KIND)]
     return {record.name: record for record in found}
-
-
-def _study(records: Mapping[str, Record]) -> ClaimStudy:
-    return ClaimStudy(_shares(records[SHARES]), _numbers(records[NUMBERS]))
 
 
 def _shares_record(study: ClaimShares) -> Record:

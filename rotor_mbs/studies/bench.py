@@ -27,12 +27,12 @@ from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
-from rotor_mbs.solution.status import COMPLETE, code_of
+from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import Record, write_records
 from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.studies.bench_worker import Judged, Point, PointScenes, Prepared, ask, prepared_scene, start_timer
+from rotor_mbs.studies.bench_worker import ERRORS, Point, PointScenes, ask, prepared_scene, start_timer
 from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
 
 BENCH = "bench"
@@ -41,7 +41,6 @@ SOURCES = ("studies/bench.py", "studies/bench_worker.py", "execution/timing.py")
 _REFERENCE_LIMIT_S = 60.0
 # A run longer than this is ended: a hanging engine must not eat the budget of the others.
 _RUN_LIMIT_S = 10.0
-_ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
 
 
 def run_bench(
@@ -195,11 +194,15 @@ def arrays_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 @dataclass
 class Measured:
-    """What was measured, by point. lost: why nothing is known of it, of a point whose process died twice."""
+    """What was measured, by point.
+
+    answers      of the timer, by the names they are stored under
+    unanswered   status and message of a point that failed
+    lost         why nothing is known of it, of a point whose process died twice
+    """
 
     timings: Timings[Point] = field(default_factory=Timings)
-    prepared: dict[Point, Prepared] = field(default_factory=dict)
-    judged: dict[Point, Judged] = field(default_factory=dict)
+    answers: dict[Point, dict[str, Any]] = field(default_factory=dict)
     unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
     lost: dict[Point, str] = field(default_factory=dict)
 
@@ -214,7 +217,7 @@ class Measured:
 
     def is_repeatable(self, points: Sequence[Point]) -> bool:
         """Whether the last run of every point was bit for bit its first one."""
-        return all(self.judged[point].same for point in points if point in self.judged)
+        return all(self.answers.get(point, {}).get("same", True) for point in points)
 
     def fail(self, point: Point, message: str) -> None:
         """Takes note of a point that raised an error."""
@@ -228,29 +231,17 @@ class Measured:
     def _row(self, point: Point) -> dict[str, Any]:
         names = ("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s")
         others = ("setup_time_s", "setup_again_time_s", "output_time_s")
-        row: dict[str, Any] = {"setting": point.setting, **dict.fromkeys((*_ERRORS, *names, *others), np.nan)}
-        row |= {"repeats": 0, "steps": 0, "status": code_of("left_out"), "false_success": 0, "message": ""}
+        row: dict[str, Any] = {"setting": point.setting, **dict.fromkeys((*ERRORS, *names, *others), np.nan)}
+        row |= {"repeats": 0, "steps": 0, "status": "left_out", "false_success": 0, "message": ""}
         if point in self.timings.left_out:
             row["message"] = self.timings.left_out[point]
         elif point in self.unanswered:
-            status, row["message"] = self.unanswered[point]
-            row["status"] = code_of(status)
+            row["status"], row["message"] = self.unanswered[point]
             row["run_time_s"] = self.timings.warm[point].seconds
         else:
-            row |= statistics(self.timings.times[point])
-            judged, prepared = self.judged[point], self.prepared[point]
-            if judged.status in COMPLETE:  # the errors of a run that broke off are those of its part
-                row |= {name: judged.metrics.get(name, np.nan) for name in _ERRORS}
-            row |= {
-                "setup_time_s": prepared.setup_s,
-                "setup_again_time_s": prepared.setup_again_s,
-                "output_time_s": judged.output_s,
-                "steps": judged.steps,
-                "status": code_of(judged.status),
-                "false_success": int(judged.false_success),
-                "message": judged.message,
-            }
-        return row
+            row |= self.answers[point] | statistics(self.timings.times[point])
+            del row["same"]
+        return row | {"status": code_of(row["status"])}
 
 
 def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], options: Mapping[str, Any]) -> Measured:
@@ -288,16 +279,14 @@ def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], optio
             prepared = answer("prepare", point)
             if prepared is None:
                 return Warm(time.perf_counter() - start, returned=False)
-            found.prepared[point] = prepared
-            return Warm(prepared.run_s, returned=True)
+            found.answers[point] = prepared
+            return Warm(prepared["run_time_s"], returned=True)
 
         def repeat(point: Point) -> float:
             seconds = answer("repeat", point)
             return math.nan if seconds is None else float(seconds)
 
         found.timings = conduct(points, warm_up, repeat, options["budget_s"], options["repeats"], time.perf_counter)
-        for point in found.prepared:
-            judged = answer("judge", point)
-            if judged is not None:
-                found.judged[point] = judged
+        for point, known in found.answers.items():
+            known |= answer("judge", point) or {}
     return found

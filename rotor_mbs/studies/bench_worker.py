@@ -19,7 +19,6 @@ from rotor_mbs.methods.base import Solver
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.solution.metrics import Metrics
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
@@ -31,6 +30,7 @@ _MOST_INTERVALS = 100
 # An error as large as the motion itself: such a run is a failure, not a point on the curve.
 USELESS_RAD = 1.0
 USELESS_DRIFT = 0.1  # of the energy scale, where there is no reference
+ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
 
 
 @dataclass(frozen=True)
@@ -44,34 +44,15 @@ class Point:
     settings: tuple[tuple[str, object], ...]
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """Seconds: of the first build (everything compiled anew), of a second one, and of one run (the warm-up)."""
-
-    setup_s: float
-    setup_again_s: float
-    run_s: float
-
-
-@dataclass(frozen=True)
-class Judged:
-    """The last run of a point. same: bit for bit the warm-up's; output_s: time to read out and compute the samples."""
-
-    status: str
-    message: str
-    false_success: bool
-    same: bool
-    steps: int
-    output_s: float
-    metrics: Metrics
-
-
 # Of each point its scene, and its reference if there is one.
 PointScenes: TypeAlias = Mapping[Point, tuple[Scene, Trajectory | None]]
 
 
 class PointTimer:
-    """Prepares, repeats and judges points; first prepares one that the process before this one had prepared."""
+    """Prepares, repeats and judges points; first prepares one that the process before this one had prepared.
+
+    Its answers are numbers by the names that they are stored under; times in s.
+    """
 
     def __init__(self, scenes: PointScenes, clock: Callable[[], float] = time.perf_counter) -> None:
         self._scenes, self._clock = scenes, clock
@@ -79,7 +60,8 @@ class PointTimer:
         self._last: dict[Point, Integration] = {}
         self._first_angles: dict[Point, Array] = {}
 
-    def prepare(self, point: Point) -> Prepared:
+    def prepare(self, point: Point) -> dict[str, float]:
+        """The times of a first build (everything compiled anew), of a second one, and of one run (the warm-up)."""
         method = find_method(point.method)
         settings = method.settings.of(point.method, dict(point.settings))
         scene, _ = self._scenes[point]
@@ -91,7 +73,7 @@ class PointTimer:
         gc.collect()  # the collector is off in the timing worker
         seconds = self._timed_run(point)
         self._first_angles[point] = self._solvers[point].observe().angles
-        return Prepared(setups[0], setups[1], seconds)
+        return {"setup_time_s": setups[0], "setup_again_time_s": setups[1], "run_time_s": seconds}
 
     def repeat(self, point: Point) -> float:
         """Seconds of one more run."""
@@ -105,8 +87,9 @@ class PointTimer:
         self._last[point] = solver.integrate()
         return self._clock() - start
 
-    def judge(self, point: Point) -> Judged:
-        """The last run; the point is done with."""
+    def judge(self, point: Point) -> dict[str, Any]:
+        """The last run's status, message, errors, steps, and time to read out and compute the samples; `same`: whether
+        it is bit for bit the warm-up. The point is done with."""
         if point not in self._solvers:
             self.prepare(point)
         start = self._clock()
@@ -122,8 +105,16 @@ class PointTimer:
         status, message = _status(judgement.status, judgement.message, judgement.metrics)
         del self._solvers[point]
         same = np.array_equal(trajectory.angles, self._first_angles[point])
-        false_success = integration.success and status != "ok"
-        return Judged(status, message, false_success, same, integration.steps or 0, output, judgement.metrics)
+        errors = judgement.metrics if status in COMPLETE else {}  # those of a run that broke off are of its part
+        return {
+            "status": status,
+            "message": message,
+            "false_success": int(integration.success and status != "ok"),
+            "steps": integration.steps or 0,
+            "output_time_s": output,
+            "same": same,
+            **{name: errors.get(name, np.nan) for name in ERRORS},
+        }
 
 
 def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[str, str]:

@@ -69,16 +69,9 @@ class KnownRun:
 
 def known_runs(bounds: Bounds, methods: tuple[str, ...]) -> list[KnownRun]:
     """`bounds`: those that the statuses follow; `methods`: those with bounds."""
-    found = [run for method in methods for run in _at_the_bounds(method, bounds)]
-    return [
-        *found,
-        *_broken_off(),
-        *_singular(),
-        *_conditioned(bounds),
-        *_carried(bounds),
-        *_gross(),
-        *_unbounded(),
-    ]
+    rules = [_at_the_bounds(method, bounds) for method in methods]
+    rules += [_broken_off(), _singular(), _conditioned(bounds), _carried(bounds), _gross(), _unbounded()]
+    return [run for rule in rules for run in rule]
 
 
 def metrics_off() -> Iterator[tuple[str, float]]:

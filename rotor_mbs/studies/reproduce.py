@@ -97,10 +97,10 @@ def perform_ladder(job: Job) -> Result:
             found.timings.left_out[point] = f"not run: the setting before took {longest:.2g} s"
             continue
         try:
-            prepared = timer.prepare(point)
-            found.prepared[point], found.timings.times[point] = prepared, [prepared.run_s]
-            found.judged[point] = timer.judge(point)
-            longest = prepared.run_s
+            seconds = timer.prepare(point)
+            found.timings.times[point] = [seconds["run_time_s"]]
+            found.answers[point] = seconds | timer.judge(point)
+            longest = seconds["run_time_s"]
         except OF_THE_MACHINE:
             raise
         except RotorError as exc:
