@@ -50,7 +50,8 @@ def run_suite(
 ) -> SuiteReport:
     """The suite on the scenes of these names (all of it where there are none) into the results file `output`.
 
-    methods: all corrected ones where none is named; settings: of the methods that have them, for the runs of the map; the step ladders vary the step by themselves.
+    methods: all corrected ones where none is named; settings: of the methods that have them, for the runs of the map
+    (the step ladders vary the step by themselves).
     What the file has already is kept; records of these scenes that are no longer wanted are dropped. Raises InputError,
     StoreError.
     """
