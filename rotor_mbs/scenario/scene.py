@@ -168,6 +168,11 @@ class Scene:
         return self.shaft_damping != 0.0 or any(self.bearing_damping)
 
     @property
+    def work_needs_path(self) -> bool:
+        """Whether the work has to be integrated along the path: it is exact for constant loads without dampers."""
+        return self.has_damping or not self.has_constant_loads
+
+    @property
     def coordinate_labels(self) -> tuple[str, ...]:
         return ("rotor", *(f"pitch {i + 1}" for i in range(len(self.blades))))
 

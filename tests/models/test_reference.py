@@ -62,7 +62,7 @@ def _propagated(name: str, tolerance: float) -> Any:
     """(samples, coordinates that move) rad, quad precision."""
     scene = shipped_scene(name)
     run = Propagation(scene, build_system(scene), quad=True, tol=tolerance, compact_mode=True)
-    run.run()
+    run.integrate()
     return run.states[:, : len(scene.moving_coordinates)]
 
 
@@ -130,7 +130,7 @@ def test_a_reference_that_fails_says_why_and_how_far_the_better_run_came(failing
         for name, reached, steps in (("best", 2.0, 20), ("check", 1.0, 10))
     }
     solver: Any = object.__new__(ReferenceSolver)
-    solver._runs = [SimpleNamespace(run=lambda one=one: one) for one in runs.values()]
+    solver._runs = [SimpleNamespace(integrate=lambda one=one: one) for one in runs.values()]
     found = solver.integrate()
     assert (found.success, found.time_reached, found.steps) == (not failing, 2.0, 20)
     assert found.message == (f"{failing} failed" if failing else "")

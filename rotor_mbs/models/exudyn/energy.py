@@ -33,18 +33,13 @@ def _rest(scene: Scene, blade: int, angles: Array) -> Array:
     return values_at(scene.pitch_load(blade)[1], sample_times(scene)[: len(angles)])
 
 
-def work_needs_rows(scene: Scene) -> bool:
-    """Whether the work has to be integrated along the path: it is exact for constant loads without dampers."""
-    return scene.has_damping or not scene.has_constant_loads
-
-
 def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the torques less what the dampers took, from rows of time s, angles rad, rates rad/s.
 
     A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `work_of_rests`.
     """
     out, done = np.zeros(len(time)), 0.0
-    if not work_needs_rows(scene):
+    if not scene.work_needs_path:
         for column, load, _ in drives(scene):
             out += segments[0].values[load] * (angles[:, column] - angles[:1, column])
         return out

@@ -18,7 +18,6 @@ from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stabil
 from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
-from rotor_mbs.models.exudyn.energy import work_needs_rows
 from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, ExtrapolatedSolver
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
@@ -86,7 +85,7 @@ def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
     scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
-    between = scene.wants("energy") and work_needs_rows(scene)
+    between = scene.wants("energy") and scene.work_needs_path
     return MultibodySolver(scene, tree.parts(scene, loads), loads, scheme, sensor_samples.tree_trajectory, between)
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.closed_form import accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
@@ -31,8 +30,8 @@ def motion_at(scene: Scene, times: Array, equations: Equations | None = None) ->
     if equations is None and is_available():
         # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
         run = Propagation(scene, build_system(scene), times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)
-        run.run()
-        return samples.trajectory(scene, times, run.states)
+        run.integrate()
+        return run.observe()
     solver = OdeSolver(scene, scipy_integrator("DOP853", *_DOP853), times, equations)
     solver.integrate()
     return solver.observe()

@@ -180,7 +180,7 @@ def load_segments(scene: Scene) -> tuple[Segment, ...]:
 
 def work_is_integrated(scene: Scene) -> bool:
     """Whether the work is a variable of the equations: of constant loads without dampers it is known exactly."""
-    return scene.wants("energy") and (scene.has_damping or not scene.has_constant_loads)
+    return scene.wants("energy") and scene.work_needs_path
 
 
 # Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).

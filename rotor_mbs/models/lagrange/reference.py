@@ -41,7 +41,7 @@ class ReferenceSolver:
         ]
 
     def integrate(self) -> Integration:
-        best, check = (run.run() for run in self._runs)
+        best, check = (run.integrate() for run in self._runs)
         return best if not best.success else replace(check, time_reached=best.time_reached, steps=best.steps)
 
     def observe(self) -> Trajectory:
@@ -97,7 +97,7 @@ def _transition_matrices(scene: Scene, times: Array | None = None) -> Array:
     """(n, 2k, 2k) from the variational equations, for k coordinates that move."""
     count = 2 * len(scene.moving_coordinates)
     propagation = Propagation(scene, build_system(scene), variational=True, compact_mode=True, times=times)
-    propagation.run()
+    propagation.integrate()
     matrices: Array = propagation.states[:, count:].reshape(-1, count, count)
     return matrices
 
@@ -142,8 +142,8 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     """
     if is_available():
         run = Propagation(scene, build_system(scene), quad=True, tol=_QUAD, compact_mode=True, times=times)
-        run.run()
-        trajectory = samples.trajectory(scene, times, run.states.astype(float))
+        run.integrate()
+        trajectory = run.observe()
         matrices = _transition_matrices(scene, times)
         trajectory.error_growth = _largest_growth(scene, matrices)[: len(trajectory.time)]
     else:

@@ -110,7 +110,7 @@ def is_compact(scene: Scene) -> bool:
 
 
 class Propagation:
-    """The equations of a scene under heyoka's Taylor method, run from its initial state as often as wanted.
+    """The equations of a scene under heyoka's Taylor method; see `rotor_mbs.methods.base.Solver`.
 
     quad         in quad precision; the scene's doubles are taken as exact
     variational  with the state transition matrix (without the work) as further variables, row by row
@@ -129,7 +129,7 @@ class Propagation:
         times: Array | None = None,
         **options: Any,
     ) -> None:
-        engine = heyoka()
+        engine, self._scene = heyoka(), scene
         columns, count = scene.moving_coordinates, 2 * len(scene.moving_coordinates)
         equations = system.equations
         values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
@@ -148,7 +148,7 @@ class Propagation:
         self.times = sample_times(scene) if times is None else times
         self.states = self._initial[None, :]
 
-    def run(self) -> Integration:
+    def integrate(self) -> Integration:
         self._integrator.time = self._initial.dtype.type(0)
         self._integrator.state[:] = self._initial
         self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
@@ -167,21 +167,13 @@ class Propagation:
         message = deadline.message() if deadline.is_over() else failure(outcome)
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
 
-
-class TaylorSolver:
-    """See `rotor_mbs.methods.base.Solver`. Raises MethodRefusal where heyoka is not installed."""
-
-    def __init__(self, scene: Scene, tolerance: float) -> None:
-        self._scene = scene
-        self._propagation = Propagation(
-            scene, build_system(scene), tol=tolerance, compact_mode=is_compact(scene), high_accuracy=True
-        )
-
-    def integrate(self) -> Integration:
-        return self._propagation.run()
-
     def observe(self) -> Trajectory:
-        return samples.trajectory(self._scene, self._propagation.times, self._propagation.states)
+        return samples.trajectory(self._scene, self.times, self.states.astype(float, copy=False))
+
+
+def solver(scene: Scene, tolerance: float) -> Propagation:
+    """In double precision, the samples as they are stored. Raises MethodRefusal where heyoka is not installed."""
+    return Propagation(scene, build_system(scene), tol=tolerance, compact_mode=is_compact(scene), high_accuracy=True)
 
 
 def items(scene: Scene) -> list[BuiltItem]:

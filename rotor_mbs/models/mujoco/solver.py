@@ -64,7 +64,7 @@ class MujocoSolver:
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
         self._moving = scene.moving_coordinates
         self._intervals = intervals(mjcf.load_segments(scene), scene.samples, every_sample=True)
-        self._rows_between = scene.wants("energy") and _work_needs_rows(scene)
+        self._rows_between = scene.wants("energy") and scene.work_needs_path
         self._rows = _Rows()
         self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
 
@@ -153,7 +153,7 @@ class MujocoSolver:
         loads = mjcf.loads_of(self._scene)
         columns, gains = [self._moving.index(load.coordinate) for load in loads], np.array([one.gain for one in loads])
         torques = gains * values
-        if not _work_needs_rows(self._scene):
+        if not self._scene.work_needs_path:
             turned = angles[:, columns] - angles[:1, columns]
             return np.asarray((torques * turned).sum(axis=1))
         dampings = np.array(_dampings(self._scene))[self._moving]
@@ -164,11 +164,6 @@ class MujocoSolver:
         h = np.diff(self._rows.times)
         parts = 0.5 * h * (power[1:] + power[:-1]) + h * h / 12.0 * (change[:-1] - change[1:])
         return np.concatenate([[0.0], np.cumsum(parts)])
-
-
-def _work_needs_rows(scene: Scene) -> bool:
-    """Whether the work has to be integrated along the path: it is exact for constant loads without dampers."""
-    return scene.has_damping or not scene.has_constant_loads
 
 
 def _dampings(scene: Scene) -> tuple[float, ...]:
