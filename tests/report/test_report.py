@@ -198,6 +198,12 @@ def test_a_gap_in_a_curve_is_a_gap_in_its_picture() -> None:
     assert "nan" not in text
 
 
+def test_a_straight_curve_of_many_samples_is_short() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot(TIME, 0.3 * TIME, color=COLOURS[2])
+    assert len(svg.drawing(picture, "n", "t", "d")) < 5000  # a thousand steps would be 8 characters each
+
+
 def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
     picture = panels((2.0,), "time (s)")
     picture.axes[0].plot([0.0, 1.0], [0.0, 3e-4])

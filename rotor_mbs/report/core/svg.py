@@ -200,8 +200,8 @@ class _Page:
 
     def _path(self, path: Any, transform: Any) -> str:
         """Path data with relative steps of a tenth of a point, which are shorter than places."""
-        parts = []
-        for points in transform.transform_path(path).cleaned(remove_nans=True).to_polygons(closed_only=False):
+        parts, whole = [], transform.transform_path(path).cleaned(remove_nans=True, simplify=True)
+        for points in whole.to_polygons(closed_only=False):
             tenths = np.round(10.0 * np.clip(self._placed(points), -1e4, 1e4))
             steps = np.diff(tenths, axis=0)
             numbers = [_short(0.1 * step) for step in steps[steps.any(axis=1)].ravel()]
