@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import sys
 import time
 from functools import partial
 from pathlib import Path
 
-from rotor_mbs.analysis.claim_records import stored_claims
-from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.finding import finding
-from rotor_mbs.analysis.run_tables import finding_lines, method_table, run_table
+from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
 from rotor_mbs.execution.output_lock import has_unfinished
-from rotor_mbs.execution.provenance import fingerprint, versions
 from rotor_mbs.methods.catalogue import check_names
-from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
+from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.reference import compute_references
+from rotor_mbs.studies.reproduce import made_from, summary_of
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
 
@@ -62,13 +58,13 @@ def reproduce(arguments: argparse.Namespace) -> int:
     results, pages = arguments.output / "results.h5", arguments.output / "report"
     index, summary, stamp = (pages / name for name in ("index.html", "summary.txt", ".made-from"))
     there = results.is_file() and index.is_file() and summary.is_file() and stamp.is_file()
-    if there and stamp.read_text() == _made_from(results, arguments.timeout) and not has_unfinished(results):
+    if there and stamp.read_text() == made_from(results, arguments.timeout) and not has_unfinished(results):
         print(f"{results}: nothing to do, every run is there already")
     else:
         status = _reproduce(arguments, results, pages)
-        replace_file(summary, _summary(results).encode())
+        replace_file(summary, summary_of(results).encode())
         if status == 0:
-            replace_file(stamp, _made_from(results, arguments.timeout).encode())
+            replace_file(stamp, made_from(results, arguments.timeout).encode())
     print_text(summary.read_text(encoding="utf-8"))
     print(f"report: {index}\n{time.monotonic() - start:.1f} s in all")
     return status
@@ -81,25 +77,6 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> int
         report = reproduce_paper(results, workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress)
         write_report(results, pages, arguments.jobs, partial(progress.stage, "pages and figures"))
     return print_summary(report, results)
-
-
-def _made_from(results: Path, timeout_s: float) -> str:
-    """A digest of the results file, code, versions, scenes, references and the time limit."""
-    digest = hashlib.sha256(f"{fingerprint('.')} {versions()} {timeout_s}".encode())
-    for path in (results, *sorted(scenarios_folder().rglob("*.toml")), *sorted(reference_folder().iterdir())):
-        with path.open("rb") as file:
-            digest.update(hashlib.file_digest(file, "sha256").digest())
-    return digest.hexdigest()
-
-
-def _summary(path: Path) -> str:
-    """Numbers and claims of the paper, and a line for each method over all its scenes."""
-    with open_results(path) as results:
-        runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        study = stored_claims(results)
-        facts = finding(results.scenes, claims(results.scenes))
-        lines = finding_lines(facts, None if study is None else study.shares)
-        return "\n".join([*lines, "", str(method_table(runs)), ""])
 
 
 def reference(arguments: argparse.Namespace) -> int:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rotor_mbs.cli.terminal import print_doubts
-from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps
-from rotor_mbs.scenario.scene import Scene, scene_fields
 
 if TYPE_CHECKING:  # numpy behind it is too heavy for `list`
-    from rotor_mbs.methods.base import BuiltItem, Method
+    from rotor_mbs.methods.base import Method
 
 
 def list_all(arguments: argparse.Namespace) -> int:
@@ -58,6 +57,7 @@ def new(arguments: argparse.Namespace) -> int:
 def show(arguments: argparse.Namespace) -> int:
     """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
     from rotor_mbs.methods.catalogue import look_up
+    from rotor_mbs.studies.scene_overview import models_of, scene_data
 
     method = look_up(arguments.scene)
     if method is not None:
@@ -67,14 +67,16 @@ def show(arguments: argparse.Namespace) -> int:
     if len(found) != 1:
         raise InputError(f"{arguments.scene}: {len(found)} scenes; allowed: one scene's name or file")
     scene = found[0]
-    models = _models(scene)
+    models = models_of(scene)
     if arguments.json:
         built = {model.name: asdict(model) for model in models}
-        print(json.dumps({"name": scene.name, "scene": _data(scene), "models": built}, ensure_ascii=False, indent=1))
+        print(
+            json.dumps({"name": scene.name, "scene": scene_data(scene), "models": built}, ensure_ascii=False, indent=1)
+        )
         return 0
     print_doubts(found)
     print(f"{scene.name}: {scene.title}\n")
-    for key, value in _data(scene).items():
+    for key, value in scene_data(scene).items():
         if isinstance(value, dict):
             print(f"  {key}", *(f"    {part:24} {_readable(number)}" for part, number in value.items()), sep="\n")
         else:
@@ -94,62 +96,9 @@ def _settings_lines(method: Method) -> list[str]:
     return [*lines, "", f"set one: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE"] if lines else ["no settings"]
 
 
-def _data(scene: Scene) -> dict[str, object]:
-    """Every key of the scene that is set, with its unit."""
-    data: dict[str, object] = {}
-    for one in scene_fields("label", "run", "start", "rotor"):
-        value, unit = getattr(scene, one.name), one.metadata["unit"]
-        if one.name == "blades":
-            data["blades"] = len(value)
-            alike = all(blade == value[0] for blade in value)
-            for i, blade in enumerate(value[:1] if alike else value):
-                numbers = {f"{part.name}, {part.metadata['unit']}": getattr(blade, part.name) for part in fields(blade)}
-                data["every blade" if alike else f"blade {i + 1}"] = numbers
-        elif one.metadata["key"] and one.name != "title" and (value not in ((), 0.0) or one.name == "gravity"):
-            data[one.metadata["key"] if unit == "1" else f"{one.metadata['key']}, {unit}"] = value
-    return data
-
-
 def _readable(value: object) -> str:
     if isinstance(value, dict):
         return "; ".join(f"{key} {_readable(part)}" for key, part in value.items())
     if isinstance(value, tuple):
         return ", ".join(f"[{_readable(part)}]" if isinstance(part, tuple) else _readable(part) for part in value)
     return f"{value:.10g}" if isinstance(value, float) else str(value)
-
-
-@dataclass
-class _Model:
-    """What a model would build for the scene, or why it cannot."""
-
-    name: str
-    methods: list[str]
-    items: list[BuiltItem] = field(default_factory=list)
-    refused: str = ""
-    is_linearized: bool = False
-
-    @property
-    def line(self) -> str:
-        """ "lagrange/taylor, /ode45, ...", and what else there is to know."""
-        first, *others = self.methods
-        names = ", ".join([first, *(name.removeprefix(self.name) for name in others)])
-        if self.refused:
-            return f"{names}  (cannot represent this scene: {self.refused})"
-        return names + ("  (linearized by `rotor-mbs modes`)" if self.is_linearized else "")
-
-
-def _models(scene: Scene) -> list[_Model]:
-    from rotor_mbs.methods.catalogue import methods
-
-    models: dict[str, _Model] = {}
-    for method in methods():
-        known = models.setdefault(method.model, _Model(method.model, []))
-        known.methods.append(method.name)
-        known.is_linearized |= method.linearize is not None
-        if known.items:
-            continue
-        try:
-            known.items, known.refused = method.items(scene), ""
-        except MethodRefusal as exc:
-            known.refused = str(exc)
-    return list(models.values())

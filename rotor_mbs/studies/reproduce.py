@@ -7,21 +7,27 @@ those of a bench, its times are good to a factor.
 
 from __future__ import annotations
 
+import hashlib
 import os
 from dataclasses import replace
 from pathlib import Path
 
-from rotor_mbs.analysis.claim_records import shipped_claims
+from rotor_mbs.analysis.claim_records import shipped_claims, stored_claims
+from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.errata import ERRATA, errata_record
+from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.run_selection import PRINTED
+from rotor_mbs.analysis.run_tables import finding_lines, method_table
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Result, ignore_progress
 from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
+from rotor_mbs.execution.provenance import fingerprint, versions
 from rotor_mbs.methods.catalogue import default_methods, errata_methods, ladders
-from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
+from rotor_mbs.store.read import open_results
 from rotor_mbs.store.records import write_records
 from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench import BENCH, SOURCES, Measured, curve_record, facts_of, points_of, store_curve
@@ -50,6 +56,25 @@ def _complete_claims(output: Path) -> None:
     shipped, results = shipped_claims(), ResultsStore(output)
     if shipped.exists() and not ResultsStore(shipped).stored_keys() <= results.stored_keys():
         results.merge([shipped])
+
+
+def made_from(results: Path, timeout_s: float) -> str:
+    """A digest of the results file, code, versions, scenes, references and the time limit."""
+    digest = hashlib.sha256(f"{fingerprint('.')} {versions()} {timeout_s}".encode())
+    for path in (results, *sorted(scenarios_folder().rglob("*.toml")), *sorted(reference_folder().iterdir())):
+        with path.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()
+
+
+def summary_of(path: Path) -> str:
+    """Numbers and claims of the paper, and a line for each method over all its scenes."""
+    with open_results(path) as results:
+        runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
+        study = stored_claims(results)
+        facts = finding(results.scenes, claims(results.scenes))
+        lines = finding_lines(facts, None if study is None else study.shares)
+        return "\n".join([*lines, "", str(method_table(runs)), ""])
 
 
 def perform(job: Job) -> Result:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rotor_mbs.cli import main, runs
+from rotor_mbs.studies import reproduce
 
 
 @pytest.fixture
@@ -25,14 +26,14 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]
         return int((tmp_path / "fails").exists())
 
     monkeypatch.setattr(runs, "_reproduce", work)
-    monkeypatch.setattr(runs, "_summary", lambda _: "what came out\n")
+    monkeypatch.setattr(runs, "summary_of", lambda _: "what came out\n")
 
-    def reproduce(*options: str) -> bool:
+    def called(*options: str) -> bool:
         done.clear()
         assert main(["reproduce", "-o", str(tmp_path), *options]) == int(bool(done) and (tmp_path / "fails").exists())
         return bool(done)
 
-    return reproduce
+    return called
 
 
 def test_nothing_is_done_twice_and_the_summary_is_shown_again(
@@ -67,7 +68,7 @@ def test_another_time_limit_or_other_code_is_looked_into(
 ) -> None:
     assert call()
     assert call("--timeout", "5")
-    monkeypatch.setattr(runs, "fingerprint", lambda *_: "other code")
+    monkeypatch.setattr(reproduce, "fingerprint", lambda *_: "other code")
     assert call("--timeout", "5")
 
 
