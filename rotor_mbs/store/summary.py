@@ -26,7 +26,7 @@ _NUMBERS = {
     "angle_error_end": Column(("row",), "rad", "angle error at the last sample"),
     "tip_error_max": Column(("row",), "m", "largest distance of a tip from the reference up to the horizon"),
     "energy_drift_max": Column(("row",), "1", "largest energy error over the run, of the energy scale"),
-    "horizon_s": Column(("row",), "s", "time at which a perturbation of the start has grown 1e5-fold, or the end"),
+    "horizon_s": Column(("row",), "s", "last sample before the error growth reaches 1e5, or the end"),
     "time_reached": Column(("row",), "s", "time of the last sample"),
     "setup_time_s": Column(("row",), "s", "building the model"),
     "run_time_s": Column(("row",), "s", "median run time of the integration alone"),

@@ -104,11 +104,6 @@ def _joint_angles(scene: Scene) -> Array:
             blade = pitching(scene)[k - 1]
             turn = scene.initial_angles[0] + scene.phases[blade]
             axis, p = np.array([np.sin(turn), 0.0, np.cos(turn)]), quaternion(turn, scene.initial_angles[1 + blade])
-        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + _cross(p[1:])])
+        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
         out[k, 7 * k + 3 : 7 * k + 7] = 2.0 * axis @ spin
     return out
-
-
-def _cross(vector: Array) -> Array:
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

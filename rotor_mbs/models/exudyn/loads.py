@@ -41,7 +41,7 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
     F = m (a + g e_z),  M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it.
     """
     blade, turned, name = scene.blades[i], _rotation(scene, i), f"blade {i + 1} root"
-    frames = _matrices(sampled(f"{name} rotation")) @ turned
+    frames = matrices(sampled(f"{name} rotation")) @ turned
     lifted = sampled(f"{name} acceleration") + np.array([0.0, 0.0, scene.gravity])
     force = blade.mass * _in_frames(frames, lifted)
     moment = np.cross(blade.centre_of_mass, force)
@@ -108,13 +108,13 @@ def _joint_sensors(joint: str, connector: str) -> list[Part]:
 
 def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
     """Loads of the chain: what its joints and its connectors transmit."""
-    hub = _matrices(sampled("hub rotation"))
+    hub = matrices(sampled("hub rotation"))
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
     for i in range(len(scene.blades)):
         if i not in pitching(scene):
             roots.append(_newton_euler(scene, i, sampled)[:2])
             continue
-        frames = _matrices(sampled(f"blade {i + 1} rotation"))
+        frames = matrices(sampled(f"blade {i + 1} rotation"))
         force, moment = _joint_reaction(f"pitch bearing {i + 1}", hub @ mounting(i, len(scene.blades)), frames, sampled)
         if is_driven(scene, i):
             actuators[:, i] = -sampled(f"pitch spring {i + 1} torque")[:, 0]
@@ -141,7 +141,8 @@ def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> t
     return force, multipliers[:, :1] * np.cross(z, x) + multipliers[:, 1:2] * np.cross(z, y)
 
 
-def _matrices(rows: Array) -> Array:
+def matrices(rows: Array) -> Array:
+    """(n, 3, 3) of the (n, 9) that a sensor keeps of rotations."""
     return rows.reshape(-1, 3, 3)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.models.exudyn import chain, energy, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
-from rotor_mbs.models.exudyn.loads import chain_loads, tree_loads
+from rotor_mbs.models.exudyn.loads import chain_loads, matrices, tree_loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times
@@ -66,13 +66,13 @@ def chain_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callab
 
 
 def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
-    hub, hub_spin = _matrices(read.all("hub rotation")), read.all("hub spin")
+    hub, hub_spin = matrices(read.all("hub rotation")), read.all("hub spin")
     wrapped = np.arctan2(hub[:, 0, 2] - hub[:, 2, 0], hub[:, 0, 0] + hub[:, 2, 2])
     rates = [hub_spin[:, 1]]
     angles = [unwrap(read.time, wrapped, rates[0], scene.initial_angles[0])]
     hub_omega = (hub @ hub_spin[:, :, None])[:, :, 0]
     for i in pitching(scene):
-        blade = _matrices(read.all(f"blade {i + 1} rotation"))
+        blade = matrices(read.all(f"blade {i + 1} rotation"))
         x, y, z = np.moveaxis(blade, 2, 0)
         seat_x, seat_y = hub @ mounting(i, len(scene.blades))[:, 0], hub[:, :, 1]
         wrapped = np.arctan2(_dot(seat_y, x) - _dot(seat_x, y), _dot(seat_x, x) + _dot(seat_y, y))
@@ -87,15 +87,11 @@ def _dot(a: Array, b: Array) -> Array:
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
-def _matrices(rows: Array) -> Array:
-    return rows.reshape(-1, 3, 3)
-
-
 def _largest_gap(read: _Reader, bodies: Sequence[tuple[str, Body]]) -> Array:
     """(samples,) m: every body's hub centre, which the joints hold together with the ground's and the hub's."""
     centres = []
     for name, body in bodies:
-        rotation = _matrices(read.sampled(f"{name} rotation"))
+        rotation = matrices(read.sampled(f"{name} rotation"))
         centres.append(read.sampled(f"{name} position") - rotation @ body.com)
     hub, *blades = centres
     gaps = [hub, *(blade - hub for blade in blades)]

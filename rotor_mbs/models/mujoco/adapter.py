@@ -103,24 +103,19 @@ class Engine:
 
     def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
         """At given states, (n, coordinates) rad and rad/s, (n, actuators) N m or rad."""
+        rows = [self._pose(*state) for state in zip(angles, rates, loads, strict=True)]
+        return Poses(*map(np.array, zip(*rows, strict=True)))
+
+    def _pose(self, angles: Array, rates: Array, loads: Array) -> tuple[Array, ...]:
+        """The fields of `Poses`, of one state."""
         model, data = self._model, self._data
-        n, bodies = len(angles), model.nbody - 1
-        centre, velocity, spin = np.empty((3, n, bodies, 3))
-        site, acceleration = np.empty((n, model.nsite, 3)), np.empty((n, model.nv))
-        frame, wrench = np.empty((n, bodies, 3, 3)), np.empty((n, bodies, 6))
-        out = Poses(centre, velocity, spin, site, acceleration, frame, wrench)
-        six = np.empty(6)
-        for k in range(n):
-            data.qpos[:], data.qvel[:] = angles[k], rates[k]
-            data.act[:] = loads[k]
-            _engine.mj_forward(model, data)
-            out.centre[k], out.site[k], out.acceleration[k] = data.xipos[1:], data.site_xpos, data.qacc
-            for body in range(bodies):
-                _engine.mj_objectVelocity(model, data, _engine.mjtObj.mjOBJ_BODY, 1 + body, six, 1)
-                out.spin[k, body], out.velocity[k, body] = six[:3], six[3:]
-            out.frame[k] = data.xmat[1:].reshape(bodies, 3, 3)
-            out.wrench[k] = self._wrench()
-        return out
+        data.qpos[:], data.qvel[:], data.act[:] = angles, rates, loads
+        _engine.mj_forward(model, data)
+        motion = np.empty((model.nbody - 1, 6))
+        for body, velocity in enumerate(motion, start=1):
+            _engine.mj_objectVelocity(model, data, _engine.mjtObj.mjOBJ_BODY, body, velocity, 1)
+        kept = (data.site_xpos.copy(), data.qacc.copy(), data.xmat[1:].reshape(-1, 3, 3).copy())
+        return data.xipos[1:].copy(), motion[:, 3:], motion[:, :3], *kept, self._wrench()
 
     def _wrench(self) -> Array:
         """(bodies, 6) as in `Poses`; the engine gives moments about the centre of mass of a body's whole tree."""
