@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotor_mbs.models.exudyn.geometry import pitching
-from rotor_mbs.models.exudyn.moments import drives
+from rotor_mbs.models.exudyn.moments import ROTOR, drives
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, is_constant, values_at
 from rotor_mbs.solution.trajectory import Array, sample_times
@@ -38,12 +38,14 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
 
     A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `work_of_rests`.
     """
-    out, done = np.zeros(len(time)), 0.0
     if not scene.work_needs_path:
+        turned, torques = angles - angles[:1], segments[0].values
+        exact: Array = torques[ROTOR] * turned[:, 0]
         for column, load, _ in drives(scene):
-            out += segments[0].values[load] * (angles[:, column] - angles[:1, column])
-        return out
+            exact = exact + torques[load] * turned[:, column] if column else exact
+        return exact
     losses = _losses(scene, rates)
+    out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in segments:
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
