@@ -293,13 +293,12 @@ def sweep(
     >>> data.to_xarray().angles.dims
     ('run', 'time', 'coordinate')
     """
-    from rotor_mbs.execution.pool import SerialPool
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import run_sweep
 
     study = sweep_of(scene, parameters, methods=list(methods), **options)
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
-    run_sweep(study, path, workers=workers, engine="local" if workers else SerialPool(), timeout_s=timeout)
+    run_sweep(study, path, workers=workers, timeout_s=timeout)
     data = SweepData(path)
     if output is None:
         weakref.finalize(data, shutil.rmtree, path.parent, ignore_errors=True)

@@ -84,8 +84,7 @@ def verdicts(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds
                 found += _of_stored_run(scene, run, exact, own, damages.pop(f"{scene.name}/{run.method}", []))
             found += _copies(scene, own)
             found += _of_reference(scene, known.reference if known is not None else None, own)
-        if results.scenes:
-            found += [_integrity(place, "*", parts, bounds) for place, parts in damages.items()]
+        found += [_integrity(place, "*", parts, bounds) for place, parts in damages.items()]
         found += _of_paper(results, bounds)
     return found
 

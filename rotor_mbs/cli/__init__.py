@@ -27,8 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
                 status = _run(words)
             sys.stdout.flush()
         except (KeyboardInterrupt, SystemError, ImportError) as exc:
-            if not _is_interrupt(exc):
-                raise
+            if not _is_interrupt(exc):  # without memory for a library, its loading raises either
+                show(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
+                return EXIT_FAILED
             show("interrupted; what was finished is kept, the same command goes on from there", sys.stderr)
             return EXIT_INTERRUPTED
         except BrokenPipeError:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -23,6 +22,7 @@ from rotor_mbs.cli.argument_values import (
     span,
 )  # fmt: skip
 from rotor_mbs.errors import nearest
+from rotor_mbs.execution import cores
 
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv", "sympy", "iftomm")
 
@@ -46,11 +46,6 @@ class Command(NamedTuple):
     def __call__(self, arguments: argparse.Namespace) -> int:
         module, _, name = self.function.partition(":")
         return int(getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), name)(arguments))
-
-
-def cores() -> int:
-    """How many processes this one may run at once."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _argument(*names: str, **options: Any) -> Argument:

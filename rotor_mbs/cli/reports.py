@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 import webbrowser
 from pathlib import Path
 
 from rotor_mbs.cli.argument_values import pages_beside
+from rotor_mbs.execution import cores
 
 
 def report(arguments: argparse.Namespace) -> int:
@@ -15,7 +15,7 @@ def report(arguments: argparse.Namespace) -> int:
     from rotor_mbs.report.build import write_report
 
     output = arguments.output or pages_beside(arguments.file)
-    index = write_report(arguments.file, output, jobs=os.cpu_count() or 1, checked=True)
+    index = write_report(arguments.file, output, jobs=cores(), checked=True)
     print(index)
     if arguments.open:
         webbrowser.open(index.resolve().as_uri())

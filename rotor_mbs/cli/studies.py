@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rotor_mbs.cli.argument_values import pages_beside
-from rotor_mbs.cli.arguments import cores
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
 from rotor_mbs.errors import InputError
+from rotor_mbs.execution import cores
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.scenario.catalogue import find_scenes, only_scene
 

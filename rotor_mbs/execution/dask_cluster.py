@@ -18,7 +18,7 @@ from contextlib import ExitStack, suppress
 from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.pool import R, T, TaskPool, WorkerPool, one_line
+from rotor_mbs.execution.pool import R, SerialPool, T, TaskPool, WorkerPool, one_line
 from rotor_mbs.execution.provenance import fingerprint, versions
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
@@ -33,10 +33,12 @@ _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_"
 
 
 def open_task_pool(name: str, workers: int) -> TaskPool:
-    """The engine called `name`, with `workers` processes where it is local; these load their code at once.
+    """The engine called `name`, with `workers` processes where it is local; these load their code at once. 0: this one.
 
     Raises InputError where there is no such engine, or it does not answer.
     """
+    if name == "local" and not workers:
+        return SerialPool()
     if name == "local":
         for variable, value in _KEEP_MEMORY.items():
             os.environ.setdefault(variable, value)

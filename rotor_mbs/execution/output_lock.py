@@ -84,8 +84,8 @@ def _resolved(output: Path) -> Path:
 def _prepare(parts: Path, kind: str) -> None:
     """Makes the folder. Raises InputError where it has unfinished work of another kind, or a foreign file."""
     parts.mkdir(parents=True, exist_ok=True)
-    names = {path.name for path in parts.iterdir()}
-    foreign = sorted(name for name in names if not _OWN.fullmatch(name))
+    names = {path.name: path.is_file() and not path.is_symlink() for path in parts.iterdir()}
+    foreign = sorted(name for name, is_plain in names.items() if not (is_plain and _OWN.fullmatch(name)))
     if foreign:
         raise InputError(f"{parts}: has {foreign[0]}, a foreign file; allowed: another output, or remove it")
     found = _noted(parts, 0)

@@ -22,6 +22,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 from rotor_mbs.errors import ResourceError
+from rotor_mbs.execution import cores
 
 if TYPE_CHECKING:  # loaded with the first process
     from pebble import ProcessPool
@@ -113,7 +114,7 @@ class WorkerPool:
         self._free: LifoQueue[_Process] = LifoQueue()
         for process in reversed(self._processes):
             self._free.put(process)
-        for process in self._processes[: os.cpu_count() or 1]:
+        for process in self._processes[: cores()]:
             self._threads.submit(process.start)
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:

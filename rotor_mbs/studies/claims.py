@@ -6,10 +6,9 @@ And its numbers by the printed equations for other durations, tolerances and way
 from __future__ import annotations
 
 import math
-import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,7 +22,8 @@ from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.errors import RotorError, StoreError
 from rotor_mbs.execution.dask_cluster import open_task_pool
-from rotor_mbs.execution.pool import SerialPool, run_tasks
+from rotor_mbs.execution.output_lock import RESULTS, writing
+from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.execution.provenance import versions
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
@@ -32,6 +32,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import Sweep, sweep_of
 from rotor_mbs.store.records import write_records
+from rotor_mbs.store.results_file import ResultsStore, refuse_other_kinds
 from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.sweep import run_sweep
 
@@ -87,16 +88,25 @@ def claims(*, runs: int | None = None, seed: int = SEED, workers: int = 0) -> Cl
 def study_claims(
     output: Path, *, runs: int = RUNS, seed: int = SEED, workers: int = 1, on_sweep: OnSweep = lambda *_: None
 ) -> ClaimStudy:
-    """The shares of all claims and the trials of all numbers, as records into the new results file `output`.
+    """The shares of all claims and the trials of all numbers, as records into the results file `output`.
 
     Interrupted, the same call continues: sweeps are kept in a folder beside `output` until all are done. Raises
-    InputError and StoreError as `claim_shares`, and where `output` cannot be written.
+    InputError and StoreError as `claim_shares`, and where `output` is a sweep's, or another process is writing it.
     """
     folder = output.with_name(f"{output.name}.sweeps")
-    shares = claim_shares(folder, runs=runs, seed=seed, workers=workers, on_sweep=on_sweep)
-    study = ClaimStudy(shares, number_trials(workers=workers))
-    write_records(output, records_of(study, seed, versions()))
-    shutil.rmtree(folder)
+    with writing(output, RESULTS) as parts:
+        refuse_other_kinds(output)
+        shares = claim_shares(folder, runs=runs, seed=seed, workers=workers, on_sweep=on_sweep)
+        study = ClaimStudy(shares, number_trials(workers=workers))
+        records = records_of(study, seed, versions())
+        part = parts / f"{records[0].key}.h5"
+        write_records(part, records)
+        ResultsStore(output).merge([part])
+        part.unlink()
+    for file in folder.glob("*-*s.h5"):
+        file.unlink()
+    with suppress(OSError):  # what is not of this study stays
+        folder.rmdir()
     return study
 
 
@@ -127,7 +137,7 @@ def claim_shares(
     shares: list[ClaimShare] = []
     done, total = 0, len(scenes) * len(durations)
     folder.mkdir(parents=True, exist_ok=True)
-    with closing(open_task_pool("local", workers) if workers else SerialPool()) as pool:
+    with closing(open_task_pool("local", workers)) as pool:
         for duration in durations:
             measured = {method: MeasuredRuns() for method in METHODS}
             for scene in scenes:

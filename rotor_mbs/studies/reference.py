@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.execute import OnProgress, ignore_progress
+from rotor_mbs.execution.output_lock import RESULTS, writing
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import freeze
 from rotor_mbs.store.read import open_results
@@ -27,15 +28,16 @@ def compute_references(
 
     Raises InputError where `output` has something else, StoreError.
     """
-    _refuse_other_contents(output, {scene.name for scene in scenes})
     full = output.with_name(f"{output.name}.full.h5")
     none: dict[str, Sequence[str]] = {scene.name: () for scene in scenes}
-    report = run_scenes(
-        scenes, none, full, workers=workers, timeout_s=timeout_s, use_frozen=False, on_progress=on_progress
-    )
-    if not report.not_computed:
-        freeze(full, output, datetime.now(UTC).date().isoformat())
-        full.unlink()
+    with writing(output, RESULTS):
+        _refuse_other_contents(output, {scene.name for scene in scenes})
+        report = run_scenes(
+            scenes, none, full, workers=workers, timeout_s=timeout_s, use_frozen=False, on_progress=on_progress
+        )
+        if not report.not_computed:
+            freeze(full, output, datetime.now(UTC).date().isoformat())
+            full.unlink()
     return report
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
+from rotor_mbs.execution import cores
 from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.pool import Finished, T, TaskPool, run_in
 from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
@@ -196,7 +196,7 @@ def run_sweep(
     """Computes the runs that `output` misses. However it is interrupted, the same call continues from there.
 
     methods       instead of those of the sweep
-    workers       number of processes, for the engine "local"; default: one per core
+    workers       number of processes, for the engine "local"; 0: all in this process; default: one per core
     engine        "local", "dask:tcp://host:port", or a pool that is open
     part          (k, n): part k of n alone, counted from 1
     timeout_s     time limit of a run in s
@@ -208,7 +208,7 @@ def run_sweep(
     """
     plan = plan_sweep(sweep, methods, part, timeout_s)
     start = time.monotonic()
-    pool = open_task_pool(engine, workers or os.cpu_count() or 1) if isinstance(engine, str) else engine
+    pool = open_task_pool(engine, cores() if workers is None else workers) if isinstance(engine, str) else engine
     with nullcontext() if pool is engine else closing(pool), plan.opened(output) as (dataset, statuses):
         missing, lost = int((statuses == MISSING).sum()), list[str]()
         done = plan.runs - missing
@@ -226,7 +226,8 @@ def run_sweep(
             done += len(stored)
             on_progress(done, plan.runs, _counted(stored))
         seconds, is_ok = time.monotonic() - start, _is_ok(plan, statuses)
-        return SweepResult(dataset.path, plan.runs, missing, _counted(statuses), seconds, is_ok, tuple(lost))
+        made = missing - len(lost)
+        return SweepResult(dataset.path, plan.runs, made, _counted(statuses), seconds, is_ok, tuple(lost))
 
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:

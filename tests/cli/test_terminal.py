@@ -91,6 +91,20 @@ def test_an_interrupt_inside_compiled_code_is_an_interrupt(
     assert capsys.readouterr().err.startswith("interrupted; ")
 
 
+@pytest.mark.parametrize("error", [SystemError, ImportError])
+def test_code_that_cannot_be_loaded_is_told_in_a_line(
+    error: type[Exception], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As where there is no memory for a library: "failed to map segment from shared object"."""
+
+    def short_of_memory(_: object) -> None:
+        raise error("failed to map segment")
+
+    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", short_of_memory)
+    assert main(["run", "paper/fig03"]) == 1
+    assert capsys.readouterr().err == f"code cannot be loaded: {error.__name__}: failed to map segment\n"
+
+
 class _InterruptedAtItsEnd:
     def __del__(self) -> None:
         raise KeyboardInterrupt

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
+from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.cli import main
+from rotor_mbs.errors import InputError
+from rotor_mbs.execution.output_lock import RESULTS, writing
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import open_results
+from rotor_mbs.studies import claims
 
 SWEEP = """
 title = "two starts"
@@ -82,6 +88,51 @@ def test_references_do_not_take_the_place_of_runs(results: Path, capsys: pytest.
         assert main(["reference", scene, "-o", str(results)]) == 2
         assert "which would be dropped" in capsys.readouterr().err
     assert results.read_bytes() == before
+
+
+@pytest.mark.parametrize("command", [["reference", "paper/fig03"], ["claims", "--runs", "1"], ["reproduce"]])
+def test_no_command_writes_what_another_process_is_writing(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The lock of a process that has begun with an output which is not there yet."""
+    output = tmp_path / "results.h5"
+    with ThreadPoolExecutor(1) as other, writing(output, RESULTS):
+        given = tmp_path if command == ["reproduce"] else output
+        assert other.submit(main, [*command, "-o", str(given)]).result() == 2
+    assert "another process is writing it now" in capsys.readouterr().err.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_claims_are_added_to_what_is_there(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = stored_claims()
+    assert study is not None
+    monkeypatch.setattr(claims, "claim_shares", lambda *_, **__: study.shares)
+    monkeypatch.setattr(claims, "number_trials", lambda **_: study.numbers)
+    output = tmp_path / "r.h5"
+    output.write_bytes(results.read_bytes())
+    kept = tmp_path / "r.h5.sweeps" / "notes.txt"
+    kept.parent.mkdir()
+    kept.touch()
+    claims.study_claims(output)
+    with open_results(output) as found:
+        assert list(found.scenes) == ["paper/fig03"]
+        assert stored_claims(found) is not None
+    assert kept.exists()
+
+
+@pytest.mark.parametrize("place", ["kind", "lock"])
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to(path.parents[1] / "another")])
+def test_what_is_no_file_of_ours_in_the_folder_of_parts_is_refused(
+    make: Callable[[Path], object], place: str, tmp_path: Path
+) -> None:
+    """A link would be written through, a pipe waited for."""
+    another, parts = tmp_path / "another", tmp_path / "r.h5.parts"
+    another.write_text("kept")
+    parts.mkdir()
+    make(parts / place)
+    with pytest.raises(InputError, match=f"has {place}, a foreign file"), writing(tmp_path / "r.h5", RESULTS):
+        pass
+    assert another.read_text() == "kept"
 
 
 def test_a_link_stays_a_link_to_what_is_written(results: Path, tmp_path: Path) -> None:

@@ -118,8 +118,7 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     monkeypatch.setenv("ROTOR_TEST_MARKS", str(marks))
     sweep = load_sweep(_file(tmp_path, draws=16))
     result = run_sweep(sweep, output, methods=[method], workers=2, work=_killing)
-    assert result.statuses == {"ok": 31}
-    assert not result.is_ok
+    assert (result.made, result.statuses, result.is_ok) == (31, {"ok": 31}, False)
     (line,) = result.lost
     assert line.startswith("run 5: its process died")
     assert line.endswith("and again when it was tried alone")
@@ -131,6 +130,17 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     # The same sweep tries it again; nothing of the machine's trouble stays in the file.
     again = run_sweep(sweep, output, methods=[method], workers=1)
     assert (again.made, again.statuses, again.is_ok, again.lost) == (1, {"ok": 32}, True, ())
+
+
+def _own_process(chunk: Chunk) -> Rows | NDArray[np.int8]:
+    assert os.getpid() == int(os.environ["ROTOR_TEST_PARENT"])
+    return perform(chunk)
+
+
+def test_no_workers_are_this_process_as_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROTOR_TEST_PARENT", str(os.getpid()))
+    result = run_sweep(load_sweep(_file(tmp_path)), tmp_path / "o.h5", workers=0, work=_own_process)
+    assert result.statuses == {"ok": 8}
 
 
 def _hanging(chunk: Chunk) -> Rows | NDArray[np.int8]:
