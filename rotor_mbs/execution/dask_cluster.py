@@ -82,7 +82,7 @@ def _open_cluster(address: str) -> Cluster:
     return Cluster(client)
 
 
-class Cluster:
+class Cluster(TaskPool):
     """A TaskPool of a dask client's workers. A scheduler that is gone, or has none for patience_s, is a StoreError."""
 
     shares_disk = False

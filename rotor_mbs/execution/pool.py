@@ -12,14 +12,14 @@ import pickle
 import signal
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import resource_tracker
 from queue import LifoQueue
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
 
 from rotor_mbs.errors import ResourceError
 from rotor_mbs.execution import cores
@@ -63,27 +63,36 @@ class Finished(Generic[T, R]):
     error: BaseException | None = None
 
 
-class TaskPool(Protocol):
-    """What runs tasks: worker processes of this machine (`WorkerPool`), or a cluster.
+class TaskPool(ABC):
+    """What runs tasks: worker processes of this machine (`WorkerPool`), or a cluster. A context manager.
 
     workers       how many tasks run at once
     shares_disk   whether the workers see the files of this process
     """
 
     workers: int
-    shares_disk: bool
+    shares_disk = True
 
-    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]: ...
+    @abstractmethod
+    def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
+        """The future of `work(task)`."""
 
     def failure(self, error: BaseException) -> str:
         """Why a future failed: "timed_out", "worker_died", or "error" for what the task itself raised."""
-        ...
+        return error.failure if isinstance(error, TaskLostError) else "error"
 
-    def close(self) -> None: ...
+    def close(self) -> None:  # noqa: B027  (of this process there is nothing to end)
+        """Ends what runs the tasks."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
-class WorkerPool:
-    """Worker processes, each of which keeps its state between tasks. A context manager.
+class WorkerPool(TaskPool):
+    """Worker processes, each of which keeps its state between tasks.
 
     As many as there are cores start at once, the others when there is a task for them: afresh (spawn). They ignore
     Ctrl-C and end with this process. One that dies, or is ended at a time limit, is replaced.
@@ -104,8 +113,6 @@ class WorkerPool:
     3
     """
 
-    shares_disk = True
-
     def __init__(self, workers: int, initializer: Callable[[], None] | None = None, core: int | None = None) -> None:
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers)
@@ -124,9 +131,6 @@ class WorkerPool:
         """
         return self._threads.submit(self._run, work, task, timeout_s)
 
-    def failure(self, error: BaseException) -> str:
-        return error.failure if isinstance(error, TaskLostError) else "error"
-
     def close(self) -> None:
         """Ends the processes at once, with what they do. Futures that were running raise TaskLostError."""
         with delayed_interrupts():
@@ -135,14 +139,6 @@ class WorkerPool:
             self._threads.shutdown(cancel_futures=True)
             with ThreadPoolExecutor(self.workers) as closing:
                 list(closing.map(_Process.close, self._processes))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
         process = self._free.get()
@@ -159,7 +155,7 @@ class WorkerPool:
         return found
 
 
-class SerialPool:
+class SerialPool(TaskPool):
     """A pool in this process, one task after the other, without time limits: where scripts must not start processes.
 
     Examples
@@ -168,7 +164,7 @@ class SerialPool:
     3
     """
 
-    workers, shares_disk = 1, True
+    workers = 1
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:  # noqa: ARG002
         future: Future[R] = Future()
@@ -177,12 +173,6 @@ class SerialPool:
         except Exception as exc:
             future.set_exception(exc)
         return future
-
-    def failure(self, error: BaseException) -> str:  # noqa: ARG002
-        return "error"
-
-    def close(self) -> None:
-        pass
 
 
 def run_tasks(
