@@ -43,12 +43,14 @@ _DIMENSIONS = {"bench": "setting"}  # of the others: row
 _SETTING_UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
 _INTEGERS = ("repeats", "steps", "status", "false_success")
 
-# Units and long name of every array that a record may have.
-_COLUMNS = {
+# Units and long name of every array over rows or settings that a record, or the summary of the runs, may have.
+COLUMNS = {
     "angle_error_max": ("rad", "largest angle error up to the horizon"),
     "angle_error_end": ("rad", "angle error at the last sample"),
     "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
     "energy_drift_max": ("1", "largest energy error over the run, of the energy scale"),
+    "horizon_s": ("s", "last sample before the error growth reaches 1e5, or the end"),
+    "time_reached": ("s", "time of the last sample"),
     "run_time_s": ("s", "median run time of the integration alone"),
     "run_time_min_s": ("s", "shortest run time"),
     "run_time_q1_s": ("s", "lower quartile of the run times"),
@@ -147,7 +149,7 @@ def _put_record(file: Any, record: Record) -> None:
     elif record.arrays:
         rows = np.arange(len(next(iter(record.arrays.values()))))
         hdf5.put(group, dimension, rows, Column((dimension,), "1", "number of the row"))
-    for name, (units, long_name) in _COLUMNS.items():
+    for name, (units, long_name) in COLUMNS.items():
         if name in record.arrays:
             values = np.asarray(record.arrays[name])
             values = values.astype(np.int64) if name in _INTEGERS else values

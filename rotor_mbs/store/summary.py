@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.layout import Column
+from rotor_mbs.store.records import COLUMNS
 
 SUMMARY = "summary"
 
@@ -21,18 +22,10 @@ _NAMES = {
 }
 _STATUS = Column(("row",), "1", "how the run ended, from its state")
 # Attributes of a run, as columns; NaN where a run has none.
-_NUMBERS = {
-    "angle_error_max": Column(("row",), "rad", "largest angle error up to the horizon"),
-    "angle_error_end": Column(("row",), "rad", "angle error at the last sample"),
-    "tip_error_max": Column(("row",), "m", "largest distance of a tip from the reference up to the horizon"),
-    "energy_drift_max": Column(("row",), "1", "largest energy error over the run, of the energy scale"),
-    "horizon_s": Column(("row",), "s", "last sample before the error growth reaches 1e5, or the end"),
-    "time_reached": Column(("row",), "s", "time of the last sample"),
-    "setup_time_s": Column(("row",), "s", "building the model"),
-    "run_time_s": Column(("row",), "s", "median run time of the integration alone"),
-    "output_time_s": Column(("row",), "s", "reading out and computing the samples"),
-    "steps": Column(("row",), "1", "integration steps"),
-}
+_NUMBERS = (
+    "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "horizon_s", "time_reached",
+    "setup_time_s", "run_time_s", "output_time_s", "steps",
+)  # fmt: skip
 
 
 def put_summary(file: Any, runs: Sequence[tuple[str, str]]) -> None:
@@ -49,8 +42,8 @@ def put_summary(file: Any, runs: Sequence[tuple[str, str]]) -> None:
     facts = [file[f"{scene}/{method}"].attrs for scene, method in runs]
     codes = np.array([_code(one.get("status")) for one in facts], np.int8)
     hdf5.put_flags(hdf5.put(group, "status", codes, _STATUS), STATUSES)
-    for name, column_of_numbers in _NUMBERS.items():
-        hdf5.put(group, name, _numbers([one.get(name) for one in facts]), column_of_numbers)
+    for name in _NUMBERS:
+        hdf5.put(group, name, _numbers([one.get(name) for one in facts]), Column(("row",), *COLUMNS[name]))
 
 
 def _code(status: object) -> int:
