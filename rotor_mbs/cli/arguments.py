@@ -56,12 +56,12 @@ def _flag(*names: str, help: str) -> Argument:
     return Argument(names, {"action": "store_true", "help": help})
 
 
-def _output(kind: Any, metavar: str, default: object = None, help: str = "{} (default: %(default)s)") -> Argument:
-    options = {"type": kind, "default": default, "metavar": metavar, "help": help.format(metavar)}
+def _output(kind: Any, metavar: str, default: object = None, help: str = "to write (default: %(default)s)") -> Argument:
+    options = {"type": kind, "default": default, "metavar": metavar, "help": help}
     return Argument(("-o", "--output"), options)
 
 
-def _method(help: str = "model/integrator") -> Argument:
+def _method(help: str = "model/integrator, as in rotor-mbs list") -> Argument:
     return _argument("-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated")
 
 
@@ -113,7 +113,7 @@ _COMMANDS = (
                   help="column, unit, sign, zero of each channel (default: guessed)"),
         _argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X",
                   help="rad per unit of error growth that still agree (default: %(default)g)"),
-        _output(Path, "DIR", Path("comparison"), "of the page {} (default: %(default)s)"),
+        _output(Path, "DIR", Path("comparison"), "of the page (default: %(default)s)"),
         _flag("--json", help="the verdict as JSON, for a script"),
     )),
     Command("bench", "error against run time, method by method", "studies:bench",

@@ -10,12 +10,11 @@ from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
-from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.pages import claim_study, glance
 from rotor_mbs.report.pages import claims as claim_tables
-from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
-from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell
+from rotor_mbs.store.read import OpenResults, StoredScene
 from rotor_mbs.store.records import Record
 
 # Attributes of a results file that say what made it.
@@ -54,41 +53,17 @@ def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
 
 
 def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
-    """A row per scene: its horizon, the printed model's departure, the errors of the corrected models."""
-    corrected = run_selection.in_catalogue_order(
-        dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
-    )
-    head = ["Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain"]
-    for name in corrected:
-        head += [f"{with_capital(label_of(name))}: angle error (rad)", "energy drift"]
-    rows = []
+    """A row per scene: its horizon, and what the printed model does."""
+    head = ("Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain")
+    rows: list[Row] = []
     for name, scene in scenes.items():
-        cells = [
-            TableCell(name, href=files[name], note=scene.title),
-            str(scene.attributes.get("figures", "")),
-            with_unit(horizon(scene), "s", 3),
-            *_printed_cells(scene.methods.get(run_selection.PRINTED)),
-        ]
-        rows.append([*cells, *(cell for method in corrected for cell in _corrected_cells(scene.methods.get(method)))])
-    caption = "Angle errors are the largest up to the horizon, against the quad-precision reference"
-    return PageTable(caption, head, rows, numeric=[2, *range(4, len(head))]).without_empty_columns()
-
-
-def _printed_cells(run: StoredRun | None) -> Row:
-    if run is None:
-        return ["", "", ""]
-    gain = prefixed(metric(run, "energy_gain_J"), "J")
-    return [status_cell(run), number(metric(run, "angle_error_whole")), gain]
-
-
-def _corrected_cells(run: StoredRun | None) -> Row:
-    """Error and drift; the status in place of the error, and the error below it, where the run is not ok."""
-    if run is None:
-        return ["", ""]
-    error, drift = number(metric(run, "angle_error_max")), number(metric(run, "energy_drift_max"))
-    if run.status == "ok":
-        return [error, drift]
-    return [TableCell(status_text(run.status), tone="bad", note=error), drift]
+        cells: list[TableCell | str] = [str(scene.attributes.get("figures", "")), with_unit(horizon(scene), "s", 3)]
+        run = scene.methods.get(run_selection.PRINTED)
+        if run is not None:
+            gain = prefixed(metric(run, "energy_gain_J"), "J")
+            cells += [status_cell(run), number(metric(run, "angle_error_whole")), gain]
+        rows.append([TableCell(name, href=files[name], note=scene.title), *cells, *[""] * (len(head) - 1 - len(cells))])
+    return PageTable("", head, rows, numeric=(2, 4, 5)).without_empty_columns()
 
 
 def _errata_table(errata: Sequence[Erratum]) -> PageTable:
