@@ -5,7 +5,6 @@ Reads the store alone.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -214,8 +213,3 @@ def _advice(own: Sequence[SuiteRun], heading: Callable[[str], str]) -> list[str]
 
 def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
-
-
-def is_number(value: float | None) -> bool:
-    """Neither absent nor infinite nor NaN."""
-    return value is not None and math.isfinite(value)

@@ -186,12 +186,13 @@ def run_tasks(
 
     Parameters
     ----------
+    workers : parallel processes; 0: all tasks in this process, without a time limit.
     timeout_s : time limit of a task in s, or a function of the task.
     split : the parts of a task that stands for many runs; an empty sequence for one that cannot be split.
     """
     if not tasks:
         return
-    with WorkerPool(min(workers, len(tasks))) as pool:
+    with WorkerPool(min(workers, len(tasks))) if workers else SerialPool() as pool:
         yield from run_in(pool, work, tasks, timeout_s, split)
 
 

@@ -215,8 +215,10 @@ def number_trials(
         for name, scene in scenes.items()
     ]
     found: dict[tuple[Conditions, str], NumberTrial] = {}
-    for task, numbers in _results(tasks, workers):
-        found |= {(task.conditions, one.number): one for one in numbers}
+    for end in run_tasks(perform, tasks, workers, _TIMEOUT_S):
+        if end.value is None:
+            raise end.error or RotorError(f"{end.task.scene.name}: {end.message}")
+        found |= {(end.task.conditions, one.number): one for one in end.value}
     in_order = (found[conditions, item.id] for conditions in dict.fromkeys(tried) for item in items)
     texts = (GravityRowText(row, GRAVITY_ROWS[row].formula, GRAVITY_ROWS[row].is_of_56) for row in rows)
     return NumberTrials(tuple(in_order), usual, tuple(texts))
@@ -235,16 +237,6 @@ def perform(task: Trial) -> list[NumberTrial]:
         for item in task.items
         if item.of is not None
     ]
-
-
-def _results(tasks: Sequence[Trial], workers: int) -> Iterator[tuple[Trial, list[NumberTrial]]]:
-    if not workers:
-        yield from ((task, perform(task)) for task in tasks)
-        return
-    for finished in run_tasks(perform, tasks, workers, _TIMEOUT_S):
-        if finished.value is None:
-            raise finished.error or RotorError(f"{finished.task.scene.name}: {finished.message}")
-        yield finished.task, finished.value
 
 
 def _remainder(scene: Scene, row: str) -> float:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, is_number, reached_by, suite_runs
+from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, reached_by, suite_runs
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
@@ -108,7 +109,7 @@ def _limits(records: Sequence[Record]) -> Section:
     rows = []
     for record in records:
         facts = record.attributes
-        if record.kind == "limits" and is_number(facts["largest_stable_step_s"]):
+        if record.kind == "limits" and math.isfinite(facts["largest_stable_step_s"]):
             step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
             numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
             numbers.append(f"{facts['mode_damping_ratio']:.3g}")
