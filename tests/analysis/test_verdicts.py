@@ -101,6 +101,21 @@ def test_the_rate_of_a_pitch_without_inertia_is_no_start() -> None:
     assert of_samples(solve(METHOD, scene, {}))["start", "angles, rates"] == 0.0
 
 
+def test_a_start_within_a_radian_is_off_by_what_was_added() -> None:
+    run = run_of()
+    run.trajectory.angles[0, 1] += 1e-3
+    assert of_samples(run)["start", "angles, rates"] == pytest.approx(1e-3)
+
+
+def test_settings_are_judged_always_and_steps_where_they_are_known() -> None:
+    scene, rk44 = paper("fig11", duration=1.0, samples=11), "exudyn_tree/rk44"
+    for steps, expected in ((None, set()), (50, {("steps", "steps")})):
+        one = stored(rk44, attributes={"steps": steps}, settings={"step": 0.03}, time=np.zeros(11))
+        found = values(verdicts._of_settings(one, BOUNDS, scene))
+        assert found.keys() - {("settings", "settings")} == expected
+        assert found.get(("steps", "steps"), 0.25) == pytest.approx(0.25)
+
+
 def test_energies_of_rest_are_absolute() -> None:
     """Without weight and motion there is no scale; without a tip no length."""
     blades = tuple(replace(blade, tip=(0.0, 0.0, 0.0)) for blade in general().blades)
@@ -134,6 +149,11 @@ def test_numbers_of_a_model_are_its_metrics_less_what_its_start_leaves_open() ->
     assert ("horizon", "angles") not in found
     assert of_model(run, scene, BOUNDS.for_scene("paper/fig11")).get(("horizon", "angles")) in (None, 1e-3)
     assert of_model(run, replace(scene, outputs=("rates",))).keys() & {("agreement", "angles"), ("exact", "x")} == set()
+
+
+def test_a_run_without_energies_has_no_balance() -> None:
+    scene = paper("fig11", duration=0.1, samples=11, outputs=("angles", "rates"))
+    assert {check for check, _ in of_model(solve(METHOD, scene, {}), scene)} == {"agreement", "impulse"}
 
 
 def test_slacks_are_not_given_back_below_zero() -> None:
@@ -293,6 +313,14 @@ def test_the_papers_numbers_are_judged_of_the_printed_equations_alone(tmp_path: 
             assert [one.value for one in verdicts._of_paper(results, BOUNDS)] == pytest.approx(expected)
 
 
+def test_damage_outside_the_runs_is_told_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdicts, "_damages", lambda _: {"file": ["attributes"], "paper/fig11/reference": ["angles"]})
+    made = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), REFERENCE, rotor(np.zeros_like))])
+    with open_results(made) as results:
+        found = [one for one in verdicts.verdicts(results, [], BOUNDS) if one.check == "integrity"]
+    assert [(one.scene, one.method, one.value) for one in found] == [("paper/fig11", REFERENCE, 1), ("file", "*", 1)]
+
+
 def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:
     made = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), REFERENCE, rotor(np.zeros_like))])
     with open_results(made) as results, open_results(reference_folder() / "paper.h5") as shipped:
@@ -313,3 +341,35 @@ def test_a_quantity_is_told_by_its_rule_or_by_its_own_words(monkeypatch: pytest.
         ("gap", "up", "kN", "the wing"),
     ]
     assert (found[0].value, found[0].bound) == (0.5, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "expected"),
+    [
+        (0.1, 0.2, 2.0),
+        (0.2, 0.1, 0.5),
+        (0.1, 2.1, np.inf),
+        (2.1, 2.2, 1.0),
+        (2.1, 0.1, 0.0),
+        (0.0, 8e-16, 1.0),  # rounding, four units in the last place of 1, is not compared
+        (9e-17, 2.0**-49, 2.0),
+    ],
+)
+def test_a_margin_shrinks_by_the_ratio_of_values(before: float, now: float, expected: float) -> None:
+    old = verdicts.Verdict("energy", "s", METHOD, "c", before, 2.0, "J", "")
+    (found,) = verdicts.regressions([replace(old, value=now)], [old], 10.0)
+    assert (found.check, found.channel, found.bound) == ("against", "energy: c", 10.0)
+    assert found.value == pytest.approx(expected)
+    assert f"{before:.2e} before, {now:.2e} now" in found.look_at
+    halved = replace(old, bound=4.0)
+    if expected == 2.0:
+        assert verdicts.regressions([replace(old, value=now)], [halved], 10.0)[0].value == pytest.approx(4.0)
+
+
+def test_a_verdict_that_is_gone_and_bounds_of_zero() -> None:
+    old = verdicts.Verdict("copied", "s", METHOD, "c", 0.0, 0.0, "faults", "")
+    assert verdicts.regressions([old], [old], 10.0)[0].value == 1.0
+    (gone,) = verdicts.regressions([], [old], 10.0)
+    assert np.isnan(gone.value)
+    assert "not in this one" in gone.look_at
+    assert verdicts.regressions([old], [], 10.0) == []

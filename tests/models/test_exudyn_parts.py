@@ -123,9 +123,9 @@ def test_a_wrong_setting_is_told_with_what_is_allowed(name, settings, said) -> N
 
 def test_samples_the_engine_cannot_tell_apart_are_refused() -> None:
     settings = METHODS[TREE].settings()
-    METHODS[TREE].build(replace(FIG08, duration=1.001e-5), settings)  # 1000 intervals
+    METHODS[TREE].build(replace(FIG08, duration=1.0001e-5), settings)  # 1000 intervals
     with pytest.raises(MethodRefusal, match="1e-08 s apart"):
-        METHODS[TREE].build(replace(FIG08, duration=0.999e-5), settings)
+        METHODS[TREE].build(replace(FIG08, duration=0.9999e-5), settings)
 
 
 # One blade runs into θ = π/2, where nothing holds the rotor: the rates go to infinity at about 0.06 s.

@@ -73,6 +73,11 @@ def test_intervals_meet_samples_and_kinks() -> None:
     assert all(one.segment.start <= 0.5 * (one.start + one.end) <= one.segment.end for one in every)
 
 
+def test_the_last_interval_ends_at_the_end_and_not_beside_it() -> None:
+    """49 times 1/49 is less than 1 in double precision."""
+    assert intervals(segments([RAMP], 1.0), 50, every_sample=False)[-1].end == 1.0 != 49 * (1.0 / 49)
+
+
 def test_a_kink_that_is_off_a_sample_by_rounding_is_on_it() -> None:
     parts = segments([((0.0, 1.0), (0.1 + 1e-14, 5.0), (0.1 + 1e-14, 2.0))], 1.2)
     assert all(one.ends_at_sample for one in intervals(parts, 61, every_sample=True))

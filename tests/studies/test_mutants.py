@@ -99,9 +99,12 @@ UNSEEN = {
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands of intervals"
     ),
     r"ode45\._after_success .*0\.2 -> ": "where steps begin to grow fivefold at most, they grow as much by either rule",
-    r"adapter\.integrate .*(interval\.end - interval\.start)$": (
+    r"adapter\.integrate .*interval\.end - interval\.start( lost| scaled|$)": (
         "the engine cuts a first step that is longer than its interval, with another rounding"
     ),
+    r"adapter\.linearized .*1\.0 -> ": "the size of a difference quotient's step: any near it does as well",
+    r"reference\._(LOOSER|TIGHTEST|QUAD|PERTURBATION) ": "a tolerance half as large again bounds and resolves as much",
+    r"run_integrity\.steps_off .*1e-09 scaled": "keeps rounding from adding a step: any size near it does",
     r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
     r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",
     r"adapter\._count .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps: reported, judged by nothing",

@@ -218,9 +218,7 @@ def linear_solver(coordinates: int, constraints: int) -> str:
 def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     settings = _engine.SimulationSettings()
     settings.solution.file.write = False
-    settings.displayStatistics = settings.displayComputationTime = False
     integration = settings.timeIntegration
-    integration.verboseMode = 0
     integration.solverType = getattr(_engine.DynamicSolverType, scheme.solver)
     # A step the engine halves by itself leaves the sample times: a fixed step is fixed, or fails.
     integration.adaptiveStep = False
