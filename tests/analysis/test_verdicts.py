@@ -341,35 +341,3 @@ def test_a_quantity_is_told_by_its_rule_or_by_its_own_words(monkeypatch: pytest.
         ("gap", "up", "kN", "the wing"),
     ]
     assert (found[0].value, found[0].bound) == (0.5, 2.0)
-
-
-@pytest.mark.parametrize(
-    ("before", "now", "expected"),
-    [
-        (0.1, 0.2, 2.0),
-        (0.2, 0.1, 0.5),
-        (0.1, 2.1, np.inf),
-        (2.1, 2.2, 1.0),
-        (2.1, 0.1, 0.0),
-        (0.0, 8e-16, 1.0),  # rounding, four units in the last place of 1, is not compared
-        (9e-17, 2.0**-49, 2.0),
-    ],
-)
-def test_a_margin_shrinks_by_the_ratio_of_values(before: float, now: float, expected: float) -> None:
-    old = verdicts.Verdict("energy", "s", METHOD, "c", before, 2.0, "J", "")
-    (found,) = verdicts.regressions([replace(old, value=now)], [old], 10.0)
-    assert (found.check, found.channel, found.bound) == ("against", "energy: c", 10.0)
-    assert found.value == pytest.approx(expected)
-    assert f"{before:.2e} before, {now:.2e} now" in found.look_at
-    halved = replace(old, bound=4.0)
-    if expected == 2.0:
-        assert verdicts.regressions([replace(old, value=now)], [halved], 10.0)[0].value == pytest.approx(4.0)
-
-
-def test_a_verdict_that_is_gone_and_bounds_of_zero() -> None:
-    old = verdicts.Verdict("copied", "s", METHOD, "c", 0.0, 0.0, "faults", "")
-    assert verdicts.regressions([old], [old], 10.0)[0].value == 1.0
-    (gone,) = verdicts.regressions([], [old], 10.0)
-    assert np.isnan(gone.value)
-    assert "not in this one" in gone.look_at
-    assert verdicts.regressions([old], [], 10.0) == []

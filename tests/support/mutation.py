@@ -806,9 +806,13 @@ def main() -> None:
     for group in dict.fromkeys(mutant.group for mutant in chosen):
         prove_control(group, [mutant for mutant in chosen if mutant.group == group])
     ways: Counter[str] = Counter()
+    tests = set()
     for mutant, noticed in run(chosen, arguments.jobs):
         print(json.dumps({"mutant": mutant.name, "group": mutant.group, "noticed": noticed}), flush=True)
         ways[noticed.split(":")[0].split()[0]] += 1
+        tests |= {str(ROOT / noticed[6:])} if noticed.startswith("test: tests/") else set()
+    if tests and not _in_order(lambda: pytest.main([*_PYTEST, *tests])):
+        raise SystemExit("a test that noticed a mutant fails without one")
     by_verdict = len(chosen) - sum(ways[way] for way in ("test", "survived", "raised", "did"))
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     print(
