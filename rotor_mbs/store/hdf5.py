@@ -210,7 +210,8 @@ def attributes_of(target: Any) -> dict[str, Any]:
 def copy_group(source: Any, target: Any) -> None:
     """All members and attributes of one group into another, in order. Scales are made and attached anew: a copy by
     the library itself would leave references that point nowhere."""
-    datasets = {name: item for name, item in members(source) if not is_group(item)}
+    items = dict(members(source))
+    datasets = {name: item for name, item in items.items() if not is_group(item)}
     for name, item in datasets.items():
         copied = target.create_dataset(name, data=values_of(item), compression=item.compression, shuffle=item.shuffle)
         copied.attrs.update({key: item.attrs[key] for key in item.attrs if key not in _SCALE_ATTRIBUTES})
@@ -221,7 +222,7 @@ def copy_group(source: Any, target: Any) -> None:
             if dimension:
                 target[name].dims[axis].attach_scale(target[dimension])
     target.attrs.update(source.attrs)
-    for name, item in members(source):
+    for name, item in items.items():
         if is_group(item):
             copy_group(item, new_group(target, name))
 

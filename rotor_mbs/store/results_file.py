@@ -95,10 +95,10 @@ def merge(
         hdf5.put_attributes(file, {**_description(plan), **versions, "created": created, "date_created": created})
         for owner in sorted(plan, key=lambda name: (name.split("/")[0] in RESERVED_GROUPS, name)):
             for source, names in _by_source(plan[owner]).items():
-                with open_results(source, verify=False) as results, hdf5.reading(source):
-                    hdf5.new_group(file, owner).attrs.update(results.root[owner].attrs)
+                with hdf5.open_file(source) as root, hdf5.reading(source):
+                    hdf5.new_group(file, owner).attrs.update(root[owner].attrs)
                     for name in names:
-                        hdf5.copy_group(results.root[name], hdf5.new_group(file, name))
+                        hdf5.copy_group(root[name], hdf5.new_group(file, name))
         put_summary(file, [(owner, name.removeprefix(f"{owner}/")) for owner, name in _runs_in(plan)])
 
 

@@ -70,7 +70,8 @@ class PointTimer:
             start = self._clock()
             self._solvers[point] = method.build(scene, settings)
             setups.append(self._clock() - start)
-        gc.collect()  # the collector is off in the timing worker
+        if not gc.isenabled():  # in the timing worker
+            gc.collect()
         seconds = self._timed_run(point)
         self._first_angles[point] = self._solvers[point].observe().angles
         return {"setup_time_s": setups[0], "setup_again_time_s": setups[1], "run_time_s": seconds}
