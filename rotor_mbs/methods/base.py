@@ -10,16 +10,15 @@ from importlib.util import find_spec
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
-from rotor_mbs.methods.ladders import STEP, Ladder, Look
-from rotor_mbs.methods.settings import Settings
+from rotor_mbs.methods.ladders import STEP, Ladder
+from rotor_mbs.methods.ladders import Look as Look  # who writes a method finds it here
+from rotor_mbs.methods.settings import Settings as Settings
 
 if TYPE_CHECKING:  # reading the catalogue needs none of them
     from rotor_mbs.scenario.accuracy_bounds import Bound
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.linearization import Linearization
     from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-
-__all__ = ["BuiltItem", "Look", "Method", "RunBlock", "Settings", "Solver", "late", "stability_polynomial"]
 
 
 @dataclass(frozen=True, slots=True)

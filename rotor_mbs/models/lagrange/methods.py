@@ -12,7 +12,8 @@ import numpy as np
 from rotor_mbs.methods.base import Look, Method, RunBlock
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
-from rotor_mbs.models.lagrange import heyoka_adapter, reference, samples, taylor
+from rotor_mbs.models.equation_items import equation_items
+from rotor_mbs.models.lagrange import heyoka_adapter, reference, taylor
 from rotor_mbs.models.lagrange.ode_solvers import Integrator, OdeSolver, ode45_integrator, scipy_integrator
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.scenario.scene import Scene
@@ -81,7 +82,7 @@ def _scipy_method(solver: str, look: Look, settings: type[Settings], ladder: Lad
         look=look,
         settings=settings,
         build=_ode_solver(lambda relative, absolute: scipy_integrator(solver, relative, absolute)),
-        items=samples.items,
+        items=equation_items,
         distributions=("scipy",),
         ladders=(ladder,),
         cost_scaling={"relative_tolerance": medium, "absolute_tolerance": 0.01 * medium},
@@ -116,7 +117,7 @@ METHODS = (
         look=Look(_LIGHT_BLUE, "-", "v"),
         settings=Ode45Settings,
         build=_ode_solver(ode45_integrator),
-        items=samples.items,
+        items=equation_items,
         ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
         cost_scaling={"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
         linearize=_linearize,
@@ -135,6 +136,6 @@ METHODS = (
         look=Look(_BLUE, "-.", "*"),
         settings=ReferenceSettings,
         build=reference.build,
-        items=samples.items,
+        items=equation_items,
     ),
 )  # fmt: skip

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
-from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.loads import sampled_loads
@@ -131,27 +130,3 @@ def constant_work(scene: Scene, angles: Array) -> Array:
         torque, _ = scene.pitch_load(i)
         work = work + value_at(torque, 0.0) * (angles[:, 1 + i] - scene.initial_angles[1 + i])
     return work
-
-
-def items(scene: Scene) -> list[BuiltItem]:
-    """The equations and terms the closed form has for this scene."""
-    moving = scene.moving_coordinates
-    built = [BuiltItem("equation", scene.coordinate_labels[i]) for i in moving]
-    built += [
-        BuiltItem("term", f"blade {i} fixed", "its pitch has no inertia")
-        for i in range(1, 1 + len(scene.blades))
-        if i not in moving
-    ]
-    optional = {
-        "hub inertia": scene.hub_inertia != 0.0,
-        "gravity": scene.gravity != 0.0,
-        "rotor torque": scene.has_torque,
-        "pitch torque": any(scene.pitch_torque),
-        "bearing stiffness": any(scene.bearing_stiffness),
-        "bearing rest angle": any(scene.pitch_load(i - 1)[1] for i in moving[1:]),
-        "bearing damping": any(scene.bearing_damping),
-        "shaft damping": scene.shaft_damping != 0.0,
-    }
-    built += [BuiltItem("term", name) for name, there in optional.items() if there]
-    built += [BuiltItem("output", name) for name in scene.outputs]
-    return built

@@ -13,6 +13,7 @@ import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.base import BuiltItem
+from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
@@ -180,4 +181,4 @@ def items(scene: Scene) -> list[BuiltItem]:
     """Raises MethodRefusal where heyoka is not installed, before anything is built; does not load it."""
     if find_spec("heyoka") is None:
         heyoka()  # refuses
-    return samples.items(scene)
+    return equation_items(scene)

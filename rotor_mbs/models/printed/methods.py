@@ -12,6 +12,7 @@ import numpy as np
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method
 from rotor_mbs.methods.settings import choice
+from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.ode45 import Ode45Result, Ode45Settings, RightHandSide, ode45
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
@@ -117,21 +118,9 @@ class PrintedModel:
         self._errata = errata
 
     def items(self, scene: Scene) -> list[BuiltItem]:
-        rotor = self._rotor(scene)
-        sources = self._sources(len(scene.blades))
-        built = [BuiltItem("equation", "rotor", sources[0])]
-        for i in range(1, 1 + len(scene.blades)):
-            if rotor.pitches_move:
-                built.append(BuiltItem("equation", f"pitch {i}", sources[1]))
-            else:
-                built.append(BuiltItem("term", f"blade {i} fixed", "its pitch has no inertia"))
-        if scene.gravity != 0.0:
-            built.append(BuiltItem("term", "gravity"))
-        if scene.has_torque:
-            built.append(BuiltItem("term", "rotor torque"))
-        if any(scene.pitch_torque):
-            built.append(BuiltItem("term", "pitch torque", "τ3 to τ5"))
-        return built + [BuiltItem("output", name) for name in scene.outputs]
+        """Raises MethodRefusal where the printed equations cannot represent the scene."""
+        self._rotor(scene)
+        return equation_items(scene, self._sources(len(scene.blades)))
 
     def _sources(self, blades: int) -> tuple[str, str]:
         """Where in the paper the rotor's row and a pitch's stand, in the form that is run."""
