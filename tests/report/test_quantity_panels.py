@@ -81,6 +81,8 @@ def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(t
     assert row is not None
     assert prefixed(largest, "N") in row[0]
     assert "Exudyn tree, RK67" in sections["shaft_moment"]
+    regions = re.findall(r'role="region" aria-label="([^"]*)"', page)
+    assert len(set(regions)) == len(regions) > len(loads)  # a screen reader lists them by their names
 
 
 def test_the_uncertainty_of_an_extrapolated_run_is_drawn_and_told(tmp_path: Path) -> None:
