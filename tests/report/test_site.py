@@ -15,7 +15,7 @@ from support.sweeps import made_sweep
 from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.files import Site
-from rotor_mbs.report.pages.formulas import formula, matrices
+from rotor_mbs.report.pages.formulas import matrices
 from rotor_mbs.report.pages.sweep import field_name
 from rotor_mbs.report.plots.sweep import distribution
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
@@ -88,11 +88,14 @@ def test_a_distribution_rises_from_none_to_all_runs() -> None:
 
 
 def test_formulas_are_typeset() -> None:
-    assert formula("c² m c3²") == (
-        '<math><mrow><msup><mi>c</mi><mn>2</mn></msup><mspace width="0.2em"/><mi>m</mi><mspace width="0.2em"/>'
-        "<msup><msub><mi>c</mi><mn>3</mn></msub><mn>2</mn></msup></mrow></math>"
-    )
-    assert formula("what <is> this?") == "what &lt;is&gt; this?"
+    texts = ("c² m c3²", "what <is> this?")
+    entries = [CheckedEntry("(8)", f"row 1 column {i + 1}", text, "", 0.0, True, "") for i, text in enumerate(texts)]
+    ((_, typeset),) = matrices(entries, ("(8)",))
+    assert (
+        '<mtd><mrow><msup><mi>c</mi><mn>2</mn></msup><mspace width="0.2em"/><mi>m</mi><mspace width="0.2em"/>'
+        "<msup><msub><mi>c</mi><mn>3</mn></msub><mn>2</mn></msup></mrow></mtd>"
+    ) in typeset
+    assert "<mtd><mtext>what &lt;is&gt; this?</mtext></mtd>" in typeset
 
 
 def test_the_faulty_entry_of_a_matrix_is_marked_and_corrected() -> None:

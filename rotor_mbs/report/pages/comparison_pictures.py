@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
+from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry
 from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.claims import description_of
 from rotor_mbs.report.pages.error_pictures import angle_difference
+from rotor_mbs.report.pages.scene_tables import path_table
 from rotor_mbs.report.plots import comparisons, paths
 from rotor_mbs.report.plots.comparisons import Mark
 from rotor_mbs.report.plots.time_histories import Series
@@ -112,11 +113,11 @@ def _published(claims: Sequence[Claim], shown: Sequence[int]) -> list[tuple[Mark
     return found[:_PUBLISHED]
 
 
-def tips_section(
-    stored: StoredScene, sides: dict[str, StoredRun], horizon: float | None, tables: Sequence[PageTable]
-) -> Section:
-    """Paths in space as the paper draws them; offset over azimuth; distance of printed from corrected tips."""
-    runs = {heading: run for heading, run in sides.items() if "tip" in run}
+def tips_section(stored: StoredScene, runs: Mapping[str, StoredRun], horizon: float | None) -> Section:
+    """Paths in space as the paper draws them; offset over azimuth; distance of printed from corrected tips.
+
+    runs: printed and corrected, by heading, those that have tips.
+    """
     if not runs:
         return Section()
     blades = next(iter(runs.values())).array("tip").shape[1]
@@ -140,7 +141,7 @@ def tips_section(
         caption = f"Distance of each printed tip from the corrected one: up to {prefixed(largest, 'm')}"
         pictures.append(picture(panels, "tip-difference", caption, f"{caption}."))
     ends = [line_entry("blade at the start", line="--"), line_entry("at the end"), line_entry("shaft", width=4)]
-    return Section(pictures, [*lines, *ends], tables)
+    return Section(pictures, [*lines, *ends], [path_table(runs)])
 
 
 def _path_picture(name: str, run: StoredRun) -> Picture:

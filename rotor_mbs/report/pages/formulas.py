@@ -20,12 +20,6 @@ _POWERS = {"²": "2", "³": "3"}
 _PLACE = re.compile(r"row (\d) column (\d)")
 
 
-def formula(text: str) -> Markup:
-    """The formula as one MathML element; text that is no formula stays text."""
-    inside = _row(text)
-    return Markup(f"<math>{inside}</math>") if inside is not None else Markup(escape(text))
-
-
 def _row(text: str) -> str | None:
     """MathML of a formula; None where a part of it is not understood."""
     parts, at = [], 0

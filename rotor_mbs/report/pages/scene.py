@@ -12,7 +12,7 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claim_records import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
+from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
@@ -100,7 +100,7 @@ def scene_page(
         "claims": _claims_section(claims, study, [own] if own else []),
         "viewer": viewer(scene, sides),
         "key": Section([key] if key is not None else []),
-        "paths": comparison_pictures.tips_section(scene, drawn.sides, drawn.horizon, _path_tables(drawn)),
+        "paths": comparison_pictures.tips_section(scene, drawn.sides_with("tip"), drawn.horizon),
         "motion": motion_section(drawn),
         "difference": difference_section(drawn),
         "energy": energy_section(drawn),
@@ -233,11 +233,6 @@ def energy_section(drawn: DrawnRuns) -> Section:
         return Section()
     legend = [*error_pictures.run_legend(methods), *_horizon_entry(drawn)]
     return Section([shown], legend, [scene_tables.energy_table(runs)])
-
-
-def _path_tables(drawn: DrawnRuns) -> list[PageTable]:
-    runs = drawn.sides_with("tip")
-    return [scene_tables.path_table(runs)] if runs else []
 
 
 def _horizon_entry(drawn: DrawnRuns) -> list[LegendEntry]:
