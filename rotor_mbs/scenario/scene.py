@@ -186,6 +186,11 @@ class Scene:
         stiffness = self.bearing_stiffness[blade] if self.bearing_stiffness else 0.0
         return stiffness, self.bearing_damping[blade] if self.bearing_damping else 0.0
 
+    @property
+    def dampings(self) -> tuple[float, ...]:
+        """(1 + blades,) N m s/rad: of the shaft, then of each pitch bearing."""
+        return self.shaft_damping, *(self.bearing(i)[1] for i in range(len(self.blades)))
+
     def pitch_load(self, blade: int) -> tuple[Table, Table]:
         """Torque (N m) and rest angle (rad) over time of the pitch bearing of a blade, counted from 0.
 

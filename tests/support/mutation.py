@@ -159,7 +159,6 @@ _TARGETS = (
             "_kinetic_energy",
             "_potential_energy",
             "_work",
-            "_dampings",
             "_spring_energy",
             "_springs",
             "_work_of_rests",

@@ -44,7 +44,7 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
         for column, load, _ in drives(scene):
             exact = exact + torques[load] * turned[:, column] if column else exact
         return exact
-    losses = _losses(scene, rates)
+    losses = rates**2 @ np.array(scene.dampings)
     out, done = np.zeros(len(time)), 0.0
     slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in segments:
@@ -73,15 +73,6 @@ def work_of_rests(scene: Scene, angles: Array) -> Array:
             energy = 0.5 * scene.bearing_stiffness[i] * rest * (rest - 2.0 * angles[:, 1 + i])
             total += energy - energy[:1]
     return total
-
-
-def _losses(scene: Scene, rates: Array) -> Array:
-    """(n,) W turned into heat."""
-    losses = scene.shaft_damping * rates[:, 0] ** 2
-    if scene.bearing_damping:
-        for i in pitching(scene):
-            losses = losses + scene.bearing_damping[i] * rates[:, 1 + i] ** 2
-    return losses
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:

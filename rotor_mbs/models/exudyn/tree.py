@@ -90,7 +90,7 @@ def _tree(scene: Scene) -> Part:
         parameters["jointPControlVector"] = [0.0, *stiffness]
         parameters["jointPositionOffsetVector"] = [0.0, *(constant_value(scene.pitch_load(i)[1]) for i in blades)]
         detail += ", bearing stiffness"
-    damping = [scene.shaft_damping, *(scene.bearing(i)[1] for i in blades)]
+    damping = [scene.dampings[column] for column in scene.moving_coordinates]
     if any(damping):
         parameters["jointDControlVector"] = damping
         parameters["jointVelocityOffsetVector"] = [0.0 for _ in links]

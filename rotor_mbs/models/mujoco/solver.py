@@ -156,7 +156,7 @@ class MujocoSolver:
         if not self._scene.work_needs_path:
             turned = angles[:, columns] - angles[:1, columns]
             return np.asarray((torques * turned).sum(axis=1))
-        dampings = np.array(_dampings(self._scene))[self._moving]
+        dampings = np.array(self._scene.dampings)[self._moving]
         slopes = gains * np.array([segment.slopes for segment in self._rows.segments]).reshape(values.shape)
         power = (torques * rates[:, columns]).sum(axis=1) - (dampings * rates**2).sum(axis=1)
         change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
@@ -164,11 +164,6 @@ class MujocoSolver:
         h = np.diff(self._rows.times)
         parts = 0.5 * h * (power[1:] + power[:-1]) + h * h / 12.0 * (change[:-1] - change[1:])
         return np.concatenate([[0.0], np.cumsum(parts)])
-
-
-def _dampings(scene: Scene) -> tuple[float, ...]:
-    """(1 + blades,) N m s/rad."""
-    return (scene.shaft_damping, *(scene.bearing_damping or (0.0,) * len(scene.blades)))
 
 
 def _springs(scene: Scene, samples: int) -> Iterator[tuple[int, float, Array, bool]]:
