@@ -133,7 +133,7 @@ def ode45(
         h_min = smallest_step(t)
         h = min(h_max, max(h_min, h))
         if done := 1.1 * h >= t_end - t:
-            h = t_end - t  # the last step is stretched, or cut, to the end
+            h = t_end - t  # the last step is stretched, or cut, to the end; exact, for t is past half of it
         failed_here = False
         while True:
             y_new, k, error = _attempt(f, t, y, k1, h, threshold)
@@ -151,7 +151,7 @@ def ode45(
             failed_here = True
         if message:
             break
-        t, y, k1 = (t_end if done else t + h), y_new, k[6]
+        t, y, k1 = t + h, y_new, k[6]
         times.append(t)
         states.append(y)
         stages.append(k)

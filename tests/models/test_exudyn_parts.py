@@ -8,6 +8,7 @@ import sys
 import time
 from dataclasses import replace
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -340,6 +341,14 @@ def test_mountings_balance_exactly() -> None:
         for i in range(count):
             c, s = np.cos(2 * pi * i / count), np.sin(2 * pi * i / count)
             assert np.abs(geometry.mounting(i, count) - geometry.rotation_y(c, s)).max() < 5e-16
+
+
+def test_a_spring_over_time_resists_from_its_offset() -> None:
+    """A constant rest is the engine's offset, a torque over time is the spring's own: 3 (0.5 - 0.2) + 4·2 - 10·7."""
+    from rotor_mbs.models.exudyn.chain import _spring_torque
+
+    torque = _spring_torque(SimpleNamespace(at=lambda time: 10.0 * time))
+    assert torque(None, 7.0, 0, 0.5, 2.0, 3.0, 4.0, 0.2) == pytest.approx(0.9 + 8.0 - 70.0, rel=1e-14)
 
 
 def test_quaternion_and_rotation_vector_are_those_of_the_rotation() -> None:

@@ -244,6 +244,7 @@ _CHECK = "studies/test_check.py::test_"
 _REFERENCE = "models/test_reference.py::test_"
 _TESTS = {
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
+    f"{_M}.chain": (f"{_PARTS}a_spring_over_time_resists_from_its_offset",),
     f"{_M}.sensor_samples": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
     "rotor_mbs.scenario.time_table": ("scenario/test_time_table.py",),
     f"{_M}.tree": ("solution/test_judgement_messages.py",),
