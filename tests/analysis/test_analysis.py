@@ -144,7 +144,7 @@ def test_a_number_that_the_printed_model_gives_and_the_right_one_does_not(tmp_pa
 def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
     run = Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t, lambda t: -0.2 * t))
     less = Condition(of=of("range"), relation="<", than=of("range", 1))
-    opposite = Condition(of=of("net_change"), relation="opposite", than=of("net_change", 1))
+    opposite = Condition(of=of("net_change", 1), relation="opposite", than=of("net_change"))
     undefined = Condition(of=of("growth", 2), relation=">", bound=0.0)
     with open_results(store(tmp_path / "r.h5", [run])) as results:
         found = claims(

@@ -156,6 +156,15 @@ def test_growth_is_known_as_far_as_the_variational_equations_went(
     assert np.isfinite(found.trajectory.error_growth).tolist() == finite
 
 
+def test_growth_over_one_interval_is_that_over_its_halves() -> None:
+    pytest.importorskip("heyoka")
+    one, halves = (solve("reference", paper("fig03", duration=0.1, samples=n), {}).trajectory for n in (2, 3))
+    assert one.error_growth is not None
+    assert halves.error_growth is not None
+    assert one.error_growth[-1] == pytest.approx(halves.error_growth[-1], rel=1e-9)
+    assert one.error_growth[-1] > 1.01
+
+
 def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reference_module, "is_available", lambda: False)
     free = paper("fig03").blades[0]

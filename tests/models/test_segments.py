@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from support.scenes import ARM, MASS, OFFSET, paper
 
+from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods import time_limit
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.models.lagrange import taylor
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
 from rotor_mbs.models.lagrange.samples import Advance, over_segments
 from rotor_mbs.scenario.time_table import Segment
@@ -108,6 +110,18 @@ def test_the_order_of_taylors_series_is_that_of_its_tolerance(tolerance: float |
     )
     expected = math.ceil(1.0 - 0.5 * math.log(tolerance or np.finfo(float).eps))
     assert solver._integrator.order == expected
+
+
+def test_what_taylor_builds_is_listed_without_loading_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
+    def load() -> None:
+        raise MethodRefusal("heyoka is not installed")
+
+    monkeypatch.setattr(taylor, "heyoka", load)
+    monkeypatch.setattr(taylor, "find_spec", lambda _: object())
+    assert taylor.items(paper("fig03"))
+    monkeypatch.setattr(taylor, "find_spec", lambda _: None)
+    with pytest.raises(MethodRefusal, match="not installed"):
+        taylor.items(paper("fig03"))
 
 
 def _work_unit(weight: float, kinetic: float, torque: float) -> float:
