@@ -153,11 +153,12 @@ def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
                 claim(less),
                 claim(less.model_copy(update={"relation": ">"})),
                 claim(opposite),
+                claim(less.model_copy(update={"relation": "opposite"})),
                 claim(undefined),
                 claim(less, undefined),
             ],
         )
-    assert [one.printed.holds for one in found] == [True, False, True, False, False]
+    assert [one.printed.holds for one in found] == [True, False, True, False, False, False]
     assert all(one.corrected.holds is None for one in found)
 
 

@@ -86,6 +86,7 @@ EQUIVALENT = {
     r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\.(_settings .*|)(constraints|_OLD_JACOBIAN_FROM)": (
         "decides how long a run takes, not what comes out"
     ),
+    r"claims\._relation .*value \* against scaled": "its sign alone counts",
     r"verdicts\._start_off .*1 -> 2": "one zero or two: the largest is zero",
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
