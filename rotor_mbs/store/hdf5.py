@@ -151,7 +151,7 @@ def mapped(dataset: Any) -> NDArray[Any]:
 def values_of(dataset: Any) -> NDArray[Any]:
     """An array, whole. Raises StoreError where it is not in the file, or claims far more than the file holds."""
     place = f"{dataset.file.filename}: {dataset.name}"
-    if not isinstance(dataset, h5py.Dataset):
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind == "O":
         raise StoreError(f"{place} is no array")
     if dataset.external or dataset.is_virtual:
         raise StoreError(f"{place} is stored in another file; allowed: arrays of this file")

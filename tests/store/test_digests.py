@@ -176,6 +176,8 @@ FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
     ),
     "30 GB that are not there": lambda run, _: run.create_dataset("angles", (10**9, 4), "f8", chunks=(1000, 4)),
     "a group": lambda run, _: run.create_group("angles"),
+    "a text": lambda run, _: run.create_dataset("angles", data="text"),
+    "an array of nothing": lambda run, _: run.create_dataset("angles", data=h5py.Empty("f8")),
 }
 
 
