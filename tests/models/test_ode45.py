@@ -157,6 +157,19 @@ def test_growth_cap_and_stretched_last_step_by_hand():
     assert result.evaluations == 1 + 6 * result.steps
 
 
+def test_a_state_of_zero_counts_as_the_threshold():
+    """abs_tol / rel_tol = 1e-3: the first step is that of test_first_step_by_hand."""
+    assert ode45(lambda _t, _y: [0.02], 1.0, [0.0], 1e-5, 1e-8).time[1] == pytest.approx(0.004, rel=1e-9)
+
+
+@pytest.mark.parametrize(("begun", "last"), [(0.09001, 0.10999), (0.08999, 0.01001)])
+def test_the_last_step_is_stretched_by_a_tenth_at_most(begun, last):
+    """Two steps of together `begun`, eight of 0.1: 0.10999 is one step more, 0.11001 is two."""
+    k = 0.1 / (1.25 * begun / 6.0)  # 1/rh = begun / 6 at RelTol 1e-5
+    result = ode45(lambda _t, _y: [k], 1.0, [1.0], 1e-5, 1e-8)
+    assert result.time[-1] - result.time[-2] == pytest.approx(last, rel=1e-9)
+
+
 def wall(position):
     """y' = 0 up to `position`, not defined beyond."""
     return lambda t, _y: [0.0 if t < position else math.nan]
