@@ -36,6 +36,7 @@ from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
+from rotor_mbs.store.digests import seal
 from rotor_mbs.store.freeze import write_digests
 from rotor_mbs.studies import check, check_probes
 from rotor_mbs.studies.check_probes import measure, probe, probes
@@ -537,6 +538,7 @@ def test_a_stored_scene_that_is_none_is_refused(copy: Path, capsys: pytest.Captu
 def test_a_file_without_runs_is_no_success(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with h5py.File(tmp_path / "empty.h5", "w") as file:
         file.attrs.update({"format": "rotor_mbs", "format_version": 1})
+        seal(file)
     assert main(["check", str(tmp_path / "empty.h5")]) == 1
     assert "nothing to check" in capsys.readouterr().err
 
