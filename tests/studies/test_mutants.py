@@ -122,7 +122,8 @@ def _run(*arguments: str) -> list[dict[str, str]]:
     done = subprocess.run([sys.executable, script, *arguments], capture_output=True, text=True, timeout=6 * 3600)
     assert done.returncode == 0, done.stderr
     print(done.stderr)
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    rows = [line for line in done.stdout.splitlines() if line.startswith("{")]  # Exudyn greets on standard output
+    return [json.loads(row) for row in rows]
 
 
 def _unexplained(rows: list[dict[str, str]]) -> list[str]:
