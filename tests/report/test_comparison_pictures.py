@@ -34,7 +34,7 @@ def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
     (axes,) = picture.axes
     heights = [line.get_ydata()[0] for line in axes.get_lines() if line.get_linestyle() == ":"]
     assert heights == [2.7315]
-    assert [text.get_text().strip() for text in axes.texts] == ["published 2.7315 rad", "they part at 1.5 s"]
+    assert [text.get_text().strip() for text in axes.texts] == ["published 2.7315 rad", "0.05 rad apart at 1.5 s"]
     assert axes.get_ylabel() == "rotor angle (rad)"
     assert [line.get_xdata()[0] for line in axes.get_lines()[-2:]] == [6.0, 1.5]
 

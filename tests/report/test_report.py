@@ -287,7 +287,7 @@ def test_energy_of_runs_that_ended_early_is_not_the_largest_of_the_finding(tmp_p
     ]
     found = page(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent, "index.html")
     # 149/300 of 1e12 J
-    assert "in 2 of 2 scenes, up to 1.00 MJ, or more where the run breaks off (paper/fig12: 497 GJ)." in found.words
+    assert "in 2 of 2 scenes, up to 1.00 MJ; in paper/fig12 497 GJ before its run breaks off." in found.words
 
 
 def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) -> None:

@@ -17,11 +17,10 @@ from rotor_mbs.report.pages.claims import description_of
 from rotor_mbs.report.pages.error_pictures import angle_difference
 from rotor_mbs.report.pages.scene_tables import path_table
 from rotor_mbs.report.plots import comparisons, paths
-from rotor_mbs.report.plots.comparisons import Mark
+from rotor_mbs.report.plots.comparisons import VISIBLE, Mark
 from rotor_mbs.report.plots.time_histories import Series
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 _PUBLISHED = 2  # published values at most on one picture
 
 

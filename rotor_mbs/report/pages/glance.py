@@ -109,8 +109,11 @@ def short_sentences(facts: Finding) -> list[str]:
         found.append(f"The paper's equations as printed give {share} published numbers{other}.")
     if facts.energy is not None and facts.energy.rises.count:
         most = f", up to {prefixed(facts.energy.gain, 'J')}" if facts.energy.scene else ""
-        broken = [f"{name}: {prefixed(gain, 'J')}" for name, gain in facts.energy.ended_early.items()]
-        most += f", or more where the run breaks off ({'; '.join(broken)})" if broken else ""
+        broken = [
+            f"; in {name} {prefixed(gain, 'J')} before its run breaks off"
+            for name, gain in facts.energy.ended_early.items()
+        ]
+        most += "".join(broken)
         rises = facts.energy.rises
         found.append(f"As printed they make energy from nothing in {rises.count} of {rises.of} scenes{most}.")
     known = {one.method: one.angle_error for one in facts.agreement if one.angle_error is not None}

@@ -17,6 +17,7 @@ from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.core.numbers import power
 from rotor_mbs.report.plots.time_histories import Array, Series, errors, mark_time, set_range, thin
 
+VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 _LOWEST = 1e-16  # relative energy at which a mark below it is drawn
 
 
@@ -52,7 +53,7 @@ def departure(
         if parted is not None and 0.0 < parted < end:
             axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
             if not place:
-                text = f" they part at {parted:.2g} s"
+                text = f" {VISIBLE:g} rad apart at {parted:.2g} s"
                 axes.text(parted, axes.get_ylim()[1], text, color=GREY, ha="left", va="top", fontsize=8.5)
     return picture
 
