@@ -334,6 +334,15 @@ def test_cumulative_integral_is_exact_on_uneven_rows() -> None:
     assert np.allclose(got, t**8 - t**2 - (t[0] ** 8 - t[0] ** 2), rtol=1e-11)
 
 
+def test_cumulative_integral_of_a_mirrored_function_is_mirrored() -> None:
+    """The nearest rows stand alike on both sides of an interval, but for the first and last three."""
+    t = np.cumsum(np.random.default_rng(2).uniform(0.5, 1.5, 40))
+    power = np.exp(0.3 * t - 9.0)
+    forwards = np.diff(energy.cumulative_integral(t, power))
+    backwards = np.diff(energy.cumulative_integral(-t[::-1], power[::-1]))[::-1]
+    assert np.allclose(forwards, backwards, rtol=1e-11)
+
+
 def test_mountings_balance_exactly() -> None:
     for count in (2, 3, 4, 6):
         assert not sum(geometry.mounting(i, count)[0, 0] for i in range(count))

@@ -72,6 +72,8 @@ EQUIVALENT = {
     r"judgement\._shaft_inertia_forms .*has_pitch_inertia: always": (
         "without pitch inertia the products of inertia that would be divided are zero, too"
     ),
+    r"samples\._put_energies .*2 \* len\(columns\) scaled": "a count beside a count: a millionth more is the same",
+    r"tree\._tree .*0\.0 -> ": "the offset of a spring of no stiffness: the rotor's",
     r"judgement\.allowed_of .*and, or in angle is None": "a method has a bound for both or for neither",
     r"ode_solvers\.right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
     r"ode_solvers\.right_hand_side .*not any\(\(slope .*: never": "slopes of zero: loads worked out again, the same",
@@ -96,6 +98,7 @@ UNSEEN = {
     r"energy\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
         "a tolerance in matching times: any between round-off and the distance of two rows does as well"
     ),
+    r"time_table\.values_before .*1e-12 scaled": "keeps rounding from passing a jump: any size near it does",
     r"time_table\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
     r"ode_solvers\.ode45_integrator .*end - start|adapter\._schedule .*(0\.1 / |1\.0 - )": (
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands of intervals"

@@ -262,6 +262,7 @@ _TESTS = {
     "rotor_mbs.solution.metrics": _RULES,
     f"{_M}.energy": (
         f"{_PARTS}cumulative_integral_is_exact_on_uneven_rows",
+        f"{_PARTS}cumulative_integral_of_a_mirrored_function_is_mirrored",
         "models/test_exudyn_work.py",
         f"{_PITCH}work_of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
     ),
