@@ -147,7 +147,7 @@ def ode45(
                     f"below the smallest value allowed ({h_min:e}) at time t."
                 )
                 break
-            h, done = max(h_min, _after_failure(h, error, rel_tol, failed_here)), False
+            h, done = max(h_min, after_failure(h, error, rel_tol, failed_here)), False
             failed_here = True
         if message:
             break
@@ -185,7 +185,8 @@ def _after_success(h: float, error: float, rel_tol: float) -> float:
     return h / shrink if shrink > 0.2 else 5.0 * h
 
 
-def _after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -> float:
+def after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -> float:
+    """The step tried after one of h whose error was too large, at the same time: the first time by the error."""
     return 0.5 * h if failed_before else h * max(0.1, 0.8 * (rel_tol / error) ** _POWER)
 
 

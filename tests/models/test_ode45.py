@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from rotor_mbs.models.ode45 import ERROR, INTERPOLANT, NODES, STAGES, first_step, ode45, smallest_step
+from rotor_mbs.models.ode45 import ERROR, INTERPOLANT, NODES, STAGES, after_failure, first_step, ode45, smallest_step
 
 A = [[*row, *[Fraction(0)] * (7 - len(row))] for row in ((), *STAGES)]
 B = A[6]
@@ -143,6 +143,21 @@ def test_first_step_by_hand():
     # A state below the threshold 1e-3 is taken as the threshold: rh = 1.25·(0.02/1e-3)/0.1 = 250 again.
     assert first_step([0.0], [0.02], 0.1, 1e-5, 1e-3) == pytest.approx(0.004, rel=1e-12)
     assert first_step([1.0], [0.0], 0.1, 1e-5, 1e-3) == 0.1
+    # Of 1/250 and the longest step the shorter one, however near they are.
+    assert first_step([1.0], [-20.0], 0.004 * (1.0 + 1e-9), 1e-5, 1e-3) == pytest.approx(0.004, rel=1e-12)
+    shorter = 0.004 * (1.0 - 1e-9)
+    assert first_step([1.0], [-20.0], shorter, 1e-5, 1e-3) == shorter
+
+
+def test_the_smallest_step_is_sixteen_units_in_the_last_place_of_the_time():
+    assert [smallest_step(t) for t in (1.0, 1.5, 8.0)] == [2.0**-48, 2.0**-48, 2.0**-45]
+
+
+def test_a_first_failure_shrinks_a_step_by_its_error_to_a_tenth_at_most():
+    """Four fifths of the fifth root: an error 32 times the tolerance leaves 0.4 of the step."""
+    assert after_failure(0.1, 32e-5, 1e-5, False) == pytest.approx(0.04, rel=1e-12)
+    assert after_failure(0.1, 1e5, 1e-5, False) == pytest.approx(0.01, rel=1e-12)
+    assert after_failure(0.1, 32e-5, 1e-5, True) == 0.05
 
 
 def test_growth_cap_and_stretched_last_step_by_hand():
