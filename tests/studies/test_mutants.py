@@ -110,6 +110,7 @@ UNSEEN = {
     r"adapter\.linearized .*1\.0 -> ": "the size of a difference quotient's step: any near it does as well",
     r"reference\._(LOOSER|TIGHTEST|QUAD|PERTURBATION) ": "a tolerance half as large again bounds and resolves as much",
     r"run_integrity\.steps_off .*1e-09 scaled": "keeps rounding from adding a step: any size near it does",
+    r"methods\._scheme .*scheme\.step scaled": "the largest number of steps: any near it does",
     r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
     r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",
     r"adapter\._count .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps: reported, judged by nothing",

@@ -297,6 +297,7 @@ _TESTS = {
         "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization",
     ),
     f"{_L}.ode_solvers": ("models/test_segments.py",),
+    f"{_L}.methods": ("methods/test_settings.py",),
     f"{_L}.taylor": (
         "models/test_segments.py::test_the_order_of_taylors_series_is_that_of_its_tolerance",
         "models/test_segments.py::test_what_taylor_builds_is_listed_without_loading_heyoka",
