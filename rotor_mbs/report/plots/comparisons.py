@@ -53,8 +53,8 @@ def departure(
         if parted is not None and 0.0 < parted < end:
             axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
             if not place:
-                text = f" {VISIBLE:g} rad apart at {parted:.2g} s"
-                axes.text(parted, axes.get_ylim()[1], text, color=GREY, ha="left", va="top", fontsize=8.5)
+                text = f"{VISIBLE:g} rad apart at {parted:.2g} s"
+                axes.text(parted + 0.01 * end, axes.get_ylim()[1], text, color=GREY, va="top", fontsize=8.5)
     return picture
 
 
