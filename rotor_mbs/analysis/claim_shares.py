@@ -7,12 +7,12 @@ many starts, for several durations, and holds or fails only where nearly all run
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.claims import all_hold, readings_of
+from rotor_mbs.analysis.claims import NumberValues, all_hold, readings_of
 from rotor_mbs.analysis.published import Published, TrajectoryNumber
 from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.solution.status import COMPLETE, code_of
@@ -146,43 +146,16 @@ class SampledRuns:
         # Infinite or undefined: the energy is beyond all numbers.
         return complete & (np.nan_to_num(self.energy_drift, nan=np.inf) < ENERGY_GAIN)
 
-    def numbers(self, asked: TrajectoryNumber) -> list[float | None]:
-        """(runs,) the number of each run; None where it is undefined."""
-        runs = zip(self.angles, self.rates, strict=True)
-        return [measure({"time": self.time, "angles": angles, "rates": rates}, asked) for angles, rates in runs]
+    def values(self, asked: Iterable[TrajectoryNumber]) -> list[dict[TrajectoryNumber, float | None]]:
+        """(runs,) the `asked` numbers of each run, None where one is undefined; none of a run that decides nothing."""
+        numbers = list(asked)
+        runs = zip(self.decides.tolist(), self.angles, self.rates, strict=True)
+        return [
+            {one: measure({"time": self.time, "angles": angles, "rates": rates}, one) for one in numbers if decides}
+            for decides, angles, rates in runs
+        ]
 
 
-@dataclass
-class MeasuredRuns:
-    """Numbers of the runs of one method for one duration: by what is read off, and by scene which runs decide."""
-
-    numbers: dict[TrajectoryNumber, list[float | None]] = field(default_factory=dict)
-    decides: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
-
-    def add(self, scene: str, runs: SampledRuns, asked: Iterable[TrajectoryNumber]) -> None:
-        """The runs of one more scene, and of the `asked` numbers those that are read off it."""
-        self.numbers |= {number: runs.numbers(number) for number in asked if number.scene == scene}
-        self.decides[scene] = runs.decides
-
-    def marks(self, item: Published) -> str:
-        """A mark of the claim for each run; run k of one scene is compared with run k of another."""
-        runs = len(next(iter(self.decides.values())))
-        return "".join(_MARKS[all_hold(readings_of(item, _OneRun(self, run)))] for run in range(runs))
-
-
-@dataclass(frozen=True)
-class _OneRun:
-    measured: MeasuredRuns
-    run: int
-
-    def has(self, scene: str) -> bool:
-        return scene in self.measured.decides and bool(self.measured.decides[scene][self.run])
-
-    def value(self, asked: TrajectoryNumber) -> float | None:
-        return self.measured.numbers[asked][self.run]
-
-
-def numbers_in(items: Iterable[Published]) -> list[TrajectoryNumber]:
-    """Everything that the claims read off, each once."""
-    sides = [side for item in items for test in item.tests for side in (test.of, test.than)]
-    return list(dict.fromkeys(side for side in sides if side is not None))
+def marks(item: Published, runs: Iterable[NumberValues]) -> str:
+    """A mark of the claim for each run; run k of one scene is compared with run k of another."""
+    return "".join(_MARKS[all_hold(readings_of(item, values))] for values in runs)

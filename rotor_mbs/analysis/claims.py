@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
@@ -13,6 +12,8 @@ from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Choice = Callable[[StoredScene], StoredRun | None]
+# What is read off the runs of one model: None where it is undefined; without it where no run can decide.
+NumberValues = Mapping[TrajectoryNumber, float | None]
 
 
 @dataclass(frozen=True)
@@ -53,24 +54,14 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
     """The numbers and claims that `scenes` can decide for at least one model; of `items`, by default of all."""
     found = []
     for item in published() if items is None else items:
-        printed = _outcome(item, _Runs(scenes, run_selection.printed_run))
-        found.append(Claim(item, printed, _outcome(item, _Runs(scenes, run_selection.reference_or_corrected_run))))
+        printed = _outcome(item, scenes, run_selection.printed_run)
+        found.append(Claim(item, printed, _outcome(item, scenes, run_selection.reference_or_corrected_run)))
     return [claim for claim in found if claim.is_decided]
 
 
-class Numbers(Protocol):
-    """Where the numbers of a claim are read off: the runs of one model, one for each scene."""
-
-    def has(self, scene: str) -> bool:
-        """Whether there is a run of the scene that can decide anything."""
-
-    def value(self, asked: TrajectoryNumber) -> float | None:
-        """The number; None where it is undefined, or where there is no run."""
-
-
-def readings_of(item: Published, numbers: Numbers) -> tuple[Reading, ...]:
+def readings_of(item: Published, values: NumberValues) -> tuple[Reading, ...]:
     """The tests of a claim in words, in order."""
-    return tuple(_read(test, numbers) for test in item.tests)
+    return tuple(_read(test, values) for test in item.tests)
 
 
 def all_hold(readings: Iterable[Reading]) -> bool | None:
@@ -81,28 +72,15 @@ def all_hold(readings: Iterable[Reading]) -> bool | None:
     return None if None in verdicts or not verdicts else True
 
 
-@dataclass(frozen=True)
-class _Runs:
-    scenes: Mapping[str, StoredScene]
-    choose: Choice
-
-    def of(self, scene: str) -> StoredRun | None:
-        return self.choose(self.scenes[scene]) if scene in self.scenes else None
-
-    def has(self, scene: str) -> bool:
-        return self.of(scene) is not None
-
-    def value(self, asked: TrajectoryNumber) -> float | None:
-        run = self.of(asked.scene)
-        return None if run is None else measure(run, asked)
-
-
-def _outcome(item: Published, runs: _Runs) -> ClaimResult:
-    early = tuple(sorted(scene for scene in item.scenes if _ended_early(runs.of(scene))))
+def _outcome(item: Published, scenes: Mapping[str, StoredScene], choose: Choice) -> ClaimResult:
+    chosen = {name: choose(scenes[name]) for name in sorted(item.scenes) if name in scenes}
+    runs = {name: run for name, run in chosen.items() if run is not None}
+    values = {number: measure(runs[number.scene], number) for number in item.numbers if number.scene in runs}
+    early = tuple(name for name, run in runs.items() if run.status not in COMPLETE)
     if item.of is not None:
-        value = runs.value(item.of)
+        value = values.get(item.of)
         return ClaimResult(None if value is None else rounds_to(value, item.value, item.decimals), value, (), early)
-    readings = readings_of(item, runs)
+    readings = readings_of(item, values)
     return ClaimResult(all_hold(readings), None, readings, early)
 
 
@@ -111,15 +89,11 @@ def rounds_to(value: float, printed: float, decimals: int) -> bool:
     return f"{value:.{decimals}f}" == f"{printed:.{decimals}f}"
 
 
-def _ended_early(run: StoredRun | None) -> bool:
-    return run is not None and run.status not in COMPLETE
-
-
-def _read(test: Condition, numbers: Numbers) -> Reading:
-    if not numbers.has(test.of.scene) or (test.than is not None and not numbers.has(test.than.scene)):
+def _read(test: Condition, values: NumberValues) -> Reading:
+    sides = [test.of] if test.than is None else [test.of, test.than]
+    if any(side not in values for side in sides):
         return Reading(test, None, None, None)
-    value = numbers.value(test.of)
-    limit = numbers.value(test.than) if test.than is not None else None
+    value, limit = values[test.of], None if test.than is None else values[test.than]
     undefined = value is None or (test.than is not None and limit is None)
     return Reading(test, value, limit, False if undefined else _relation(test, value, limit))
 

@@ -78,10 +78,15 @@ class Published(Table):
         return self.kind == "number"
 
     @property
+    def numbers(self) -> list[TrajectoryNumber]:
+        """All that is read off runs for it, each once."""
+        sides = [self.of, *(side for test in self.tests for side in (test.of, test.than))]
+        return list(dict.fromkeys(side for side in sides if side is not None))
+
+    @property
     def scenes(self) -> frozenset[str]:
         """Every scene that it speaks of."""
-        numbers = [self.of, *(side for test in self.tests for side in (test.of, test.than))]
-        return frozenset(one.scene for one in numbers if one is not None)
+        return frozenset(number.scene for number in self.numbers)
 
 
 class Erratum(Table):

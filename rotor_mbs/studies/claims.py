@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
-from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, MeasuredRuns, SampledRuns, numbers_in
+from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
 from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials, trial
-from rotor_mbs.analysis.published import Published, published
+from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.errors import RotorError, StoreError
@@ -132,24 +132,27 @@ def claim_shares(
     Raises InputError, StoreError where the folder has a sweep of other numbers, or cannot be written.
     """
     wanted = [item for item in (published() if items is None else items) if not item.is_number]
-    asked = numbers_in(wanted)
+    asked = dict.fromkeys(number for item in wanted for number in item.numbers)
     scenes = find_scenes(sorted({number.scene for number in asked}))
     shares: list[ClaimShare] = []
     done, total = 0, len(scenes) * len(durations)
     folder.mkdir(parents=True, exist_ok=True)
     with closing(open_task_pool("local", workers)) as pool:
         for duration in durations:
-            measured = {method: MeasuredRuns() for method in METHODS}
+            read: dict[str, list[dict[TrajectoryNumber, float | None]]]
+            read = {method: [{} for _ in range(runs + 1)] for method in METHODS}
             for scene in scenes:
                 sweep = moved_starts(scene, duration, runs, seed)
                 file = folder / f"{scene.name.replace('/', '-')}-{duration:g}s.h5"
                 result = run_sweep(sweep, file, engine=pool, timeout_s=_TIMEOUT_S)
+                own = [number for number in asked if number.scene == scene.name]
                 for method, found in _by_method(StoredSweep(file), runs + 1):
-                    measured[method].add(scene.name, found, asked)
+                    for values, more in zip(read[method], found.values(own), strict=True):
+                        values |= more
                 done += 1
                 on_sweep(f"{scene.name} {duration:g} s: {result.made} runs made", done, total)
             for item in wanted:
-                shares += [ClaimShare(item.id, name, duration, found.marks(item)) for name, found in measured.items()]
+                shares += [ClaimShare(item.id, name, duration, marks(item, values)) for name, values in read.items()]
     return ClaimShares(tuple(shares), SPREAD, runs)
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
-from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, MeasuredRuns, SampledRuns, joint_verdict
+from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, joint_verdict, marks
 from rotor_mbs.analysis.number_trials import count_of_rows
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
 from rotor_mbs.solution.status import code_of
@@ -64,14 +65,14 @@ def claim(*tests: Condition) -> Published:
     return Published(id="c", figure="5", kind="claim", quote="«»", statement="A claim.", tests=tests)
 
 
-def marks(item: Published, **scenes: SampledRuns) -> str:
-    numbers = {one: scenes[one.scene].numbers(one) for one in (TURN, OTHER) if one.scene in scenes}
-    return MeasuredRuns(numbers, {name: found.decides for name, found in scenes.items()}).marks(item)
+def marks_of(item: Published, **scenes: SampledRuns) -> str:
+    by_scene = (scenes[one.scene].values([one]) for one in (TURN, OTHER) if one.scene in scenes)
+    return marks(item, (dict(ChainMap(*values)) for values in zip(*by_scene, strict=True)))
 
 
 def test_a_run_is_compared_with_the_run_of_the_same_number() -> None:
     larger = claim(Condition(of=TURN, relation=">", than=OTHER))
-    assert marks(larger, a=runs([1.0, 2.0, 3.0]), b=runs([2.0, 1.0, 2.0])) == "nyy"
+    assert marks_of(larger, a=runs([1.0, 2.0, 3.0]), b=runs([2.0, 1.0, 2.0])) == "nyy"
 
 
 @pytest.mark.parametrize(
@@ -90,14 +91,14 @@ def test_a_run_is_compared_with_the_run_of_the_same_number() -> None:
 def test_a_run_that_broke_off_or_gained_a_thousandfold_energy_decides_nothing(
     status: str, drift: float, mark: str
 ) -> None:
-    assert marks(claim(Condition(of=TURN, relation=">", bound=0.5)), a=runs([1.0, 1.0], status, drift)) == f"{mark}y"
+    assert marks_of(claim(Condition(of=TURN, relation=">", bound=0.5)), a=runs([1.0, 1.0], status, drift)) == f"{mark}y"
 
 
 def test_a_claim_about_two_scenes_fails_where_one_of_them_fails_and_the_other_decides_nothing() -> None:
     both = claim(Condition(of=TURN, relation="<", bound=1.5), Condition(of=OTHER, relation="<", bound=1.5))
     broken = runs([1.0, 1.0], "solver_failed")
-    assert marks(both, a=broken, b=runs([2.0, 1.0])) == "ny"
-    assert marks(both, a=broken, b=runs([1.0, 1.0])) == "-y"
+    assert marks_of(both, a=broken, b=runs([2.0, 1.0])) == "ny"
+    assert marks_of(both, a=broken, b=runs([1.0, 1.0])) == "-y"
 
 
 def test_the_study_comes_back_from_a_file_as_it_was(tmp_path: Path) -> None:
