@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeAlias
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.output_lock import RESULTS, writing
-from rotor_mbs.execution.pool import Finished, run_tasks
+from rotor_mbs.execution.pool import run_tasks
 
 # Statuses of a case of which there is no record: the same call tries it again.
 NOT_COMPUTED = ("worker_died", "error", "no_reference")
@@ -81,7 +81,7 @@ class Store(Protocol):
 
 
 Perform: TypeAlias = Callable[[Job], Result]
-JobRunner: TypeAlias = Callable[[Sequence[Job]], Iterable[Finished[Job, Result]]]
+JobRunner: TypeAlias = Callable[[Sequence[Job]], Iterable[tuple[Job, Result]]]
 OnProgress: TypeAlias = Callable[[int, int, Outcome], None]
 OnTimeOut: TypeAlias = Callable[[Job, str], Result]
 
@@ -95,14 +95,12 @@ def execute(
     run_jobs: JobRunner,
     store: Store,
     on_progress: OnProgress = ignore_progress,
-    on_time_out: OnTimeOut | None = None,
 ) -> list[Outcome]:
     """The outcomes of the cases that `store` did not have; those that others are compared with come first.
 
     run_jobs      computes a list of jobs and writes their parts: `in_pool`, or a study's own way (a bench times its
                   jobs together)
     on_progress   called with (cases done, of how many, outcome) after each
-    on_time_out   writes the part of a job whose process was ended, in this process
 
     Raises InputError where another process is writing the output, StoreError, and what `run_jobs` raises of RotorError.
     """
@@ -114,7 +112,7 @@ def execute(
         work = sum(case.work for case in missing)
         for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
             jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored)) for case in wave]
-            for outcome in _outcomes(jobs, run_jobs, on_time_out):
+            for outcome in _outcomes(jobs, run_jobs):
                 done = outcome.case.work + sum(one.case.work for one in made)
                 made.append(replace(outcome, share=done / work))
                 on_progress(len(made), len(missing), made[-1])
@@ -139,46 +137,46 @@ def _merge(store: Store, parts: Path, *, even_none: bool = False) -> None:
 
 def compute(cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float) -> Iterator[Outcome]:
     """Outcomes of cases of which nothing is stored, as they come."""
-    return _outcomes([Job(case, Path()) for case in cases], in_pool(perform, workers, timeout_s), None)
+    return _outcomes([Job(case, Path()) for case in cases], in_pool(perform, workers, timeout_s))
 
 
-def in_pool(perform: Perform, workers: int, timeout_s: float) -> JobRunner:
+def in_pool(perform: Perform, workers: int, timeout_s: float, on_time_out: OnTimeOut | None = None) -> JobRunner:
     """Computes jobs in parallel processes.
 
     perform       computes a job and writes its part
     workers       parallel processes; 0: one job after the other in this process
     timeout_s     of one job; its process is ended where it has not ended itself a while after that
+    on_time_out   writes the part of a job whose process was ended, in this process
+
+    Raises what a job raised of RotorError.
     """
 
-    def run_jobs(jobs: Sequence[Job]) -> Iterable[Finished[Job, Result]]:
+    def run_jobs(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
         limited = [replace(job, time_limit_s=timeout_s) for job in jobs]
         if not workers:
-            return (Finished(job, perform(job)) for job in limited)
+            yield from ((job, perform(job)) for job in limited)
+            return
         # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
-        return run_tasks(perform, limited, workers, 1.2 * timeout_s + 10.0)
+        for end in run_tasks(perform, limited, workers, 1.2 * timeout_s + 10.0):
+            if isinstance(end.error, RotorError):
+                raise end.error
+            if end.failure == "timed_out" and on_time_out is not None:
+                yield end.task, on_time_out(end.task, end.message)
+            else:
+                yield end.task, end.value or Result(end.failure, end.message)
 
     return run_jobs
 
 
-def _outcomes(jobs: Sequence[Job], run_jobs: JobRunner, on_time_out: OnTimeOut | None) -> Iterator[Outcome]:
+def _outcomes(jobs: Sequence[Job], run_jobs: JobRunner) -> Iterator[Outcome]:
     ready = []
     for job in jobs:
         if job.reference is None or job.reference.exists():
             ready.append(job)
         else:
             yield Outcome(job.case, Result("no_reference", "its reference was not computed"))
-    for finished in run_jobs(ready) if ready else ():
-        yield Outcome(finished.task.case, _result(finished, on_time_out))
-
-
-def _result(finished: Finished[Job, Result], on_time_out: OnTimeOut | None) -> Result:
-    if finished.value is not None:
-        return finished.value
-    if isinstance(finished.error, RotorError):
-        raise finished.error
-    if finished.failure == "timed_out" and on_time_out is not None:
-        return on_time_out(finished.task, finished.message)
-    return Result(finished.failure, finished.message)
+    for job, result in run_jobs(ready):
+        yield Outcome(job.case, result)
 
 
 def _part(parts: Path, key: str) -> Path:

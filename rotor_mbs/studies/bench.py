@@ -21,7 +21,7 @@ from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
-from rotor_mbs.execution.pool import OF_THE_MACHINE, Finished, TaskLostError, WorkerPool, last_core, one_line
+from rotor_mbs.execution.pool import WorkerPool, last_core, run_in
 from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
 from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder
@@ -116,7 +116,7 @@ def store_curve(job: Job, record: Record) -> Result:
     return Result("ok", counts)
 
 
-def _time_by_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
+def _time_by_scene(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
     """Times, judges and collects every point of the curves of one scene, then of the next."""
     by_scene: dict[str, list[Job]] = {}
     for job in jobs:
@@ -125,7 +125,7 @@ def _time_by_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
         yield from _measure_scene(own)
 
 
-def _measure_scene(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
+def _measure_scene(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
     load_before = os.getloadavg()[0]
     case, results = jobs[0].case, jobs[0].reference
     assert results is not None  # every bench case has a reference
@@ -197,23 +197,22 @@ class Measured:
     """What was measured, by point.
 
     answers      of the timer, by the names they are stored under
-    unanswered   status and message of a point that failed
-    lost         why nothing is known of it, of a point whose process died twice
+    unanswered   status and message of a point that failed; "worker_died": its process died twice, nothing is known
     """
 
     timings: Timings[Point] = field(default_factory=Timings)
     answers: dict[Point, dict[str, Any]] = field(default_factory=dict)
     unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
-    lost: dict[Point, str] = field(default_factory=dict)
 
     def finished(
         self, job: Job, points: Sequence[Point], record: Callable[[list[dict[str, Any]]], Record]
-    ) -> Finished[Job, Result]:
+    ) -> tuple[Job, Result]:
         """The end of a curve: the part of its record is written, but where one of its points is lost."""
         for point in points:
-            if point in self.lost:
-                return Finished(job, None, "worker_died", self.lost[point])
-        return Finished(job, store_curve(job, record(self.rows(points))))
+            status, message = self.unanswered.get(point, ("", ""))
+            if status == "worker_died":
+                return job, Result(status, f"{point.method} at {point.setting:g}: {message}")
+        return job, store_curve(job, record(self.rows(points)))
 
     def is_repeatable(self, points: Sequence[Point]) -> bool:
         """Whether the last run of every point was bit for bit its first one."""
@@ -256,23 +255,13 @@ def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], optio
     with WorkerPool(1, partial(start_timer, methods, scenes), last_core()) as pool:
 
         def answer(task: str, point: Point) -> Any:
-            """None where there is none. A process that died, or lacked memory, is replaced and asked once more."""
-            if point in found.lost or point in found.unanswered:
+            """None where there is none."""
+            if point in found.unanswered:
                 return None
-            for _ in range(2):
-                try:
-                    return pool.submit(ask, (task, point), limit).result()
-                except TaskLostError as exc:
-                    failure, reason = exc.failure, str(exc)
-                except OF_THE_MACHINE as exc:
-                    failure, reason = "worker_died", one_line(exc)
-                except Exception as exc:
-                    failure, reason = "solver_failed", one_line(exc)
-                if failure != "worker_died":
-                    found.unanswered[point] = (failure, reason)
-                    return None
-            found.lost[point] = f"{point.method} at {point.setting:g}: {reason}, and again when it was tried alone"
-            return None
+            (end,) = run_in(pool, ask, [(task, point)], limit)
+            if end.failure:
+                found.unanswered[point] = "solver_failed" if end.failure == "error" else end.failure, end.message
+            return end.value
 
         def warm_up(point: Point) -> Warm:
             start = time.perf_counter()

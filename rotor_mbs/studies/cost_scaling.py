@@ -18,7 +18,6 @@ import numpy as np
 from rotor_mbs.analysis.work_precision import cost_exponent
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
-from rotor_mbs.execution.pool import Finished
 from rotor_mbs.methods.catalogue import methods as all_methods
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -97,7 +96,7 @@ def run_cost_scaling(
     return execute(cases, _time_by_study, ResultsStore(output), on_progress)
 
 
-def _time_by_study(jobs: Sequence[Job]) -> Iterator[Finished[Job, Result]]:
+def _time_by_study(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
     for study in cost_studies():
         points = {
             job: [

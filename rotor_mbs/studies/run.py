@@ -106,10 +106,10 @@ def run_scenes(
     cases += beside
     # Slowest first, so that no long run starts last and keeps one process busy while the others wait.
     cases.sort(key=lambda case: -find_method(case.method).relative_cost)
-    run = in_pool(perform or perform_run, workers, timeout_s)
+    run = in_pool(perform or perform_run, workers, timeout_s, store_time_out)
     with writing(output, RESULTS):
         refuse_losses(output, cases)
-        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress, store_time_out)
+        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress)
         made = [one for one in made if one.case.key in runs]
         asked = [case for case in cases if case.key in runs]
         return RunReport(made, len(asked) - len(made), _stored_failures(output, asked, made))

@@ -54,11 +54,10 @@ def test_a_point_whose_process_dies_is_tried_again_and_after_that_not_stored(
     assert kills.read_text() == ""
     for name, points in curves.items():
         job = Job(Case(SCENE, points[0].method), tmp_path / f"{name}.h5")
-        ended = found.finished(job, points, _record)
+        _, result = found.finished(job, points, _record)
         if name == "twice":
-            assert (ended.value, ended.failure) == (None, "worker_died")
-            assert ended.message.endswith("and again when it was tried alone")
+            assert result.status == "worker_died"
+            assert result.message.endswith("and again when it was tried alone")
         else:
-            assert ended.value is not None
-            assert ended.value.message == "1 points, 0 failed, 0 left out"
-        assert job.part.exists() == (ended.value is not None)
+            assert (result.status, result.message) == ("ok", "1 points, 0 failed, 0 left out")
+        assert job.part.exists() == (result.status == "ok")
