@@ -135,7 +135,7 @@ def export(arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies.export import export as export_scene
 
     scene = only_scene(arguments.scene)
-    output = arguments.output or Path(scene.name.rpartition("/")[2] + FORMATS[arguments.to][1])
+    output = arguments.output or Path(scene.name.rpartition("/")[2] + FORMATS[arguments.to][0])
     print(*export_scene(scene, arguments.to, output), sep="\n")
     return 0
 

@@ -57,10 +57,8 @@ def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
     output = Path(output)
     if to not in FORMATS:
         raise InputError(f"no format {to!r}; allowed: {', '.join(FORMATS)}")
-    if to == "iftomm":
-        texts = {output / name: text for name, text in _benchmark(scene).items()}
-    else:
-        texts = {output: _TEXTS[to](scene)}
+    text_of = FORMATS[to][1]
+    texts = {output: text_of(scene)} if text_of else {output / name: text for name, text in _benchmark(scene).items()}
     for path, text in texts.items():
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +68,7 @@ def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
     return list(texts)
 
 
-def rebuilt_reference(scene: Scene) -> Trajectory:
+def reference_of(scene: Scene) -> Trajectory:
     """The scene's reference: the shipped one, else computed. Raises StoreError where it does not reach the end."""
     scene_key = scene_hash(scene)
     shipped = frozen_file(scene_key) is not None
@@ -121,7 +119,7 @@ def _names(quantity: Quantity, scene: Scene) -> list[str]:
 
 def _benchmark(scene: Scene) -> dict[str, str]:
     """Texts of a benchmark problem by file name: description, reference, error and acceptance as a program, models."""
-    trajectory = rebuilt_reference(scene)
+    trajectory = reference_of(scene)
     return {
         "description.md": description(scene, trajectory),
         "reference.csv": trajectory_csv(scene, trajectory),
@@ -141,17 +139,11 @@ def _results(scene: Scene, trajectory: Trajectory) -> str:
     return "\n".join([" ".join(names), *(" ".join(map(repr, row)) for row in rows)]) + "\n"
 
 
-_TEXTS: dict[str, Callable[[Scene], str]] = {
-    "mjcf": mjcf_file,
-    "exudyn": exudyn_script,
-    "csv": lambda scene: trajectory_csv(scene, rebuilt_reference(scene)),
-    "sympy": sympy_text,
-}
-# By format: what is written, and the ending of its name ("": a folder).
-FORMATS = {
-    "mjcf": ("a model that MuJoCo loads, with initial state and torques", ".xml"),
-    "exudyn": ("a Python script for Exudyn, without this package", "-exudyn.py"),
-    "csv": ("the reference trajectory, with units", ".csv"),
-    "sympy": ("the equations of motion as a SymPy program", "-equations.py"),
-    "iftomm": ("a folder for a library of benchmark problems: description, error, acceptance, results", ""),
+# By format: the ending of the file's name, "" of a folder; its text, None of a folder.
+FORMATS: dict[str, tuple[str, Callable[[Scene], str] | None]] = {
+    "mjcf": (".xml", mjcf_file),
+    "exudyn": ("-exudyn.py", exudyn_script),
+    "csv": (".csv", lambda scene: trajectory_csv(scene, reference_of(scene))),
+    "sympy": ("-equations.py", sympy_text),
+    "iftomm": ("", None),
 }
