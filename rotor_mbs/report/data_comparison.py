@@ -14,7 +14,7 @@ import numpy as np
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict
 from rotor_mbs.foreign.trajectory import load_data
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.files import INDEX, render, write_pages
+from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.pages.data_comparison import comparison_page, error_panels
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import need_xarray
@@ -120,9 +120,7 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""
-        page = render("data_comparison", comparison_page(self.study.record()))
-        write_pages(Path(folder), {INDEX: page})
-        return Path(folder) / INDEX
+        return write_page(folder, "data_comparison", comparison_page(self.study.record()))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Data, reference, errors and verdict as a results file. Raises StoreError where it cannot be written."""

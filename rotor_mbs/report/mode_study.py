@@ -14,7 +14,8 @@ from rotor_mbs.analysis.mode_records import linear_dataset, to_records
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.pages.modes import write_modes_pages
+from rotor_mbs.report.core.files import write_page
+from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.plots import modes as plots
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import need_xarray
@@ -91,7 +92,7 @@ class Modes(SceneModes):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""
-        return write_modes_pages([self], Path(folder))
+        return write_page(folder, "modes", modes_page([self]))
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""

@@ -25,7 +25,8 @@ from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.modes import write_modes_pages
+from rotor_mbs.report.core.files import write_page
+from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.modes import compute_modes
 from rotor_mbs.studies.run import solve_judged
@@ -52,7 +53,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = write_report(results, folder / "out").parent
     sweep = write_report(made_sweep(folder), folder / "sweep")
     shutil.copy(sweep, out / "sweep.html")
-    modes = write_modes_pages([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])], folder / "modes")
+    modes = write_page(folder / "modes", "modes", modes_page([compute_modes(paper("fig11"), [0.0, 2.0, 3.0])]))
     return shutil.copy(modes, out / "modes.html").parent
 
 

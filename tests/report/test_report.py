@@ -397,6 +397,7 @@ def test_file_names_stay_in_the_folder_and_differ() -> None:
     assert names["paper/fig05"] == "paper-fig05.html"
     assert all(re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*\.html", name) for name in names.values())
     assert len({name.lower() for name in names.values()} | {"index.html", "errata.html"}) == len(names) + 2
+    assert set(page_names(["data--2", "Bench-fig11"]).values()) == {"scene-data--2.html", "scene-Bench-fig11.html"}
     for bad in ("../x", "a/../b", "..", "a\\..\\b"):
         with pytest.raises(StoreError, match="file name"):
             page_names([bad])

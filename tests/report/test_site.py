@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,6 @@ from support.sweeps import made_sweep
 
 from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.core.files import Site
 from rotor_mbs.report.pages.formulas import matrices
 from rotor_mbs.report.pages.sweep import field_name
 from rotor_mbs.report.plots.sweep import distribution
@@ -52,9 +52,13 @@ def test_the_page_of_the_check_has_every_verdict_that_fails_and_is_made_where_it
     assert 'href="check.html"' in (folder / "paper-fig11.html").read_text(encoding="utf-8")
 
 
-def test_a_single_page_needs_no_navigation() -> None:
-    assert Site((("index.html", "Overview"),)).links("index.html") == []
-    assert Site((("index.html", "Overview"),)).links("paper-fig11.html") == [("index.html", "Overview", False)]
+def test_a_single_main_page_has_no_navigation_and_the_others_lead_to_it(tmp_path: Path) -> None:
+    results = store(tmp_path / "r.h5", [Made(replace(FIG11, name="mine"), "lagrange/taylor", SWING)])
+    folder = write_report(results, tmp_path / "out").parent
+    assert "<nav" not in (folder / "index.html").read_text(encoding="utf-8")
+    found = re.search(r'<nav class="site".*?</nav>', (folder / "mine.html").read_text(encoding="utf-8"))
+    assert found is not None
+    assert re.findall(r'href="([^"]*)"', found[0]) == ["index.html"]
 
 
 def test_a_sweep_has_a_page_from_its_dataset_alone(tmp_path: Path) -> None:

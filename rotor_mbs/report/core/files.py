@@ -8,9 +8,9 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from os import PathLike
 from pathlib import Path
 
 import jinja2
@@ -24,8 +24,10 @@ from rotor_mbs.store.hdf5 import replace_file
 GENERATOR = "rotor_mbs report"
 INDEX, ERRATA, WALK = "index.html", "errata.html", "figures.html"
 BENCH, MODES, COMPARISON, CHECK = "bench.html", "modes.html", "comparison.html", "check.html"
+Site = Sequence[tuple[str, str]]  # (file, label) of the main pages of a report, in order
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
+_OTHERS = ("bench-", "data--")  # beginnings of the names of other pages than those of scenes
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
@@ -39,6 +41,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", scene)[:_LONGEST].strip(".-") or "scene"
+        stem = f"scene-{stem}" if stem.lower().startswith(_OTHERS) else stem
         name, number = f"{stem}.html", 2
         while name.lower() in taken:
             name, number = f"{stem}-{number}.html", number + 1
@@ -69,25 +72,19 @@ def _is_ours(path: Path) -> bool:
         return f'<meta name="generator" content="{GENERATOR}">' in file.read(2000)
 
 
-@dataclass(frozen=True)
-class Site:
-    """The navigation that every page of a report has: (file, label) of its main pages, in order."""
-
-    pages: tuple[tuple[str, str], ...] = ()
-
-    def links(self, here: str) -> list[tuple[str, str, bool]]:
-        """(file, label, whether it is this page); none where there is nowhere else to go."""
-        found = [(file, label, file == here) for file, label in self.pages]
-        return found if any(not is_here for _, _, is_here in found) else []
-
-
-def render(template: str, page: Mapping[str, object], site: Site | None = None, here: str = "") -> str:
+def render(template: str, page: Mapping[str, object], site: Site = (), here: str = "") -> str:
     """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have.
 
-    site, here: the navigation, and the file that the page is
+    site, here: the main pages of the report, and the file that the page is; no navigation where there is no other.
     """
-    links = [] if site is None else site.links(here)
+    links = [(file, label, file == here) for file, label in site] if {file for file, _ in site} - {here} else []
     return _environment().get_template(f"{template}.html.j2").render(page=page, site=links)
+
+
+def write_page(folder: str | PathLike[str], template: str, page: Mapping[str, object]) -> Path:
+    """One page as the index of a folder; its path. Raises StoreError where it cannot be written."""
+    write_pages(Path(folder), {INDEX: render(template, page)})
+    return Path(folder) / INDEX
 
 
 @cache

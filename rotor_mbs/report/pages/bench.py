@@ -31,7 +31,7 @@ def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
     grouped, made_with = by_scene(read_records(results.path, "bench")), versions(results.attributes)
     scaling = {name: curves for name, curves in grouped.items() if name.startswith(f"{COST_SCALING}/")}
     scenes = {name: grouped[name] for name in natural_order(grouped) if name not in scaling}
-    files = dict(zip(scenes, page_names(f"bench/{name}" for name in scenes).values(), strict=True))
+    files = {name: f"bench-{file}" for name, file in page_names(scenes).items()}
     pages = {main: render("bench", _index(scenes, scaling, files, made_with), site, main)}
     pages["bench.csv"] = tables.csv_text([curve for curves in scenes.values() for curve in curves])
     for name, curves in scenes.items():

@@ -5,28 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rotor_mbs.analysis.errata import Effect, effects
-from rotor_mbs.analysis.published import Erratum
+from rotor_mbs.analysis.errata import entries as checked_entries
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
+from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.formulas import matrices
 from rotor_mbs.report.pages.scene_tables import status_text
-from rotor_mbs.store.read import StoredScene
+from rotor_mbs.store.read import OpenResults, StoredScene
 
 
-def errata_page(
-    errata: Sequence[Erratum],
-    entries: Sequence[CheckedEntry],
-    scenes: Mapping[str, StoredScene],
-    files: Mapping[str, str],
-) -> dict[str, object]:
-    """scenes: in order; files: the file name of each scene's page."""
+def errata_page(opened: OpenResults, context: Context) -> dict[str, object]:
+    """The content of the page of errata."""
+    entries = checked_entries(opened)
     agreeing = [entry for entry in entries if entry.agrees]
     return {
-        "errata": [(one, matrices(entries, one.stands_in)) for one in errata],
+        "errata": [(one, matrices(entries, one.stands_in)) for one in context.errata],
         "differing": Section(tables=[_differing_table([one for one in entries if not one.agrees], len(entries))]),
-        "effects": Section(tables=[_effects_table(scenes, files)]),
+        "effects": Section(tables=[_effects_table(opened.scenes, context.files)]),
         "agreeing": _agreeing_table(agreeing),
         "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
     }

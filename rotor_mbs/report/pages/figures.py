@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
@@ -15,6 +15,7 @@ from rotor_mbs.report.core import canvas, svg
 from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, with_unit
+from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.claims import description_of, unit_of
 from rotor_mbs.report.pages.comparison_pictures import parting
 from rotor_mbs.report.pages.error_pictures import angle_difference
@@ -26,11 +27,10 @@ from rotor_mbs.store.read import StoredRun, StoredScene
 _ROUNDING = 1e-9  # rad
 
 
-def walk_figure(
-    figure: PaperFigure, scenes: Mapping[str, StoredScene], claims: Sequence[Claim], files: Mapping[str, str]
-) -> dict[str, object]:
-    """claims: all of the paper; files: the file name of each scene's page."""
-    numbers = [claim for claim in claims if claim.published.is_number and claim.published.figure == figure.number]
+def walk_figure(figure: PaperFigure, scenes: Mapping[str, StoredScene], context: Context) -> dict[str, object]:
+    """The part of the page about one figure."""
+    claims = (claim for claim in context.claims if claim.published.is_number)
+    numbers = [claim for claim in claims if claim.published.figure == figure.number]
     pictures = paper_figures.panel_runs(figure, scenes)
     is_torques = figure.kind == TORQUES  # all in one picture per model
     panels = []
@@ -40,7 +40,7 @@ def walk_figure(
         panels.append({
             "letter": letter,
             "scene": name,
-            "href": files[name],
+            "href": context.files[name],
             "conditions": _conditions(scenes[name], with_torque=not is_torques),
             "pictures": [_picture(figure, letter, key, runs, f"{same} {different}") for key, runs in row.items()],
             "same": same,

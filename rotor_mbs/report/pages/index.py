@@ -1,50 +1,193 @@
-"""The index: the finding, the paper's numbers and claims, one table over all scenes."""
+"""The index: the rotor, the published crest, energy and errors of all methods; then numbers, claims and all scenes."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claim_records import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.finding import finding
+from rotor_mbs.analysis.finding import ENERGY_RISE, Finding, finding
 from rotor_mbs.analysis.published import Erratum
-from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
+from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
-from rotor_mbs.report.pages import claim_study, glance
+from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages import Context, claim_study
 from rotor_mbs.report.pages import claims as claim_tables
-from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell
-from rotor_mbs.store.read import OpenResults, StoredScene
+from rotor_mbs.report.pages.comparison_pictures import key_picture
+from rotor_mbs.report.pages.cost import cost_legend, cost_picture
+from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
+from rotor_mbs.report.pages.viewer import viewer
+from rotor_mbs.report.plots import comparisons, paths
+from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.store.records import Record
 
+Scenes = Mapping[str, StoredScene]
 # Attributes of a results file that say what made it.
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
+# Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
+_SHADES = (-12, -10, -8, -6, -4, -2, 0)
+_MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
+_FAILED = "✗"
+_NAMED = 4  # methods at most in the sentence on agreement; of more, the best and the worst
 
 
-def index_page(
-    results: OpenResults, scenes: Mapping[str, StoredScene], files: Mapping[str, str], claims: Sequence[Claim],
-    conditions: Mapping[str, str], errata: Sequence[Erratum], *, study: ClaimStudy | None = None,
-    curves: Mapping[str, Sequence[Record]] | None = None,
-) -> dict[str, object]:  # fmt: skip
-    """scenes: in order; files: the file name of each scene's page; errata: empty where there is no such page.
+@dataclass(frozen=True)
+class HeatCell:
+    """A run in the heat map: the shade's number, the error as text, the mark of its status, a text that is read out."""
 
-    study: the claims on many runs, and the numbers under other conditions; None where there is none
-    curves: error against run time, by scene
-    """
+    shade: int
+    error: str
+    mark: str
+    spoken: str
+
+
+def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
+    """The content of the index. Tables are folded, below what it opens with."""
+    scenes, claims, study = opened.scenes, context.claims, context.study
     shares = None if study is None else study.shares
     trials = [] if study is None else claim_study.trial_tables(study.numbers)[:1]
     notes = [] if shares is None else [claim_study.headline(shares), claim_study.study_note(shares)]
-    general = [text for key, text in conditions.items() if not key.startswith("fig")]
+    general = [text for key, text in context.conditions.items() if not key.startswith("fig")]
     general += [] if study is None else [claim_study.numbers_headline(study.numbers)]
     return {
-        "glance": glance.glance(scenes, files, claims, curves or {}, finding(scenes, claims)),
-        "scenes": Section(tables=[scene_table(scenes, files)]),
+        "glance": _glance(scenes, context),
+        "scenes": Section(tables=[_scene_table(scenes, context.files)]),
         "numbers": Section(tables=[claim_tables.number_table(claims), *trials], notes=general),
         "claims": Section(tables=[claim_tables.claim_table(claims, shares)], notes=notes),
-        "errata": Section(tables=[_errata_table(errata)]),
-        "versions": versions(results.attributes),
+        "errata": Section(tables=[_errata_table(context.errata)]),
+        "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
+
+
+def _glance(scenes: Scenes, context: Context) -> dict[str, object]:
+    """What the index opens with; what the file has no data for is None."""
+    name = _shown_scene(scenes, context.claims)
+    sides = _sides(scenes[name])
+    benched = next((one for one in context.curves if one in scenes), "")
+    tips = next((run for run in reversed(sides) if "tip" in run), None)
+    own = [claim for claim in context.claims if name in claim.published.scenes]
+    described = f"{name}: paths of the tips"
+    return {
+        "sentences": short_sentences(finding(scenes, context.claims)),
+        "scene": name,
+        "viewer": viewer(scenes[name], {label_of(run.method): run for run in sides}),
+        "still": None if tips is None else picture(paths.paths(tips.array("tip")), "still", name, described),
+        "crest": key_picture(sides, own, horizon(scenes[name]), "crest"),
+        "energy": _energy(scenes),
+        "cost": _cost(benched, context.curves.get(benched, ())),
+        "heat": heat_map(scenes, context.files),
+    }
+
+
+def _shown_scene(scenes: Scenes, claims: Sequence[Claim]) -> str:
+    """The scene with a published extreme that is no rounding error; else one with both models; else the first."""
+    for claim in claims:
+        item = claim.published
+        if item.is_number and not item.rounding and item.of is not None and item.of.scene in scenes:
+            return item.of.scene
+    return next((name for name, scene in scenes.items() if len(_sides(scene)) > 1), next(iter(scenes)))
+
+
+def _sides(scene: StoredScene) -> list[StoredRun]:
+    """The printed run and the one that stands for the corrected model."""
+    found = (run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene))
+    return [run for run in found if run is not None]
+
+
+def short_sentences(facts: Finding) -> list[str]:
+    """Three at most: what the paper's numbers come from, what is wrong with that, and how well it is known."""
+    found = []
+    numbers, corrected = facts.numbers, facts.numbers_corrected
+    if numbers is not None:
+        share = f"all {numbers.of}" if numbers.count == numbers.of else f"{numbers.count} of {numbers.of}"
+        other = "" if corrected is None else f"; with their three errors corrected, {corrected.count or 'none'}"
+        found.append(f"The paper's equations as printed give {share} published numbers{other}.")
+    if facts.energy is not None and facts.energy.rises.count:
+        most = f", up to {prefixed(facts.energy.gain, 'J')}" if facts.energy.scene else ""
+        broken = [
+            f"; in {name} {prefixed(gain, 'J')} before its run breaks off"
+            for name, gain in facts.energy.ended_early.items()
+        ]
+        most += "".join(broken)
+        rises = facts.energy.rises
+        found.append(f"As printed they make energy from nothing in {rises.count} of {rises.of} scenes{most}.")
+    known = {one.method: one.angle_error for one in facts.agreement if one.angle_error is not None}
+    if known:
+        count = len({method.partition("/")[0] for method in known})
+        models = "The corrected model agrees" if count == 1 else f"{count} independent corrected models agree"
+        ranked = sorted(known.items(), key=lambda item: item[1])
+        shown = ranked if len(ranked) <= _NAMED else [ranked[0], ranked[-1]]
+        each = ", ".join(f"{with_unit(error, 'rad')} ({label_of(method)})" for method, error in shown)
+        found.append(f"{models} with a quad-precision reference to {each}, up to each scene's horizon.")
+    return found
+
+
+def _energy(scenes: Scenes) -> Picture | None:
+    """A mark per scene for the printed model's gain, and for the worst corrected model's drift."""
+    rows: dict[str, list[tuple[float, Look]]] = {}
+    drawn: dict[str, Look] = {}
+    made = 0
+    for name, scene in scenes.items():
+        marks = []
+        for run in scene.methods.values():
+            gain, scale = metric(run, "energy_gain_J"), metric(run, "energy_scale_J")
+            is_printed = run.method == run_selection.PRINTED
+            if gain is None or not scale or not (is_printed or run.method in run_selection.corrected_runs(scene)):
+                continue
+            value = gain / scale if is_printed else metric(run, "energy_drift_max")
+            if value is not None and math.isfinite(value):
+                marks.append((value, look_of(run.method)))
+                drawn[run.method] = look_of(run.method)
+                made += is_printed and value > ENERGY_RISE
+        if marks:
+            rows[name.removeprefix("paper/")] = marks
+    if run_selection.PRINTED not in drawn:
+        return None
+    caption = f"Energy made from nothing: the printed equations, more than a thousandth in {made} of {len(rows)} scenes"
+    legend = [LegendEntry(label_of(name), Look(look.colour, "", look.marker)) for name, look in drawn.items()]
+    return picture(comparisons.energy_of_scenes(rows), "energy-scenes", caption, f"{caption}.", legend=legend)
+
+
+def _cost(scene: str, curves: Sequence[Record]) -> Picture | None:
+    if not curves:
+        return None
+    shown = cost_picture(curves, f"Error against run time of all methods, {scene}")
+    return None if shown is None else Picture(shown.svg, shown.caption, shown.notes, cost_legend(curves))
+
+
+def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:
+    """Scene by method, the largest angle error before the horizon; None where no run was compared with a reference.
+
+    methods: (label, name); rows: (scene, page, cells); key: the marks that occur, with their meaning
+    """
+    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
+    methods = run_selection.in_catalogue_order(names)
+    if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):
+        methods.insert(0, run_selection.PRINTED)
+    rows = [
+        (name, files[name], [_heat_cell(scene.methods.get(method)) for method in methods])
+        for name, scene in scenes.items()
+    ]
+    if not any(cell and cell.error for _, _, cells in rows for cell in cells):
+        return None
+    used = {cell.mark: cell.spoken.rpartition(", ")[2] for _, _, cells in rows for cell in cells if cell and cell.mark}
+    return {"methods": [(label_of(name), name) for name in methods], "rows": rows, "key": sorted(used.items())}
+
+
+def _heat_cell(run: StoredRun | None) -> HeatCell | None:
+    if run is None:
+        return None
+    error = metric(run, "angle_error_max")
+    mark = _MARKS.get(run.status, _FAILED)
+    text = "" if error is None else number(error)
+    spoken = f"{label_of(run.method)}: {text or 'no error known'}, {status_text(run.status)}"
+    if error is None or not math.isfinite(error):
+        return HeatCell(len(_SHADES), text, mark, spoken)
+    return HeatCell(sum(error > 10.0**e for e in _SHADES), text, mark, spoken)
 
 
 def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
@@ -52,7 +195,7 @@ def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
     return [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
 
 
-def scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
+def _scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
     """A row per scene: its horizon, and what the printed model does."""
     head = ("Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain")
     rows: list[Row] = []

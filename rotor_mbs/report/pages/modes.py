@@ -4,33 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence
 from rotor_mbs.analysis.modes import multiblade
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.files import INDEX, Site, render, write_pages
 from rotor_mbs.report.core.looks import with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import modes as plots
 
 
-def write_modes_pages(modes: Sequence[SceneModes], output: Path) -> Path:
-    """The page of modes that are in memory; its path. Raises StoreError where it cannot be written."""
-    write_pages(output, {INDEX: modes_page(modes)})
-    return output / INDEX
+def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
+    """What the template has of the modes of some scenes."""
+    return {"scenes": [_scene_part(one, f"scene{i}") for i, one in enumerate(modes)]}
 
 
-def modes_page(modes: Sequence[SceneModes], site: Site | None = None, here: str = INDEX) -> str:
-    """The page of the modes of some scenes."""
-    parts = [scene_part(one, f"scene{i}") for i, one in enumerate(modes)]
-    return render("modes", {"scenes": parts}, site, here)
-
-
-def scene_part(modes: SceneModes, name: str) -> dict[str, object]:
+def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
     """What the page has of a scene; `name` is unique on the page."""
     rest = next(iter(modes.rest.values()), None)
     rotation = next(iter(modes.rotation.values()), None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_e
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import claim_study, comparison_pictures, error_pictures, scene_tables
+from rotor_mbs.report.pages import Context, claim_study, comparison_pictures, error_pictures, scene_tables
 from rotor_mbs.report.pages import claims as claim_tables
 from rotor_mbs.report.pages.cost import cost_section
 from rotor_mbs.report.pages.drive import drive_section
@@ -29,7 +29,6 @@ from rotor_mbs.report.plots.comparisons import VISIBLE
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
-from rotor_mbs.store.records import Record
 
 Array = NDArray[np.float64]
 
@@ -72,21 +71,12 @@ class DrawnRuns:
         return {heading: run for heading, run in self.sides.items() if all(name in run for name in names)}
 
 
-def scene_page(
-    scene: StoredScene, claims: Sequence[Claim], conditions: Mapping[str, str], *,
-    previous: str, following: str, study: ClaimStudy | None = None,
-    curves: Sequence[Record] = (),
-) -> dict[str, object]:  # fmt: skip
-    """The content of the page of a scene.
-
-    claims               those of the paper about this scene
-    conditions           what the paper does not print, by key
-    previous, following  file names of the neighbouring pages, or ""
-    study                the claims on many runs; None where there is none
-    curves               error against run time on this scene
-    """
-    drawn = DrawnRuns.of(scene)
-    own = conditions.get(scene.name.rpartition("/")[2])
+def scene_page(scene: StoredScene, context: Context) -> dict[str, object]:
+    """The content of the page of a scene."""
+    drawn, pages = DrawnRuns.of(scene), ["", *context.files.values(), ""]
+    place = pages.index(context.files[scene.name])
+    claims = [claim for claim in context.claims if scene.name in claim.published.scenes]
+    own = context.conditions.get(scene.name.rpartition("/")[2])
     figures = str(scene.attributes.get("figures", ""))
     sides = {label_of(run.method): run for run in drawn.sides.values()}
     key = comparison_pictures.key_picture(list(drawn.sides.values()), claims, drawn.horizon)
@@ -98,7 +88,7 @@ def scene_page(
         "source": opening_comment(scene),
         "lead": _lead(drawn),
         "failures": scene_tables.failures(scene),
-        "claims": _claims_section(claims, study, [own] if own else []),
+        "claims": _claims_section(claims, context.study, [own] if own else []),
         "viewer": viewer(scene, sides),
         "key": Section([key] if key is not None else []),
         "paths": comparison_pictures.tips_section(scene, drawn.sides_with("tip"), drawn.horizon),
@@ -106,12 +96,12 @@ def scene_page(
         "difference": difference_section(drawn),
         "energy": energy_section(drawn),
         "drive": drive_section(scene, drawn.corrected),
-        "cost": cost_section(scene, curves),
+        "cost": cost_section(scene, context.curves.get(scene.name, ())),
         "quantities": quantity_sections(scene, drawn.all, drawn.horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
         "has_horizon": drawn.horizon is not None,
-        "previous": previous,
-        "next": following,
+        "previous": pages[place - 1],
+        "next": pages[place + 1],
     }
 
 
