@@ -84,13 +84,11 @@ def test_a_quantity_is_its_declaration_and_its_producers() -> None:
 
 def test_a_scene_key_is_the_scene_and_the_physics_it_changes() -> None:
     outside = {name for name in naming(r"\bshaft_damping\b") if not name.startswith(("scenario/", "models/"))}
-    # The selection rule, the balance of momentum, where an exact solution ends, an exported benchmark in words, and a
-    # picture of what the damper takes.
+    # The selection rule, the balance of momentum, where an exact solution ends, and a picture of what the damper takes.
     assert outside <= {
         "methods/selection.py",
         "solution/impulse.py",
         "analysis/exact.py",
-        "studies/benchmark_text.py",
         "report/pages/drive.py",
     }
 

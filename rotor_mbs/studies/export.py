@@ -1,4 +1,7 @@
-"""A scene for other programs: for MuJoCo, Exudyn and SymPy, its reference trajectory, a benchmark problem."""
+"""A scene for other programs: for MuJoCo, Exudyn and SymPy, its reference trajectory, a benchmark problem.
+
+What a benchmark problem has to state: https://www.iftomm-multibody.org/benchmark/submit/
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,9 @@ import io
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+import jinja2
+import numpy as np
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
@@ -17,12 +23,13 @@ from rotor_mbs.models.mujoco.export import mjcf_file
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import scene_toml
 from rotor_mbs.solution import quantities
+from rotor_mbs.solution.metrics import HORIZON_GROWTH, horizon
 from rotor_mbs.solution.quantities import Array, Quantity
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.studies.benchmark_text import description, evaluation_program
 from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
 
 _AXES = "xyz"
+_ACCEPTED = 1e-6  # rad per unit of error amplification: the largest error that a benchmark problem accepts
 
 
 def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
@@ -121,15 +128,36 @@ def _benchmark(scene: Scene) -> dict[str, str]:
     """Texts of a benchmark problem by file name: description, reference, error and acceptance as a program, models."""
     trajectory = reference_of(scene)
     return {
-        "description.md": description(scene, trajectory),
+        "description.md": _rendered("description.md.j2", scene, trajectory),
         "reference.csv": trajectory_csv(scene, trajectory),
         "results.txt": _results(scene, trajectory),
-        "evaluate.py": evaluation_program(scene),
+        "evaluate.py": _rendered("evaluate.py.j2", scene, trajectory),
         "scene.toml": scene_toml(scene),
         "model.xml": mjcf_file(scene),
         "model_exudyn.py": exudyn_script(scene),
         "equations.py": sympy_text(scene),
     }
+
+
+def _rendered(template: str, scene: Scene, reference: Trajectory) -> str:
+    """The text by templates/`template`; numbers have all their digits, but for those that follow from the reference."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    environment.filters["exact"] = lambda values: ", ".join(repr(float(value)) for value in np.ravel(values))
+    environment.filters["short"] = "{:g}".format
+    names = ["torque on the rotor about +y, N m"]
+    for number in range(1, 1 + len(scene.blades)):
+        names += [f"torque on pitch {number}, N m", f"pitch {number} at which its spring is unloaded, rad"]
+    return environment.get_template(template).render(
+        scene=scene,
+        loads=[(name, table) for name, table in zip(names, scene.load_tables, strict=True) if table],
+        reference=reference,
+        horizon=horizon(reference),
+        growth=HORIZON_GROWTH,
+        accepted=_ACCEPTED,
+    )
 
 
 def _results(scene: Scene, trajectory: Trajectory) -> str:
