@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import look_up
+from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look
-from rotor_mbs.store.read import StoredRun, StoredScene
+from rotor_mbs.report.plots import paths
+from rotor_mbs.report.plots import time_histories as histories
+from rotor_mbs.store.hdf5 import replace_file
+from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
 # The models that are compared, by key, in order from left to right.
@@ -96,10 +102,6 @@ def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[t
 
 def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
     """A picture on `axes`: one for paths, else two, position above velocity."""
-    from rotor_mbs.report.core.canvas import TIME_AXIS  # late: matplotlib
-    from rotor_mbs.report.plots import paths
-    from rotor_mbs.report.plots import time_histories as histories
-
     if figure.kind == PATHS:
         paths.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
         return
@@ -118,7 +120,7 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
     axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)
     axes[1].set_title("(b) angular velocity", loc="left")
-    axes[1].set_xlabel(TIME_AXIS)
+    axes[1].set_xlabel(canvas.TIME_AXIS)
 
 
 def torque_look(place: int) -> Look:
@@ -135,3 +137,54 @@ def legend(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple
     if figure.kind == MOTION:
         return [(label, coordinate_look(i)) for i, label in enumerate(labels)]
     return [(f"blade {i}", replace(coordinate_look(i), line="-")) for i in range(1, len(labels))]
+
+
+def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
+    """`folder`/figNN.`kind` for each figure of `numbers`, or for all that the file has where `numbers` is empty.
+
+    `kind` is "pdf", "svg" or "png". Returns the files written. Raises InputError for a figure that the file does not
+    have, StoreError where the file cannot be read or the folder cannot be written.
+    """
+    with open_results(results) as opened:
+        have = {one.number: one for one in available(opened.scenes)}
+        asked = list(dict.fromkeys(numbers)) or list(have)
+        unknown = [number for number in asked if number not in have]
+        if unknown or not have:
+            allowed = ", ".join(have) or "none: it has no scene of the paper"
+            raise InputError(f"{results}: figure {', '.join(unknown) or 'of the paper'}: not in it; allowed: {allowed}")
+        made = {f"fig{int(n):02d}.{kind}": canvas.encoded(composed(have[n], opened.scenes).figure, kind) for n in asked}
+    for name, content in made.items():
+        replace_file(folder / name, content)
+    return [folder / name for name in made]
+
+
+def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
+    """The whole figure, a column per model: position above velocity, or a row per panel where paths are shown."""
+    pictures = panel_runs(figure, scenes)
+    letters = list(dict.fromkeys(letter for letter, _, _ in pictures))
+    keys = [key for key in HEADINGS if key in {key for _, key, _ in pictures}]
+    is_paths = figure.kind == PATHS
+    with canvas.style(for_print=True):
+        rows, height, heading = (len(letters), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
+        panels = canvas.print_grid(rows, len(keys), height)
+        table = [panels.axes[i : i + len(keys)] for i in range(0, len(panels.axes), len(keys))]
+        for letter, key, runs in pictures:
+            column = [row[keys.index(key)] for row in table]
+            draw(figure, [column[letters.index(letter)]] if is_paths else column, runs)
+        for axes, key in zip(table[0], keys, strict=True):
+            axes.text(0.5, heading, HEADINGS[key], transform=axes.transAxes, ha="center", weight="bold")
+        _tidy(table, letters if is_paths else [])
+    canvas.legend_below(panels.figure, legend(figure, scenes))
+    return panels
+
+
+def _tidy(table: list[list[Any]], letters: list[str]) -> None:
+    """Letters at the rows of paths; labels of the vertical axes at the first column alone; no empty frames."""
+    for row in table:
+        for axes in row:
+            if not axes.has_data():
+                axes.set_axis_off()
+            if axes is not row[0]:
+                axes.set_ylabel("")
+    for row, letter in zip(table, letters, strict=False):
+        row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)

@@ -15,8 +15,7 @@ from support.sweeps import made_sweep
 from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core.elements import Section
-from rotor_mbs.report.pages.sweep import save_picture, sweep_page
-from rotor_mbs.report.plots.sweep import map_panels, response, spread_panels
+from rotor_mbs.report.pages.sweep import map_panels, response, save_picture, spread_panels, sweep_page
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.store.sweep_dataset import StoredSweep
 

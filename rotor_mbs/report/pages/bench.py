@@ -15,8 +15,7 @@ from rotor_mbs.report.core.elements import Section
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import bench_tables as tables
-from rotor_mbs.report.pages.cost import cheapest, cost_legend
+from rotor_mbs.report.pages import cost
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.scenario.catalogue import natural_order
@@ -33,11 +32,11 @@ def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
     scenes = {name: grouped[name] for name in natural_order(grouped) if name not in scaling}
     files = {name: f"bench-{file}" for name, file in page_names(scenes).items()}
     pages = {main: render("bench", _index(scenes, scaling, files, made_with), site, main)}
-    pages["bench.csv"] = tables.csv_text([curve for curves in scenes.values() for curve in curves])
+    pages["bench.csv"] = cost.csv_text([curve for curves in scenes.values() for curve in curves])
     for name, curves in scenes.items():
         csv = files[name].removesuffix(".html") + ".csv"
         pages[files[name]] = render("bench_scene", _scene(name, results.scenes.get(name), curves, csv), site)
-        pages[csv] = tables.csv_text(curves)
+        pages[csv] = cost.csv_text(curves)
     return pages
 
 
@@ -53,13 +52,13 @@ def _scene(name: str, stored: StoredScene | None, curves: Curves, csv: str) -> d
     ]
     return {
         "scene": name,
-        "summary": [cheapest(curves), *omissions(curves), *refusals(stored)],
+        "summary": [cost.cheapest(curves), *omissions(curves), *refusals(stored)],
         "facts": curves[0].attributes,
-        "diagram": Section(pictures, cost_legend(curves)),
-        "reach": Section(tables=[tables.reach_table(curves)]),
-        "order": Section(tables=[tables.order_table(curves)]),
-        "failures": Section(tables=[tables.failure_table(curves)]),
-        "points": Section(tables=[tables.point_table(curves)]),
+        "diagram": Section(pictures, cost.cost_legend(curves)),
+        "reach": Section(tables=[cost.reach_table(curves)]),
+        "order": Section(tables=[cost.order_table(curves)]),
+        "failures": Section(tables=[cost.failure_table(curves)]),
+        "points": Section(tables=[cost.point_table(curves)]),
         "csv": csv,
     }
 
@@ -77,11 +76,10 @@ def _index(
     one_of_each = {curve.name: curve for curves in scenes.values() for curve in curves}
     return {
         "summary": omissions([curve for curves in scenes.values() for curve in curves]),
-        "fastest": Section(tables=[tables.overview_table(scenes, files)]),
-        "scenes": Section(pictures, cost_legend(list(one_of_each.values()))),
+        "fastest": Section(tables=[cost.overview_table(scenes, files)]),
+        "scenes": Section(pictures, cost.cost_legend(list(one_of_each.values()))),
         "scaling": [
-            (name.rpartition("/")[2], Section(tables=[tables.scaling_table(curves)]))
-            for name, curves in scaling.items()
+            (name.rpartition("/")[2], Section(tables=[cost.scaling_table(curves)])) for name, curves in scaling.items()
         ],
         "csv": "bench.csv",
         "versions": made_with,

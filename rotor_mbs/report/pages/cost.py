@@ -1,18 +1,52 @@
-"""Error against run time as a section of a page: the diagram, its legend, and the cheapest method for an accuracy."""
+"""Error against run time on a page: diagram and legend, the cheapest method, tables, CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 
-from rotor_mbs.analysis.work_precision import TARGETS_RAD, fastest, own_points, succeeded
-from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry, mark_entry
+import numpy as np
+
+from rotor_mbs.analysis.work_precision import (
+    TARGETS_RAD,
+    Reach,
+    cost_exponent,
+    fastest,
+    left_out,
+    own_points,
+    reaches,
+    succeeded,
+)
+from rotor_mbs.report.core.elements import (
+    LegendEntry,
+    PageTable,
+    Picture,
+    Row,
+    Section,
+    TableCell,
+    line_entry,
+    mark_entry,
+)
 from rotor_mbs.report.core.looks import label_of, look_of
-from rotor_mbs.report.core.numbers import prefixed
+from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.bench_tables import target_text
+from rotor_mbs.report.pages.scene_tables import method_cell, status_text
 from rotor_mbs.report.plots.work_precision import FRONT_COLOUR, diagram, has_visible_uncertainty
 from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
+
+_POINT_COLUMNS = (
+    "method", "setting", "angle error (rad)", "at the end (rad)", "tip error (m)", "energy drift", "median",
+    "quartiles", "shortest", "set-up", "again", "read-out", "repeats", "steps", "status",
+)  # fmt: skip
+_CSV_COLUMNS = (
+    "setting", "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "run_time_s",
+    "run_time_min_s", "run_time_q1_s", "run_time_q3_s", "setup_time_s", "setup_again_time_s", "output_time_s",
+    "repeats", "steps", "false_success",
+)  # fmt: skip
 
 
 def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
@@ -55,5 +89,156 @@ def cheapest(curves: Sequence[Record]) -> str:
         if found:
             curve, reach = found[0]
             best = f"{label_of(curve.name)} ({curve.name}), {prefixed(reach.seconds, 's', 2)}"
-        parts.append(f"within {target_text(target)}: {best}")
+        parts.append(f"within {_target_text(target)}: {best}")
     return f"Cheapest method {'; '.join(parts)}."
+
+
+def _target_text(target: float) -> str:
+    """ "10⁻⁶ rad": the targets are powers of ten."""
+    return f"{power(round(math.log10(target)))} rad"
+
+
+def csv_text(curves: Sequence[Record]) -> str:
+    """Every point, unrounded, with a heading line; units are those of the results file (s, rad, m)."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["scene", "method", "setting_kind", *_CSV_COLUMNS, "status", "message"])
+    for curve in curves:
+        for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True)):
+            values = [curve.arrays[column][i].item() for column in _CSV_COLUMNS]
+            writer.writerow([curve.scene, curve.name, curve.attributes["setting_kind"], *values, status, message])
+    return stream.getvalue()
+
+
+def reach_table(curves: Sequence[Record]) -> PageTable:
+    """A row per curve: time and ratio for each target."""
+    found = reaches(curves)
+    head = ["method", *map(_target_text, TARGETS_RAD)]
+    rows: list[Row] = [
+        [method_cell(curve.name), *(_reach_cell(curve, found[curve.name][target]) for target in TARGETS_RAD)]
+        for curve in curves
+    ]
+    caption = (
+        "Run time to an angle error, interpolated linearly in the logarithms between the points of a method's own "
+        "front, and its ratio to the fastest method's. A dash: no setting of the ladder was as accurate. Not measured: "
+        "the budget left out finer settings, which might have been."
+    )
+    return PageTable(caption, head, rows, numeric=range(1, len(head)))
+
+
+def _reach_cell(curve: Record, reach: Reach | None) -> TableCell:
+    """Time and ratio, or whether the method cannot, or was not asked to."""
+    if reach is not None:
+        return TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
+    count = left_out(curve)
+    if count:
+        return TableCell("not measured", note=f"{count} finer {'setting' if count == 1 else 'settings'} left out")
+    errors = curve.arrays["angle_error_max"][succeeded(curve)]
+    best = f"{with_unit(float(errors.min()), 'rad')} at best" if len(errors) else "no run is ok"
+    return TableCell(NOTHING, note=best)
+
+
+def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, str]) -> PageTable:
+    """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
+    head = ["scene", *map(_target_text, TARGETS_RAD)]
+    rows: list[Row] = [
+        [TableCell(scene, href=files[scene]), *(_fastest_cell(curves, target) for target in TARGETS_RAD)]
+        for scene, curves in scenes.items()
+    ]
+    return PageTable(
+        "Run time of the fastest method to an angle error, and how many times as long the next one takes.", head, rows
+    )
+
+
+def _fastest_cell(curves: Sequence[Record], target: float) -> TableCell:
+    found, is_cut = fastest(curves, target), any(map(left_out, curves))
+    if not found:
+        return TableCell("not measured" if is_cut else NOTHING)
+    (first, reach), *others = found
+    if others:
+        next_one = f"then {label_of(others[0][0].name)}, {number(others[0][1].ratio)} times as long"
+    else:
+        next_one = "no other was measured to there" if is_cut else "no other gets there"
+    return TableCell(f"{label_of(first.name)} ({first.name}): {prefixed(reach.seconds, 's', 2)}", note=next_one)
+
+
+def order_table(curves: Sequence[Record]) -> PageTable:
+    """A row per fixed-step curve."""
+    rows = [
+        [method_cell(curve.name), number(facts.get("order"), 3), f"{facts['order_expected']:g}"]
+        for curve in curves
+        if "order_expected" in (facts := curve.attributes)
+    ]
+    return PageTable(
+        "Fitted on the finest points above the round-off floor.", ["method", "order", "expected"], rows, numeric=(1, 2)
+    )
+
+
+def point_table(curves: Sequence[Record]) -> PageTable:
+    """A row per point that was run."""
+    rows = list(chain.from_iterable(map(_point_rows, curves)))
+    return PageTable("Every setting measured.", _POINT_COLUMNS, rows, numeric=range(1, 14)).without_empty_columns()
+
+
+def _point_rows(curve: Record) -> Iterator[Row]:
+    a = curve.arrays
+    for i, status in enumerate(curve.statuses):
+        if status == "left_out":
+            continue
+        low, high, shortest = (prefixed(_known(a[f"run_time_{q}_s"][i]), "s", 3) for q in ("q1", "q3", "min"))
+        spread = (f"{low} to {high}", shortest) if a["repeats"][i] > 1 else ("", "")
+        errors = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
+        seconds = ("setup_time_s", "setup_again_time_s", "output_time_s")
+        yield [
+            method_cell(curve.name),
+            _setting(curve, i),
+            *(number(_known(a[error][i])) for error in errors),
+            prefixed(_known(a["run_time_s"][i]), "s", 3),
+            *spread,
+            *(prefixed(_known(a[second][i]), "s", 3) for second in seconds),
+            str(a["repeats"][i]),
+            str(a["steps"][i]),
+            TableCell(status_text(status), tone="" if status == "ok" else "bad"),
+        ]
+
+
+def failure_table(curves: Sequence[Record]) -> PageTable:
+    """Every point that is not on a curve, with the reason; one row for all that the budget left out of a curve."""
+    rows = []
+    for curve in curves:
+        cut = [i for i, status in enumerate(curve.statuses) if status == "left_out"]
+        for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True)):
+            if status == "ok" or i in cut[1:]:
+                continue
+            setting = _setting(curve, i) + (f" and {len(cut) - 1} finer" if [i] == cut[:1] != cut else "")
+            seconds = prefixed(_known(curve.arrays["run_time_s"][i]), "s", 3)
+            claimed = "yes" if curve.arrays["false_success"][i] else ""
+            rows.append([method_cell(curve.name), setting, seconds, status_text(status), claimed, message])
+    head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
+    caption = "Runs that failed, found from their state, and settings that the budget left out."
+    return PageTable(caption, head, rows, numeric=(1, 2)).without_empty_columns()
+
+
+def scaling_table(curves: Sequence[Record]) -> PageTable:
+    """A row per method over the sizes of a study (blades, or s of duration): run time per simulated second."""
+    sizes = sorted({float(size) for curve in curves for size in curve.arrays["setting"]})
+    kind = str(curves[0].attributes["setting_kind"])
+    head = ["method", *(f"{size:g} {'s' if kind == 'duration' else kind}" for size in sizes), "exponent"]
+    rows = []
+    for curve in curves:
+        ok = np.array([status == "ok" for status in curve.statuses])
+        rate = curve.arrays["run_time_s"] / np.array(curve.arrays["simulated_s"])
+        at = dict(zip(curve.arrays["setting"][ok].tolist(), rate[ok].tolist(), strict=True))
+        exponent = cost_exponent(curve.arrays["setting"][ok], rate[ok])
+        rows.append([method_cell(curve.name), *(prefixed(at.get(size), "s", 3) for size in sizes), number(exponent)])
+    caption = "Run time of one simulated second, and the exponent fitted on the larger half of the sizes."
+    return PageTable(caption, head, rows, numeric=range(1, len(head)))
+
+
+def _setting(curve: Record, i: int) -> str:
+    value = float(curve.arrays["setting"][i])
+    return prefixed(value, "s", 3) if curve.attributes["setting_kind"] == "step" else number(value, 2)
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -16,7 +16,7 @@ from rotor_mbs.report.core.elements import LegendEntry, Picture
 from rotor_mbs.report.core.looks import label_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, with_unit
 from rotor_mbs.report.pages import Context
-from rotor_mbs.report.pages.claims import description_of, unit_of
+from rotor_mbs.report.pages.claim_tables import description_of, unit_of
 from rotor_mbs.report.pages.comparison_pictures import parting
 from rotor_mbs.report.pages.error_pictures import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric

@@ -14,8 +14,7 @@ from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row,
 from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context, claim_study
-from rotor_mbs.report.pages import claims as claim_tables
+from rotor_mbs.report.pages import Context, claim_tables
 from rotor_mbs.report.pages.comparison_pictures import key_picture
 from rotor_mbs.report.pages.cost import cost_legend, cost_picture
 from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
@@ -48,10 +47,10 @@ def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
     """The content of the index. Tables are folded, below what it opens with."""
     scenes, claims, study = opened.scenes, context.claims, context.study
     shares = None if study is None else study.shares
-    trials = [] if study is None else claim_study.trial_tables(study.numbers)[:1]
-    notes = [] if shares is None else [claim_study.headline(shares), claim_study.study_note(shares)]
+    trials = [] if study is None else claim_tables.trial_tables(study.numbers)[:1]
+    notes = [] if shares is None else [claim_tables.headline(shares), claim_tables.study_note(shares)]
     general = [text for key, text in context.conditions.items() if not key.startswith("fig")]
-    general += [] if study is None else [claim_study.numbers_headline(study.numbers)]
+    general += [] if study is None else [claim_tables.numbers_headline(study.numbers)]
     return {
         "glance": _glance(scenes, context),
         "scenes": Section(tables=[_scene_table(scenes, context.files)]),

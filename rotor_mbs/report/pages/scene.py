@@ -16,8 +16,7 @@ from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_e
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context, claim_study, comparison_pictures, error_pictures, scene_tables
-from rotor_mbs.report.pages import claims as claim_tables
+from rotor_mbs.report.pages import Context, claim_tables, comparison_pictures, error_pictures, scene_tables
 from rotor_mbs.report.pages.cost import cost_section
 from rotor_mbs.report.pages.drive import drive_section
 from rotor_mbs.report.pages.quantities import quantity_sections
@@ -109,10 +108,10 @@ def _claims_section(claims: Sequence[Claim], study: ClaimStudy | None, notes: li
     """The numbers and claims about a scene; where a number is rounding error, what it is under other conditions."""
     tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims, study.shares if study else None)]
     if study is not None and tables[1].rows:
-        notes = [*notes, claim_study.study_note(study.shares)]
+        notes = [*notes, claim_tables.study_note(study.shares)]
     if study is not None and any(claim.published.rounding for claim in claims):
-        tables += claim_study.trial_tables(study.numbers)
-        notes = [*notes, claim_study.trial_note(study.numbers)]
+        tables += claim_tables.trial_tables(study.numbers)
+        notes = [*notes, claim_tables.trial_note(study.numbers)]
     return Section(tables=[table for table in tables if table.rows], notes=notes)
 
 

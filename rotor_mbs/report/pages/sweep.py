@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.sweep_numbers import GROWN, spread_of, stability_map
+from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap, spread_of, stability_map
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.core.canvas import Panels, legend_inside
+from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, curve, growth_map, legend_inside, log_axis, panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
-from rotor_mbs.report.core.looks import with_capital
+from rotor_mbs.report.core.looks import BLUE, VERMILLION, Look, with_capital
 from rotor_mbs.report.core.numbers import SPACE, apart
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.index import versions
 from rotor_mbs.report.pages.scene_tables import status_text
-from rotor_mbs.report.plots import sweep as plots
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.sweep_columns import parameter_name
@@ -29,6 +28,10 @@ Array = NDArray[Any]
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
 _RESPONSE, _MOST_RESPONSES = "pitch_max", 3
+_MOST_POINTS = 200  # of a distribution
+_MOST_RUNS = 1000  # that have a point
+_MOST_GROWTH = 1e4  # the colours end there: the pitch has turned many times
+MEDIAN, GROWTH, BOUNDARY = Look(BLUE, "-", ""), Look(VERMILLION, "--", ""), Look(VERMILLION, "-", "")
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 
@@ -82,10 +85,10 @@ def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEnt
     start = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"])).initial_angles
     found = stability_map(sweep, max(map(abs, start[1:]), default=0.0))
     labels = [f"{field_name(key)} ({unit})" for key, unit in ((found.x_key, found.x_unit), (found.y_key, found.y_unit))]
-    panels, has_line = plots.map_panels(found, *labels)
+    panels, has_line = map_panels(found, *labels)
     line = f"The pitches grow {GROWN:g}-fold in {found.unstable.sum()} of {found.growth.size} runs."
     caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
-    return panels, caption, line, [LegendEntry(f"{GROWN:g} times its start", plots.BOUNDARY)] if has_line else []
+    return panels, caption, line, [LegendEntry(f"{GROWN:g} times its start", BOUNDARY)] if has_line else []
 
 
 def _asked(sweep: StoredSweep) -> str:
@@ -103,11 +106,11 @@ def _spread(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
         f"({found.pairs} pairs, {found.start:.2f} to {found.end:.2f} s)."
     )
     legend = [
-        LegendEntry(f"10 to 90 % of {found.pairs} pairs", plots.MEDIAN, 8.0),
-        LegendEntry("median", plots.MEDIAN),
-        LegendEntry(f"growth {found.exponent:.2f} ± {found.uncertainty:.2f} per s", plots.GROWTH),
+        LegendEntry(f"10 to 90 % of {found.pairs} pairs", MEDIAN, 8.0),
+        LegendEntry("median", MEDIAN),
+        LegendEntry(f"growth {found.exponent:.2f} ± {found.uncertainty:.2f} per s", GROWTH),
     ]
-    return plots.spread_panels(found), "Separation of nearby starts", line, legend
+    return spread_panels(found), "Separation of nearby starts", line, legend
 
 
 def _status_table(statuses: Array) -> PageTable:
@@ -140,7 +143,7 @@ def _responses(sweep: StoredSweep, ok: Array) -> list[Picture]:
             continue
         caption = f"The largest pitch of each run over the {field_name(key)}"
         label = _axis(field_name(key), sweep.columns[name].units)
-        panels = plots.response(parameter, values, label, "largest pitch (rad)", logarithmic=_is_wide(parameter))
+        panels = response(parameter, values, label, "largest pitch (rad)", logarithmic=_is_wide(parameter))
         found.append(picture(panels, f"over-{name}", caption, caption))
     return found
 
@@ -159,7 +162,7 @@ def _distributions(sweep: StoredSweep, ok: Array) -> list[Picture]:
         low, middle, high = apart(*map(float, np.quantile(values, (0.05, 0.5, 0.95))))
         what = f"median {middle}, 5 to 95 % from {low} to {high}"
         caption = _axis(f"{with_capital(column.long_name)}: {what}", column.units)
-        panels = plots.distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
+        panels = distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
         found.append(picture(panels, f"of-{name}", caption, f"{caption}, over {len(values)} runs."))
     return found
 
@@ -171,3 +174,55 @@ def _axis(label: str, unit: str) -> str:
 def _is_wide(values: Array) -> bool:
     """Whether a logarithmic axis shows more."""
     return bool(values.min() > 0.0 and values.max() > _SPAN * values.min())
+
+
+def spread_panels(spread: Spread) -> Panels:
+    """Separation over time on a log scale, with the fitted exponential growth."""
+    panel = panels((3.6,), TIME_AXIS)
+    axes = panel.axes[0]
+    seen = spread.low > 0.0
+    axes.fill_between(spread.time[seen], spread.low[seen], spread.high[seen], color=BLUE, alpha=0.2, lw=0)
+    curve(axes, spread.time, spread.median, MEDIAN)
+    inside = (spread.time >= spread.start) & (spread.time <= spread.end)
+    time, growth = spread.time[inside], spread.growth[inside]
+    # Through the window's middle, at the slope that was found.
+    curve(axes, time, np.exp(np.log(growth).mean() + spread.exponent * (time - time.mean())), GROWTH)
+    log_axis(axes, float(spread.low[seen].min()), float(spread.high.max()))
+    axes.set_ylabel("separation of the angles (rad)")
+    return panel
+
+
+def map_panels(found: StabilityMap, x_label: str, y_label: str) -> tuple[Panels, bool]:
+    """Growth of the pitches as colour over both axes, and whether there is the line where they grew tenfold."""
+    panel = panels((3.8,), x_label)
+    axes = panel.axes[0]
+    label = "largest pitch, of its start (powers of ten)"
+    has_line = growth_map(panel, found.x, found.y, found.growth, _MOST_GROWTH, label, GROWN)
+    axes.ticklabel_format(style="plain")
+    axes.set_ylabel(y_label)
+    panel.figure.subplots_adjust(left=0.18)
+    return panel, has_line
+
+
+def response(parameter: Array, values: Array, x_label: str, y_label: str, *, logarithmic: bool) -> Panels:
+    """A number of each run over a parameter that was varied, a point per run."""
+    panel = panels((3.0,), x_label)
+    shown = np.linspace(0, len(values) - 1, min(len(values), _MOST_RUNS)).round().astype(int)
+    curve(panel.axes[0], parameter[shown], values[shown], Look(BLUE, "", "o"), markersize=3.5, markerfacecolor=BLUE)
+    if logarithmic:
+        log_axis(panel.axes[0], float(parameter.min()), float(parameter.max()), "x")
+    panel.axes[0].set_ylabel(y_label)
+    return panel
+
+
+def distribution(values: Array, label: str, *, logarithmic: bool) -> Panels:
+    """How many runs have how large a value: the share of runs up to each value, as a rising curve."""
+    panel = panels((1.9,), label)
+    known = np.sort(values[np.isfinite(values) & ((values > 0.0) | (not logarithmic))])
+    if len(known) > _MOST_POINTS:
+        known = known[np.linspace(0, len(known) - 1, _MOST_POINTS).round().astype(int)]
+    curve(panel.axes[0], known, np.linspace(0.0, 100.0, len(known)), MEDIAN)
+    if logarithmic:
+        log_axis(panel.axes[0], known[0], known[-1], "x")
+    panel.axes[0].set(ylim=(0.0, 101.0), ylabel="share of runs (%)")
+    return panel

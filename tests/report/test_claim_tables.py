@@ -6,8 +6,7 @@ from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares
 from rotor_mbs.analysis.claims import Claim, ClaimResult
 from rotor_mbs.analysis.published import published
-from rotor_mbs.report.pages import claim_study
-from rotor_mbs.report.pages.claims import claim_table
+from rotor_mbs.report.pages import claim_tables
 
 PRINTED, CLOSED_FORM = "printed/ode45", "lagrange/taylor"
 CLAIMS = [item for item in published() if not item.is_number]
@@ -25,7 +24,9 @@ def shares(printed: dict[str, str]) -> ClaimShares:
 def test_verdicts_of_claims_are_those_of_the_shares() -> None:
     first, second = CLAIMS[:2]
     study = shares({first.id: 11 * "y", second.id: "n" + 6 * "y" + 2 * "n" + 2 * "-"})
-    rows = claim_table([Claim(item, ClaimResult(True), ClaimResult(None)) for item in CLAIMS[:3]], study).rows
+    rows = claim_tables.claim_table(
+        [Claim(item, ClaimResult(True), ClaimResult(None)) for item in CLAIMS[:3]], study
+    ).rows
     cells = [[cell if isinstance(cell, str) else cell.text for cell in row[2:]] for row in rows]
     assert cells == [["holds", "fails"], ["undecided", "fails"], ["holds", "–"]]  # the third one: of the stored run
     notes = [cell.note.replace("\N{NO-BREAK SPACE}", " ") for cell in rows[1][2:] if not isinstance(cell, str)]
@@ -35,7 +36,7 @@ def test_verdicts_of_claims_are_those_of_the_shares() -> None:
 
 def test_the_headline_counts_what_holds_whatever_the_rounding_and_the_duration() -> None:
     study = shares({CLAIMS[0].id: 11 * "y", CLAIMS[1].id: 11 * "y", CLAIMS[2].id: 6 * "y" + 5 * "n"})
-    sentence = claim_study.headline(study)
+    sentence = claim_tables.headline(study)
     assert "in the printed model 2 hold whatever the rounding and the duration and 1 are undecided" in sentence
     assert "in the corrected model 3 fail (10 runs each" in sentence
 
@@ -43,12 +44,12 @@ def test_the_headline_counts_what_holds_whatever_the_rounding_and_the_duration()
 def test_the_numbers_stand_in_tables_by_duration_tolerances_and_way_of_writing() -> None:
     study = stored_claims()
     assert study is not None
-    by_duration, by_tolerance, by_row = claim_study.trial_tables(study.numbers)
+    by_duration, by_tolerance, by_row = claim_tables.trial_tables(study.numbers)
     good = [
         [not isinstance(cell, str) and cell.tone == "good" for cell in row[-4:]] for row in by_duration.rows
     ]  # fmt: skip
     assert [all(row) for row in good] == [False, False, False, False, True, False]
     assert sum(all(not isinstance(c, str) and c.tone == "good" for c in row[-4:]) for row in by_tolerance.rows) == 1
     assert len(by_row.rows) == 12
-    assert "8 of 11 ways of writing the printed row give all 4 numbers" in claim_study.trial_note(study.numbers)
-    assert "for 8 of 11 ways of writing one row of (56)" in claim_study.numbers_headline(study.numbers)
+    assert "8 of 11 ways of writing the printed row give all 4 numbers" in claim_tables.trial_note(study.numbers)
+    assert "for 8 of 11 ways of writing one row of (56)" in claim_tables.numbers_headline(study.numbers)
