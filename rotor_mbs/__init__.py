@@ -50,29 +50,17 @@ if TYPE_CHECKING:
     from rotor_mbs.studies.claims import claims as claims
     from rotor_mbs.studies.export import export as export
 
-_PLACES = {
-    "rotor_mbs.api": (
-        "Comparison",
-        "ResultsTree",
-        "Run",
-        "SweepData",
-        "compare",
-        "load",
-        "open",
-        "run",
-        "scene",
-        "scenes",
-        "sweep",
-    ),
-    "rotor_mbs.errors": ("InputError", "MethodRefusal", "RotorError", "StoreError"),
-    "rotor_mbs.methods.base": ("Method",),
-    "rotor_mbs.report.data_comparison": ("DataComparison", "compare_data"),
-    "rotor_mbs.report.mode_study": ("modes",),
-    "rotor_mbs.scenario.scene": ("Blade", "Scene"),
-    "rotor_mbs.studies.claims": ("claims",),
-    "rotor_mbs.studies.export": ("export",),
+_MODULES = {
+    "rotor_mbs.api": "Comparison ResultsTree Run SweepData compare load open run scene scenes sweep",
+    "rotor_mbs.errors": "InputError MethodRefusal RotorError StoreError",
+    "rotor_mbs.methods.base": "Method",
+    "rotor_mbs.report.data_comparison": "DataComparison compare_data",
+    "rotor_mbs.report.mode_study": "modes",
+    "rotor_mbs.scenario.scene": "Blade Scene",
+    "rotor_mbs.studies.claims": "claims",
+    "rotor_mbs.studies.export": "export",
 }
-_HOME = {name: place for place, names in _PLACES.items() for name in names}
+_HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = sorted(_HOME)
 

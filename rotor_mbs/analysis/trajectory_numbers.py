@@ -40,10 +40,6 @@ def _series(run: RunArrays, name: str, coordinate: int) -> tuple[Array, Array] |
     return None
 
 
-def _range(x: Array) -> float:
-    return float(x.max() - x.min())
-
-
 def _reversals(x: Array) -> float:
     signs = np.sign(x[x != 0.0])
     return float(np.count_nonzero(signs[1:] != signs[:-1]))
@@ -70,7 +66,7 @@ STATISTICS: dict[str, Callable[[Array, Array], float | None]] = {
     "min": lambda _, x: float(x.min()),
     "max": lambda _, x: float(x.max()),
     "max_abs": lambda _, x: float(np.abs(x).max()),
-    "range": lambda _, x: _range(x),
+    "range": lambda _, x: float(np.ptp(x)),
     "max_abs_change": lambda _, x: float(np.abs(x - x[0]).max()),
     "net_change": lambda _, x: float(x[-1] - x[0]),
     "reversals": lambda _, x: _reversals(x),

@@ -88,11 +88,11 @@ def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
     return float(np.exp(np.interp(-math.log(target), -e, t)))
 
 
-def reaches(curves: Sequence[Record], *, with_setup: bool = False) -> dict[str, dict[float, Reach | None]]:
+def reaches(curves: Sequence[Record]) -> dict[str, dict[float, Reach | None]]:
     """By curve and target."""
     found: dict[str, dict[float, Reach | None]] = {curve.name: {} for curve in curves}
     for target in TARGETS_RAD:
-        times = {curve.name: time_to_reach(*points(curve, with_setup=with_setup), target) for curve in curves}
+        times = {curve.name: time_to_reach(*points(curve), target) for curve in curves}
         fastest = min((time for time in times.values() if time is not None), default=math.inf)
         for name, time in times.items():
             found[name][target] = None if time is None else Reach(time, time / fastest)

@@ -179,21 +179,18 @@ def run_tasks(
     work: Callable[[T], R],
     tasks: Sequence[T],
     workers: int,
-    timeout_s: float | Callable[[T], float],
-    split: Callable[[T], Sequence[T]] | None = None,
+    timeout_s: float,
 ) -> Iterator[Finished[T, R]]:
     """`work(task)` for all tasks in parallel processes; results as they come, retried as `run_in` does.
 
     Parameters
     ----------
     workers : parallel processes; 0: all tasks in this process, without a time limit.
-    timeout_s : time limit of a task in s, or a function of the task.
-    split : the parts of a task that stands for many runs; an empty sequence for one that cannot be split.
+    timeout_s : time limit of a task in s.
     """
-    if not tasks:
-        return
-    with WorkerPool(min(workers, len(tasks))) if workers else SerialPool() as pool:
-        yield from run_in(pool, work, tasks, timeout_s, split)
+    if tasks:
+        with WorkerPool(min(workers, len(tasks))) if workers else SerialPool() as pool:
+            yield from run_in(pool, work, tasks, timeout_s)
 
 
 def run_in(
@@ -204,6 +201,9 @@ def run_in(
     split: Callable[[T], Sequence[T]] | None = None,
 ) -> Iterator[Finished[T, R]]:
     """`work(task)` for all tasks in a pool that is open; `tasks` are taken as workers become free.
+
+    timeout_s   time limit of a task in s, or a function of the task
+    split       the parts of a task that stands for many runs; an empty sequence for one that cannot be split
 
     A task whose worker died is tried once more at the end, alone. One that can be split is split first, also where it
     was over its time limit.

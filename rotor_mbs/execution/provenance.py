@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.metadata
-import os
 import platform
 from pathlib import Path
 
 import rotor_mbs
+from rotor_mbs.execution import cores
 from rotor_mbs.methods.catalogue import methods
 
 _OWN = ("numpy", "h5py")
@@ -35,8 +35,8 @@ def versions_with(*distributions: str) -> dict[str, str]:
 
 @functools.cache
 def machine() -> dict[str, str]:
-    """Operating system and processor, as the system reports them."""
-    return {"platform": platform.platform(), "cpu": f"{_processor()}, {os.cpu_count()} cores"}
+    """Operating system and processor, as the system reports them; the cores that this process may use."""
+    return {"platform": platform.platform(), "cpu": f"{_processor()}, {cores()} cores"}
 
 
 def _processor() -> str:

@@ -245,7 +245,8 @@ def test_a_lost_task_of_many_runs_is_split_and_only_one_run_is_lost() -> None:
     def limit(numbers: tuple[int, ...]) -> float:
         return 1.0 if 7 in numbers else _LONG_S
 
-    ends = list(run_tasks(_sum, [(0, 1), (2, 3), (4, 5), (6, 7)], 2, limit, _split))
+    with WorkerPool(2) as pool:
+        ends = list(run_in(pool, _sum, [(0, 1), (2, 3), (4, 5), (6, 7)], limit, _split))
     assert {end.task: end.value if not end.failure else end.failure for end in ends} == {
         (0, 1): 1, (4, 5): 9, (2,): 2, (3,): "worker_died", (6,): 6, (7,): "timed_out",
     }  # fmt: skip
