@@ -29,8 +29,8 @@ _DAMAGE = (
 # An array may be larger than its bytes in the file, where it is compressed: up to a factor, and a size in any case.
 _UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
 
-# What the library keeps of scales and their users; it writes them itself when a scale is made or attached.
-_SCALE_ATTRIBUTES = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid")
+# Of a scale its users, of these their scales, and a number in the file: the library writes them when one is attached.
+_OF_SCALES = {"REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid"}
 
 
 @contextmanager
@@ -153,8 +153,7 @@ def values_of(dataset: Any) -> NDArray[Any]:
     place = f"{dataset.file.filename}: {dataset.name}"
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind == "O":
         raise StoreError(f"{place} is no array")
-    if dataset.external or dataset.is_virtual:
-        raise StoreError(f"{place} is stored in another file; allowed: arrays of this file")
+    _refuse_outside(dataset)
     kept = dataset.id.get_storage_size()
     if kept > Path(dataset.file.filename).stat().st_size or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
         raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
@@ -207,24 +206,42 @@ def attributes_of(target: Any) -> dict[str, Any]:
     return {name: plain(value) for name, value in target.attrs.items() if name not in ("REFERENCE_LIST", DIGESTS)}
 
 
-def copy_group(source: Any, target: Any) -> None:
-    """All members and attributes of one group into another, in order. Scales are made and attached anew: a copy by
-    the library itself would leave references that point nowhere."""
-    items = dict(members(source))
-    datasets = {name: item for name, item in items.items() if not is_group(item)}
-    for name, item in datasets.items():
-        copied = target.create_dataset(name, data=values_of(item), compression=item.compression, shuffle=item.shuffle)
-        copied.attrs.update({key: item.attrs[key] for key in item.attrs if key not in _SCALE_ATTRIBUTES})
-        if item.is_scale:
-            copied.make_scale(name)
-    for name, item in datasets.items():
-        for axis, dimension in enumerate(dimensions_of(item)):
-            if dimension:
-                target[name].dims[axis].attach_scale(target[dimension])
-    target.attrs.update(source.attrs)
+def copy_group(source: Any, file: Any, name: str) -> None:
+    """A group with all that it holds, into another file at a place of its own.
+
+    The library copies references as they are, of the file they come from: scales are attached anew. Raises StoreError
+    at a link, and at an array that is stored in another file.
+    """
+    above = name.rpartition("/")[0]
+    if above:
+        new_group(file, above)
+    h5py.h5o.copy(source.id, b".", file.id, name.encode())
+    _attach_scales(source, file[name])
+
+
+def _attach_scales(source: Any, copied: Any) -> None:
+    items = dict(members(copied))
+    for item in items.values():
+        if not is_group(item):
+            _refuse_outside(item)
+            for stale in _OF_SCALES & set(item.attrs):
+                h5py.h5a.delete(item.id, stale.encode())
     for name, item in items.items():
         if is_group(item):
-            copy_group(item, new_group(target, name))
+            _attach_scales(source[name], item)
+            continue
+        for axis, dimension in enumerate(dimensions_of(source[name])):
+            if dimension:
+                item.dims[axis].attach_scale(items[dimension])
+
+
+def _refuse_outside(dataset: Any) -> None:
+    """Raises StoreError for an array that is stored in another file."""
+    layout = dataset.id.get_create_plist()
+    if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
+        raise StoreError(
+            f"{dataset.file.filename}: {dataset.name} is stored in another file; allowed: arrays of this file"
+        )
 
 
 def dimensions_of(dataset: Any) -> list[str]:

@@ -15,7 +15,7 @@ from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.digests import DIGESTS
-from rotor_mbs.store.layout import KEYWORDS, LIMIT, TOGETHER, key_of
+from rotor_mbs.store.layout import KEYWORDS, LIMIT, SWEEP_IDENTITY, TOGETHER, key_of
 from rotor_mbs.store.read import OpenResults, StoredRun, all_damages, is_sweep, open_results
 from rotor_mbs.store.records import records_in
 from rotor_mbs.store.summary import put_summary
@@ -87,8 +87,6 @@ def merge(
     StoreError
         Where a file cannot be read or written, or is the dataset of a sweep.
     """
-    for source in sources:
-        refuse_other_kinds(source)
     plan = _plan(sources, without)
     with hdf5.new_file(path) as file:
         created = datetime.now(UTC).isoformat(timespec="seconds")
@@ -96,16 +94,21 @@ def merge(
         for owner in sorted(plan, key=lambda name: (name.split("/")[0] in RESERVED_GROUPS, name)):
             for source, names in _by_source(plan[owner]).items():
                 with hdf5.open_file(source) as root, hdf5.reading(source):
-                    hdf5.new_group(file, owner).attrs.update(root[owner].attrs)
                     for name in names:
-                        hdf5.copy_group(root[name], hdf5.new_group(file, name))
+                        hdf5.copy_group(root[name], file, name)
+                    attributes = dict(root[owner].attrs)
+            hdf5.new_group(file, owner).attrs.update(attributes)
         put_summary(file, [(owner, name.removeprefix(f"{owner}/")) for owner, name in _runs_in(plan)])
 
 
 def refuse_other_kinds(path: Path) -> None:
     """Raises StoreError where `path` has what a merge would not carry over: a sweep's dataset."""
     if path.exists() and is_sweep(path):
-        raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
+        raise _is_of_another_kind(path)
+
+
+def _is_of_another_kind(path: Path) -> StoreError:
+    return StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
 
 
 def _members(results: OpenResults) -> Iterator[tuple[str, str, str, str]]:
@@ -125,6 +128,8 @@ def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[s
     latest: dict[str, tuple[str, dict[str, Path]]] = {}
     for source in sources:
         with open_results(source, verify=False) as results, hdf5.reading(source):
+            if SWEEP_IDENTITY in results.attributes:
+                raise _is_of_another_kind(source)
             for above, owner, name, key in _members(results):
                 if key not in without or not key:
                     known, groups = latest.get(above, (owner, {}))

@@ -17,6 +17,7 @@ from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.store.hdf5 import attributes_of
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import merge
 from rotor_mbs.store.write import write_run
@@ -79,6 +80,29 @@ def test_a_later_run_takes_the_place_of_an_earlier_one_and_others_stay(tmp_path:
     with open_results(tmp_path / "all.h5") as results:
         notes = {name: scene.runs["lagrange/dop853"].attributes["note"] for name, scene in results.scenes.items()}
     assert notes == {"paper/fig05": "kept", "paper/fig08": "new"}
+
+
+def test_a_merged_run_has_its_members_in_order_and_scales_of_its_own(tmp_path: Path) -> None:
+    """A copy by the library alone would refer to the scales of the file it was copied from."""
+    stored(tmp_path / "a.h5")
+    merge(tmp_path / "all.h5", [tmp_path / "a.h5"], {})
+    merge(tmp_path / "all.h5", [tmp_path / "all.h5"], {})
+    with h5py.File(tmp_path / "a.h5") as part, h5py.File(tmp_path / "all.h5") as file:
+        before, after = part["paper/fig08/lagrange/dop853"], file["paper/fig08/lagrange/dop853"]
+        assert list(after) == list(before)
+        scales = [f"{after.name}/{name}" for name in ("time", "blade", "axis")]
+        assert [scale[0].name for scale in after["tip"].dims] == scales
+        users = {file[reference].name for reference, _ in after["blade"].attrs["REFERENCE_LIST"]}
+        assert users == {f"{after.name}/tip"}
+        assert attributes_of(after) == attributes_of(before)
+
+
+def test_arrays_in_other_files_are_not_merged(tmp_path: Path) -> None:
+    stored(tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file.create_dataset("paper/fig08/lagrange/dop853/more", (3,), "f8", external=[(tmp_path / "x", 0, 24)])
+    with pytest.raises(StoreError, match="more is stored in another file"):
+        merge(tmp_path / "all.h5", [tmp_path / "a.h5"], {})
 
 
 def test_opens_in_xarray_with_units_and_named_dimensions(tmp_path: Path) -> None:
