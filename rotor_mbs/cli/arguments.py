@@ -27,11 +27,7 @@ from rotor_mbs.execution import cores
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv", "sympy", "iftomm")
 
 
-class Argument(NamedTuple):
-    """Names and options of `ArgumentParser.add_argument`; a default that is a function is called with each parse."""
-
-    names: tuple[str, ...]
-    options: dict[str, Any]
+Argument = tuple[tuple[str, ...], dict[str, Any]]  # names and options of `ArgumentParser.add_argument`
 
 
 class Command(NamedTuple):
@@ -49,16 +45,15 @@ class Command(NamedTuple):
 
 
 def _argument(*names: str, **options: Any) -> Argument:
-    return Argument(names, options)
+    return names, options
 
 
 def _flag(*names: str, help: str) -> Argument:
-    return Argument(names, {"action": "store_true", "help": help})
+    return names, {"action": "store_true", "help": help}
 
 
 def _output(kind: Any, metavar: str, default: object = None, help: str = "to write (default: %(default)s)") -> Argument:
-    options = {"type": kind, "default": default, "metavar": metavar, "help": help}
-    return Argument(("-o", "--output"), options)
+    return _argument("-o", "--output", type=kind, default=default, metavar=metavar, help=help)
 
 
 def _method(help: str = "model/integrator, as in rotor-mbs list") -> Argument:
@@ -76,7 +71,7 @@ _PAGES = "(default: beside FILE, its name with -report; of results.h5: report)"
 # fmt: off
 _AS_JSON = _flag("--json", help="as JSON, for a script")
 _RESULTS = (
-    _argument("file", nargs="?", type=path, default=default_results, metavar="FILE",
+    _argument("file", nargs="?", type=path, metavar="FILE",
               help="a results file (default: results.h5 of this folder, else that of reproduce)"),
     _argument("--results", type=path, help=argparse.SUPPRESS),  # as it was called before; it stays for scripts
 )
@@ -253,8 +248,8 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     if argv and not argv[0].startswith("-") and argv[0] not in known:
         parser.error(f"no command {argv[0]!r}{nearest(argv[0], known)}; allowed: {', '.join(known)}")
     arguments = parser.parse_args(argv or ["--help"])
-    if getattr(arguments, "results", None):
-        arguments.file = arguments.results
+    if hasattr(arguments, "results"):
+        arguments.file = arguments.results or arguments.file or default_results()
     return arguments
 
 
@@ -277,6 +272,5 @@ def _parser() -> _Parser:
         )
         own.set_defaults(command=command)
         for names, options in command.arguments:
-            default = options.get("default")
-            own.add_argument(*names, **options | ({"default": default()} if callable(default) else {}))
+            own.add_argument(*names, **options)
     return parser

@@ -110,7 +110,7 @@ class ModePlots:
         rotation = self._rotation()
         panels = plots.campbell(rotation)
         looks = [plots.mode_look(k) for k in range(len(rotation.names))]
-        canvas.legend_inside(panels.axes[0], list(zip(rotation.names, looks, strict=True)))
+        canvas.legend(panels.axes[0], list(zip(rotation.names, looks, strict=True)))
         return panels
 
     def damping(self) -> Panels:

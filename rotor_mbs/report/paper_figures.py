@@ -174,7 +174,9 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
         for axes, key in zip(table[0], keys, strict=True):
             axes.text(0.5, heading, HEADINGS[key], transform=axes.transAxes, ha="center", weight="bold")
         _tidy(table, letters if is_paths else [])
-    canvas.legend_below(panels.figure, legend(figure, scenes))
+    labelled = legend(figure, scenes)
+    place = {"loc": "lower center", "ncols": min(len(labelled), 5), "handlelength": 2.6}
+    canvas.legend(panels.figure, labelled, for_print=True, **place)
     return panels
 
 

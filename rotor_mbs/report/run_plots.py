@@ -14,9 +14,10 @@ from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look
+from rotor_mbs.report.pages.quantities import components
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.paths import paths
-from rotor_mbs.report.plots.time_histories import Motion, Series
+from rotor_mbs.report.plots.time_histories import Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.solution import Solution
@@ -33,7 +34,7 @@ class RunPlots:
         """Angles (rad) and rates (rad/s) over time (s): rotor and pitches."""
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
-        return time_histories.motion(Motion(_some(run.time), run.angles, run.rates), horizon_s)
+        return time_histories.motion(_some(run.time), run.angles, run.rates, horizon_s)
 
     def energy(self) -> Panels:
         """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
@@ -43,7 +44,7 @@ class RunPlots:
         looks = dict(zip(curves, (Look(VERMILLION, "-", ""), Look(BLUE, "--", ""), Look(INK, "-", "")), strict=True))
         series = [Series(run.time, values, looks[name]) for name, values in curves.items()]
         picture = time_histories.lines([("energy (J)", series)])
-        canvas.legend_inside(picture.axes[0], list(looks.items()))
+        canvas.legend(picture.axes[0], list(looks.items()))
         return picture
 
     def loads(self, name: str = "blade_root_force") -> Panels:
@@ -56,17 +57,14 @@ class RunPlots:
         values, load = _quantity(self._run, name), next((one for one in LOADS if one.name == name), None)
         if load is None or load.plot is None:
             raise InputError(f"no load {name!r}; allowed: {', '.join(one.name for one in LOADS)}")
-        stacked = values[:, :, None] if values.ndim == 2 else values
-        first = 1 if load.dimensions[1] == "blade" else 0
-        looks = [coordinate_look(first + i) for i in range(stacked.shape[1])]
-        rows = [
-            (f"{axis} {load.plot.axis}" if values.ndim == 3 else load.plot.axis,
-             [Series(self._run.time, stacked[:, i, k], look) for i, look in enumerate(looks)])
-            for k, axis in zip(range(stacked.shape[2]), "xyz", strict=False)
-        ]  # fmt: skip
-        panels = time_histories.lines(rows, height=1.6)
-        names = [f"blade {i + 1}" if first else "xyz"[i] for i in range(len(looks))]
-        canvas.legend_inside(panels.axes[0], list(zip(names, looks, strict=True)))
+        parts = components(load, values)
+        looks = {one.label: coordinate_look(one.place) for one in parts}
+        rows: dict[str, list[Series]] = {}
+        for one in parts:
+            label = f"{one.group} {load.plot.axis}".strip()
+            rows.setdefault(label, []).append(Series(self._run.time, one.values, looks[one.label]))
+        panels = time_histories.lines(list(rows.items()), height=1.6)
+        canvas.legend(panels.axes[0], list(looks.items()))
         return panels
 
     def error(self) -> Panels:
@@ -120,7 +118,7 @@ def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> 
 
 def _with_legend(picture: Panels, runs: Iterable[Solution]) -> Panels:
     looks = {label_of(run.method): look_of(run.method) for run in runs}
-    canvas.legend_inside(picture.axes[0], list(looks.items()))
+    canvas.legend(picture.axes[0], list(looks.items()))
     return picture
 
 

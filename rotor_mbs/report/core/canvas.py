@@ -16,7 +16,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -46,7 +45,7 @@ class Panels:
     axes: list[Any]
 
     def _repr_svg_(self) -> str:
-        return svg_text(self.figure)
+        return encoded(self.figure, "svg", for_print=False).decode()
 
     def save(self, path: str | Path) -> None:
         """As PDF, SVG or PNG, by the ending of `path`. Raises InputError for another one, StoreError."""
@@ -97,29 +96,19 @@ def font_file() -> Path:
     return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 
 
-def legend_below(figure: Figure, labelled: Sequence[tuple[str, Look]]) -> None:
-    """A line per (label, look) at the foot of the figure."""
-    with style(for_print=True):
-        lines = _samples(labelled)
-        figure.legend(handles=lines, loc="lower center", ncols=min(len(lines), 5), handlelength=2.6)
+def legend(target: Any, labelled: Sequence[tuple[str, Look]], *, for_print: bool = False, **place: Any) -> None:
+    """A line per (label, look) on axes, where they have most room, or where `place` says, on axes or a figure."""
+    with style(for_print=for_print):
+        handles = [
+            Line2D([], [], color=look.colour, ls=look.line, marker=look.marker, label=label) for label, look in labelled
+        ]
+        target.legend(handles=handles, **(place or {"loc": "best", "fontsize": 8.0}))
 
 
-def legend_inside(axes: Any, labelled: Sequence[tuple[str, Look]]) -> None:
-    """An entry per (label, look), where the axes have most room."""
-    with style():
-        axes.legend(handles=_samples(labelled), loc="best", fontsize=8.0)
-
-
-def _samples(labelled: Sequence[tuple[str, Look]]) -> list[Line2D]:
-    return [
-        Line2D([], [], color=look.colour, ls=look.line, marker=look.marker, label=label) for label, look in labelled
-    ]
-
-
-def encoded(figure: Figure, kind: str) -> bytes:
+def encoded(figure: Figure, kind: str, *, for_print: bool = True) -> bytes:
     """The figure as a file of one of KINDS; the same bytes every time."""
     metadata: dict[str, Any] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}[kind]
-    with style(for_print=True):
+    with style(for_print=for_print):
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
@@ -147,16 +136,6 @@ def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any
         x, y, color=look.colour, linestyle=look.line, linewidth=width, marker=look.marker,
         **{"markersize": 4.2, "markerfacecolor": "white"} | more,
     )  # fmt: skip
-
-
-def svg_text(figure: Figure) -> str:
-    """The figure as matplotlib writes it, without a date, the same each time."""
-    with style(), matplotlib.rc_context({"svg.hashsalt": "rotor_mbs"}):
-        stream = io.StringIO()
-        FigureCanvasSVG(figure).print_svg(  # type: ignore[no-untyped-call]
-            stream, metadata={"Date": None, "Creator": None}
-        )
-    return stream.getvalue()
 
 
 def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: float) -> bool:

@@ -37,21 +37,19 @@ def picture(
     panels: Panels, name: str, caption: str, description: str, notes: Iterable[str] = (),
     legend: Sequence[LegendEntry] = (),
 ) -> Picture:  # fmt: skip
-    """The figure for a page. `name` is unique on the page; `description` says what the figure shows."""
-    text = drawing(panels, name, caption, description)
-    return Picture(Markup(text), caption, [note for note in notes if note], legend)
+    """The figure for a page, as an `svg` element with caption and description as its alternative text.
 
-
-def drawing(panels: Panels, name: str, title: str, description: str) -> str:
-    """The figure as an `svg` element, with title and description as its alternative text."""
+    `name` is unique on the page; `description` says what the figure shows.
+    """
     page = _Page(panels.figure)
     with style():
         body = "".join(part for axes in panels.figure.axes for part in page.axes(axes))
-    return (
+    text = (
         f'<svg viewBox="0 0 {_short(page.width)} {_short(page.height)}" role="img" '
-        f'aria-labelledby="{name}-t {name}-d"><title id="{name}-t">{escape(title)}</title>'
+        f'aria-labelledby="{name}-t {name}-d"><title id="{name}-t">{escape(caption)}</title>'
         f'<desc id="{name}-d">{escape(description)}</desc>{body}{page.cursor(panels.axes)}</svg>'
     )
+    return Picture(Markup(text), caption, [note for note in notes if note], legend)
 
 
 class _Page:

@@ -111,12 +111,9 @@ def _motion(record: Record, verdict: DataVerdict) -> list[Picture]:
     every = max(1, len(time) // 40)
     for one in chosen:
         look = _look(one)
-        reference = time_histories.thin(time, _array(record, one, "_reference"))
-        axes.plot(*reference, color=look.colour, linestyle=look.line)
-        axes.plot(
-            time[::every], _array(record, one)[::every], linestyle="none", marker="o", markersize=3.6,
-            markerfacecolor="none", markeredgecolor=look.colour,
-        )  # fmt: skip
+        canvas.curve(axes, *time_histories.thin(time, _array(record, one, "_reference")), look, 1.5)
+        marks = Look(look.colour, "", "o")
+        canvas.curve(axes, time[::every], _array(record, one)[::every], marks, markersize=3.6, markerfacecolor="none")
     drawn = [_array(record, one, ending) for one in chosen for ending in ("", "_reference")]
     time_histories.set_range(axes, np.stack(drawn, axis=1))
     axes.set_ylabel(time_histories.ANGLE_AXIS)

@@ -5,7 +5,7 @@ Those that are judged against the reference, such as loads, are drawn of the ref
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ from rotor_mbs.solution.quantities import sizes as lengths
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 
-class _Component(NamedTuple):
+class Component(NamedTuple):
     """group: the picture it is drawn in; label: its line there; place: index of the line's look; values: (n,)."""
 
     group: str
@@ -79,8 +79,9 @@ def _section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: flo
     pictures: list[Picture] = []
     for i, run in enumerate(drawn.values()):
         pictures += _pictures(quantity, plot, run, f"{name}-{i}", horizon)
-    components = list(_components(quantity, next(iter(drawn.values()))))
-    legend = {one.label: LegendEntry(one.label, coordinate_look(one.place)) for one in components}
+    first = next(iter(drawn.values()))
+    parts = components(quantity, first.array(quantity.name), first.labels)
+    legend = {one.label: LegendEntry(one.label, coordinate_look(one.place)) for one in parts}
     if not is_compared:
         return Section(pictures, list(legend.values()))
     errors = _errors(quantity, runs)
@@ -88,7 +89,7 @@ def _section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: flo
     shown = error_picture(errors, f"difference ({quantity.units})", f"{name}-error", title, horizon)
     if shown is not None:
         pictures.append(replace(shown, legend=run_legend(list(visible(errors)))))
-    return Section(pictures, list(legend.values()), [_extremes(quantity, runs[REFERENCE].array("time"), components)])
+    return Section(pictures, list(legend.values()), [_extremes(quantity, runs[REFERENCE].array("time"), parts)])
 
 
 def sizes(quantity: Quantity, runs: Runs) -> Curves:
@@ -100,24 +101,28 @@ def sizes(quantity: Quantity, runs: Runs) -> Curves:
     return {m: Series(run.array("time"), columns[m].max(axis=1), look_of(m)) for m, run in own.items()}
 
 
-def _components(quantity: Quantity, run: StoredRun) -> Iterator[_Component]:
-    """One by one: with blades and axes, a picture per axis and a line per blade; else one picture."""
-    values = run.array(quantity.name)
-    names = {"coordinate": run.labels, "axis": ["x", "y", "z"]}
-    labels = names.get(quantity.dimensions[1], [f"blade {i + 1}" for i in range(values.shape[1])])
+def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[Component]:
+    """One by one: with blades and axes, a picture per axis and a line per blade; else one picture.
+
+    labels: of the coordinates, for a quantity that has them.
+    """
+    names = {"coordinate": labels, "axis": ["x", "y", "z"]}
+    shown = names.get(quantity.dimensions[1], [f"blade {i + 1}" for i in range(values.shape[1])])[: values.shape[1]]
     first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
-    for i, label in enumerate(labels[: values.shape[1]]):
-        if values.ndim == 2:
-            yield _Component("", label, first + i, values[:, i])
-        else:
-            yield from (_Component(axis, label, first + i, values[:, i, k]) for k, axis in enumerate("xyz"))
+    if values.ndim == 2:
+        return [Component("", label, first + i, values[:, i]) for i, label in enumerate(shown)]
+    return [
+        Component(axis, label, first + i, values[:, i, k])
+        for i, label in enumerate(shown)
+        for k, axis in enumerate("xyz")
+    ]
 
 
 def _pictures(quantity: Quantity, plot: Plot, run: StoredRun, name: str, horizon: float | None) -> Iterator[Picture]:
     """One per group of components."""
-    components = list(_components(quantity, run))
-    for i, group in enumerate(dict.fromkeys(one.group for one in components)):
-        lines = [one for one in components if one.group == group]
+    parts = components(quantity, run.array(quantity.name), run.labels)
+    for i, group in enumerate(dict.fromkeys(one.group for one in parts)):
+        lines = [one for one in parts if one.group == group]
         series = [Series(run.array("time"), one.values, coordinate_look(one.place)) for one in lines]
         largest = prefixed(max(float(np.abs(one.values).max()) for one in lines), quantity.units)
         caption = with_capital(label_of(run.method)) + (f", {group} axis" if group else "")
@@ -137,10 +142,10 @@ def _errors(quantity: Quantity, runs: Runs) -> Curves:
     return found
 
 
-def _extremes(quantity: Quantity, time: Array, components: list[_Component]) -> PageTable:
+def _extremes(quantity: Quantity, time: Array, parts: Sequence[Component]) -> PageTable:
     """Smallest and largest value of each component, with their times."""
     rows = []
-    for one in components:
+    for one in parts:
         places = (int(one.values.argmin()), int(one.values.argmax()))
         cells = [
             text for k in places for text in (prefixed(float(one.values[k]), quantity.units), number(float(time[k]), 4))

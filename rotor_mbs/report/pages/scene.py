@@ -156,23 +156,22 @@ def motion_section(drawn: DrawnRuns) -> Section:
 
 
 def _motion_picture(name: str, run: StoredRun, horizon: float | None) -> Picture:
-    motion = motion_of(run)
+    time, angles, rates = motion_of(run)
     notes = []
-    for values, what, unit in ((motion.angles, "Angles", "rad"), (motion.rates, "Rates", "rad/s")):
+    for values, what, unit in ((angles, "Angles", "rad"), (rates, "Rates", "rad/s")):
         if values is not None and histories.is_cut(values):
             largest = with_unit(float(np.abs(values).max()), unit)
             notes.append(f"{what} beyond the axis are cut off; the largest is {largest}.")
     label = label_of(run.method)
-    angles = [] if motion.angles is None else zip(run.labels, motion.angles.T, strict=False)
-    ranges = [f"{n} from {number(float(x.min()), 3)} to {number(float(x.max()), 3)} rad" for n, x in angles]
-    panels = histories.motion(motion, horizon)
+    named = [] if angles is None else zip(run.labels, angles.T, strict=False)
+    ranges = [f"{n} from {number(float(x.min()), 3)} to {number(float(x.max()), 3)} rad" for n, x in named]
+    panels = histories.motion(time, angles, rates, horizon)
     return picture(panels, name, with_capital(label), f"{label} over time: {'; '.join(ranges)}.", notes)
 
 
-def motion_of(run: StoredRun) -> histories.Motion:
+def motion_of(run: StoredRun) -> tuple[Array, Array | None, Array | None]:
     """The run's time, angles and rates."""
-    angles, rates = (run.array(name) if name in run else None for name in ("angles", "rates"))
-    return histories.Motion(run.array("time"), angles, rates)
+    return run.array("time"), run.get("angles"), run.get("rates")
 
 
 def difference_section(drawn: DrawnRuns) -> Section:

@@ -192,7 +192,7 @@ def _motion(run: StoredRun | None) -> Section:
         names = " and ".join(filter(None, [", ".join(unresolved[:-1]), unresolved[-1]]))
         caption += f". The samples are too far apart to resolve the swings of {names}: only their range is meaningful"
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(run.labels)]
-    return Section([picture(histories.motion(motion_of(run)), "motion", caption, caption)], legend)
+    return Section([picture(histories.motion(*motion_of(run)), "motion", caption, caption)], legend)
 
 
 def _unresolved(run: StoredRun) -> list[str]:

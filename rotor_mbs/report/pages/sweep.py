@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap, spread_of, stability_map
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, curve, growth_map, legend_inside, log_axis, panels
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, curve, growth_map, log_axis, panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
 from rotor_mbs.report.core.looks import BLUE, VERMILLION, Look, with_capital
 from rotor_mbs.report.core.numbers import SPACE, apart
@@ -73,7 +74,7 @@ def field_name(key: str) -> str:
 def save_picture(sweep: StoredSweep, path: Path) -> str:
     """The picture that the sweep's file asks for, as a file; a line about it. Raises InputError, StoreError."""
     panels, _, line, legend = _asked_picture(sweep)
-    legend_inside(panels.axes[0], [(one.label, one.look) for one in legend])
+    canvas.legend(panels.axes[0], [(one.label, one.look) for one in legend])
     panels.save(path)
     return f"{path}: {line}"
 

@@ -67,10 +67,9 @@ def multipliers(table: FloquetTable) -> Panels:
     panel = panels((2.6,), SPEED_AXIS)
     axes = panel.axes[0]
     sizes = np.abs(table.multipliers)
-    axes.plot(
-        table.speeds, np.where(sizes > 0.0, sizes, np.nan), color=BLUE, linestyle="none", marker="o", markersize=2.0
-    )
-    axes.plot(table.speeds, table.largest, color=VERMILLION, linestyle="-")
+    shown = np.where(sizes > 0.0, sizes, np.nan)
+    curve(axes, table.speeds, shown, Look(BLUE, "", "o"), markersize=2.0, markerfacecolor=BLUE)
+    curve(axes, table.speeds, table.largest, Look(VERMILLION, "-", ""), 1.5)
     axes.axhline(1.0, color=GREY, linewidth=0.8)
     known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
     if len(known) and known.max() / known.min() > 10.0:

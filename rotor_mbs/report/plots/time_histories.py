@@ -28,14 +28,6 @@ _ROUNDING = 1e-9
 _BINS = 130  # intervals of a curve that is drawn: one in some four pixels of a page
 
 
-class Motion(NamedTuple):
-    """A run: time (n,) s; angles (rad) and rates (rad/s) (n, coordinates), either may be missing."""
-
-    time: Array
-    angles: Array | None
-    rates: Array | None
-
-
 class Series(NamedTuple):
     """A curve over time with its look."""
 
@@ -44,18 +36,21 @@ class Series(NamedTuple):
     look: Look
 
 
-def motion(run: Motion, horizon: float | None = None) -> Panels:
-    """Angles, then rates; the rotor has axes of its own: beside pitches of many turns it is a flat line."""
+def motion(time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None) -> Panels:
+    """Angles (rad), then rates (rad/s), both (n, coordinates); either may be missing.
+
+    The rotor has axes of its own: beside pitches of many turns it is a flat line.
+    """
     drawn: list[tuple[str, Array, int]] = []
-    for name, values in (("angle (rad)", run.angles), ("rate (rad/s)", run.rates)):
+    for name, values in (("angle (rad)", angles), ("rate (rad/s)", rates)):
         if values is not None:
             drawn.append((f"rotor {name}", values[:, :1], 0))
             if values.shape[1] > 1:
                 drawn.append((f"pitch {name}", values[:, 1:], 1))
     panels = canvas.panels(tuple(1.45 if first else 1.1 for _, _, first in drawn), TIME_AXIS)
     for axes, (label, values, first) in zip(panels.axes, drawn, strict=True):
-        draw_coordinates(axes, run.time, values, label, first)
-        mark_time(axes, float(run.time[-1]), horizon)
+        draw_coordinates(axes, time, values, label, first)
+        mark_time(axes, float(time[-1]), horizon)
     return panels
 
 

@@ -30,10 +30,8 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
     _front(axes, drawn)
     for curve, (errors, seconds) in zip(curves, drawn, strict=True):
         style = look_of(curve.name)
-        axes.plot(
-            np.maximum(errors, _LOWEST_ERROR), seconds, color=style.colour, linestyle=style.line,
-            marker=style.marker, markersize=3.0 if small else 4.2, markerfacecolor="white", linewidth=1.0,
-        )  # fmt: skip
+        shown = np.maximum(errors, _LOWEST_ERROR)
+        canvas.curve(axes, shown, seconds, style, 1.0, markersize=3.0 if small else 4.2)
         if not with_setup and not small:
             _whiskers(axes, curve, style)
         _rail(axes, curve, style, with_setup)
