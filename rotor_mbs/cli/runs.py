@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
+import threading
 import time
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from rotor_mbs.analysis.run_tables import run_table
@@ -71,10 +73,12 @@ def reproduce(arguments: argparse.Namespace) -> int:
 
 
 def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> int:
-    from rotor_mbs.report.build import write_report
-
+    # The code of the pages is loaded while this process waits for the runs.
+    threading.Thread(target=import_module, args=("rotor_mbs.report.build",)).start()
     with ProgressLine(parts=_REPRODUCE_PARTS) as progress:
         report = reproduce_paper(results, workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress)
+        from rotor_mbs.report.build import write_report
+
         write_report(results, pages, arguments.jobs, partial(progress.stage, "pages and figures"))
     return print_summary(report, results)
 

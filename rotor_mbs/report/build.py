@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
-
-from numpy.typing import NDArray
 
 from rotor_mbs.analysis import errata as errata_analysis
 from rotor_mbs.analysis import published, run_selection
@@ -45,8 +42,7 @@ from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.report.paper_figures import PaperFigure, available
-from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene, is_sweep, open_results
+from rotor_mbs.store.read import OpenResults, in_memory, is_sweep, open_results
 from rotor_mbs.store.records import read_records
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
@@ -70,7 +66,7 @@ def write_report(
     if is_sweep(results):
         return write_page(output, "sweep", sweep_page(StoredSweep(results)))
     with open_results(results) as opened:
-        pages = _pages(_in_memory(opened), jobs, on_page, checked)
+        pages = _pages(in_memory(opened), jobs, on_page, checked)
     write_pages(output, pages)
     return output / INDEX
 
@@ -100,7 +96,7 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
         pages |= stability_pages(opened, INDEX, site)
     elif has_runs:
         pages |= _run_pages(opened, site, figures, jobs, on_page)
-    if bench:
+    if bench and names[BENCH] not in pages:
         pages |= bench_pages(opened, names[BENCH], site)
     if modes:
         page = modes_page(list(read_modes(opened.path).values()))
@@ -118,36 +114,13 @@ def _has_errata(opened: OpenResults) -> bool:
     return bool(errata_analysis.entries(opened)) or any(printed & {*one.runs} for one in opened.scenes.values())
 
 
-class _ReadOnce(StoredRun):
-    """A run whose arrays stay in memory: the pages ask for each of them some six times."""
-
-    @cached_property
-    def _known(self) -> dict[str, NDArray[Any]]:
-        return {}
-
-    def array(self, name: str) -> NDArray[Any]:
-        if name not in self._known:
-            self._known[name] = super().array(name)
-        return self._known[name]
-
-
-def _in_memory(opened: OpenResults) -> OpenResults:
-    """The file with its scenes in order, and with arrays that are read once."""
-
-    def read_once(scene: StoredScene) -> StoredScene:
-        runs = {name: _ReadOnce(*(getattr(run, one.name) for one in fields(run))) for name, run in scene.runs.items()}
-        return replace(scene, runs=dict(runs))
-
-    return replace(opened, scenes={name: read_once(opened.scenes[name]) for name in natural_order(opened.scenes)})
-
-
 def _run_pages(
     opened: OpenResults, site: Site, figures: Sequence[PaperFigure], jobs: int, on_page: OnPage
 ) -> dict[str, str]:
-    """The index, errata, figures one by one, and a page per scene."""
+    """The index, errata, error against run time, figures one by one, and a page per scene."""
     if not opened.scenes:
         raise StoreError(f"{opened.path}: no scene in it, nothing to report")
-    decided, has_errata = claims(opened.scenes), ERRATA in dict(site)
+    decided = claims(opened.scenes)
     context = Context(
         opened.path,
         page_names(opened.scenes),
@@ -155,24 +128,26 @@ def _run_pages(
         published.conditions() if decided else {},
         stored_claims(opened) if decided else None,
         by_scene(read_records(opened.path, "bench")),
-        published.errata() if has_errata else (),
+        published.errata() if ERRATA in dict(site) else (),
         site,
     )
-    files = [Path(INDEX), *([Path(ERRATA)] if has_errata else [])]
-    parts = _parts(context, [*files, *context.files, *figures], jobs, on_page)
-    pages = {file.name: str(parts[file]) for file in files}
-    pages |= {file: str(parts[scene]) for scene, file in context.files.items()}
+    made: list[Part] = [Path(file) for file in (INDEX, ERRATA, BENCH) if file in dict(site)]
+    made += context.files
+    parts = _parts(context, [*made, *figures], jobs, on_page)
+    pages: dict[str, str] = {}
+    for part in made:
+        pages |= parts[part]
     if figures:
         pages[WALK] = render("walk", {"figures": [parts[figure] for figure in figures]}, site, WALK)
     return pages
 
 
-def _parts(context: Context, parts: Sequence[Part], jobs: int, on_page: OnPage) -> dict[Part, object]:
+def _parts(context: Context, parts: Sequence[Part], jobs: int, on_page: OnPage) -> dict[Part, Any]:
     """The parts, in `jobs` processes (in this one where it is 1)."""
     workers = min(jobs, len(parts))
     # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
     count = _GROUPS * workers if workers > 1 else 1
-    groups, found = [parts[start::count] for start in range(count)], dict[Part, object]()
+    groups, found = [parts[start::count] for start in range(count)], dict[Part, Any]()
     on_page(0, len(parts))
     for finished in run_tasks(partial(make_parts, context), groups, workers if count > 1 else 0, _TIMEOUT_S):
         if finished.value is None:
@@ -182,18 +157,22 @@ def _parts(context: Context, parts: Sequence[Part], jobs: int, on_page: OnPage) 
     return found
 
 
-def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, object]:
+def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, Any]:
     """The task of a worker: pages, and the content of figures. Raises StoreError."""
     with open_results(context.results) as file:
-        opened = _in_memory(file)
+        opened = in_memory(file)
         return {part: _part(context, opened, part) for part in parts}
 
 
-def _part(context: Context, opened: OpenResults, part: Part) -> object:
+def _part(context: Context, opened: OpenResults, part: Part) -> Any:
+    """Pages by file name, or what the page of figures takes of one."""
+    site = context.site
     if isinstance(part, PaperFigure):
         return walk_figure(part, opened.scenes, context)
     if part == Path(INDEX):
-        return render("index", index_page(opened, context), context.site, INDEX)
-    if isinstance(part, Path):
-        return render("errata", errata_page(opened, context), context.site, ERRATA)
-    return render("scene", scene_page(opened.scenes[part], context), context.site)
+        return {INDEX: render("index", index_page(opened, context), site, INDEX)}
+    if part == Path(ERRATA):
+        return {ERRATA: render("errata", errata_page(opened, context), site, ERRATA)}
+    if part == Path(BENCH):
+        return bench_pages(opened, BENCH, site)
+    return {context.files[str(part)]: render("scene", scene_page(opened.scenes[str(part)], context), site)}

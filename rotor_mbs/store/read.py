@@ -6,7 +6,7 @@ import functools
 import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
+from rotor_mbs.scenario.catalogue import RESERVED_GROUPS, natural_order
 from rotor_mbs.store import digests, hdf5
 from rotor_mbs.store.layout import SWEEP_IDENTITY, key_of
 
@@ -141,6 +141,29 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
             scenes = {scene.name: scene for scene in _scenes(file, "", verify, {hdf5.address(file)})}
             attributes = hdf5.attributes_of(file)
         yield OpenResults(path, attributes, scenes, file)
+
+
+class _ReadOnce(StoredRun):
+    """A run whose arrays stay in memory: claims and pages ask for each of them some six times."""
+
+    @functools.cached_property
+    def _known(self) -> dict[str, NDArray[Any]]:
+        return {}
+
+    def array(self, name: str) -> NDArray[Any]:
+        if name not in self._known:
+            self._known[name] = super().array(name)
+        return self._known[name]
+
+
+def in_memory(opened: OpenResults) -> OpenResults:
+    """An open file with its scenes in order, and with arrays that are read once."""
+
+    def read_once(scene: StoredScene) -> StoredScene:
+        runs = {name: _ReadOnce(*(getattr(run, one.name) for one in fields(run))) for name, run in scene.runs.items()}
+        return replace(scene, runs=dict(runs))
+
+    return replace(opened, scenes={name: read_once(opened.scenes[name]) for name in natural_order(opened.scenes)})
 
 
 def is_sweep(path: Path) -> bool:

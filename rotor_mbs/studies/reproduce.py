@@ -27,7 +27,7 @@ from rotor_mbs.methods.catalogue import default_methods, errata_methods, ladders
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
-from rotor_mbs.store.read import open_results
+from rotor_mbs.store.read import in_memory, open_results
 from rotor_mbs.store.records import write_records
 from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench import BENCH, SOURCES, Measured, curve_record, facts_of, points_of, store_curve
@@ -69,7 +69,8 @@ def made_from(results: Path, timeout_s: float) -> str:
 
 def summary_of(path: Path) -> str:
     """Numbers and claims of the paper, and a line for each method over all its scenes."""
-    with open_results(path) as results:
+    with open_results(path) as file:
+        results = in_memory(file)
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
         study = stored_claims(results)
         facts = finding(results.scenes, claims(results.scenes))
