@@ -47,6 +47,15 @@ def file(text: str) -> Path:
     return found
 
 
+def folder(text: str) -> Path:
+    """Where files are to be written: a folder that is there, or that can be made."""
+    found = path(text)
+    there = next((one for one in (found, *found.parents) if one.exists()), found)
+    if not (there.is_dir() and os.access(there, os.W_OK)):
+        raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a folder that can be written")
+    return found
+
+
 def _short(text: str) -> str:
     return ascii(text if len(text) <= 80 else f"{text[:77]}...")
 

@@ -16,6 +16,7 @@ from rotor_mbs.cli.argument_values import (
     SECONDS,
     default_results,
     file,
+    folder,
     part,
     path,
     setting,
@@ -80,7 +81,7 @@ _SET = _argument("--set", action="append", type=setting, metavar="NAME=VALUE",
                       "(see rotor-mbs show METHOD)")
 _JOBS = _argument("-j", "--jobs", type=COUNT, default=cores(), metavar="N",
                   help="parallel processes (default: the cores, %(default)s)")
-_REPORT = _argument("--report", type=path, metavar="DIR", help=f"its pages {_PAGES}")
+_REPORT = _argument("--report", type=folder, metavar="DIR", help=f"its pages {_PAGES}")
 _SOME_SCENES = _argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
 
 _COMMANDS = (
@@ -95,7 +96,7 @@ _COMMANDS = (
         _argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet"),
     )),
     Command("reproduce", "every scene of the paper by every model, and the report", "runs:reproduce",
-            ("", "-o out -j 4"), (_output(path, "DIR", REPRODUCED), _JOBS, _timeout())),
+            ("", "-o out -j 4"), (_output(folder, "DIR", REPRODUCED), _JOBS, _timeout())),
     Command("run", "scenes by methods, into one results file", "runs:run",
             ("my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3"),
             (_SOME_SCENES, _method(), _SET, _output(file, "FILE", Path("results.h5")), _JOBS, _timeout())),
@@ -108,7 +109,7 @@ _COMMANDS = (
                   help="column, unit, sign, zero of each channel (default: guessed)"),
         _argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X",
                   help="rad per unit of error growth that still agree (default: %(default)g)"),
-        _output(Path, "DIR", Path("comparison"), "of the page (default: %(default)s)"),
+        _output(folder, "DIR", Path("comparison"), "of the page (default: %(default)s)"),
         _flag("--json", help="the verdict as JSON, for a script"),
     )),
     Command("bench", "error against run time, method by method", "studies:bench",
@@ -202,13 +203,13 @@ _COMMANDS = (
     )),
     Command("report", "HTML pages from any file of this program", "reports:report", ("my.h5 --open",), (
         *_RESULTS,
-        _output(path, "DIR", help=_PAGES),
+        _output(folder, "DIR", help=_PAGES),
         _flag("--open", help="show the index in the browser"),
     )),
     Command("figures", "the paper's figures as files for a manuscript, from a results file", "reports:figures",
             ("--format svg --figure 11",), (
         *_RESULTS,
-        _output(path, "DIR", Path("figures")),
+        _output(folder, "DIR", Path("figures")),
         _argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)"),
         _argument("--figure", action="append", metavar="N", help="this one alone; may be repeated"),
     )),

@@ -58,6 +58,8 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
                 return place, divider
             if others and len(fields) - len(others) > nearest[0]:
                 nearest = len(fields) - len(others), f"; line {number} has {others[0][:40]!a}"
+    if any(_is_number(line, decimal_comma=True) for _, line in lines):
+        raise InputError(f"{source}: one column of numbers; allowed: a column of times, and others beside it")
     raise InputError(
         f"{source}: no row of numbers in it{nearest[1]}; allowed: columns of numbers under a line of names"
     )

@@ -50,7 +50,7 @@ def _of_start(scene: Scene) -> Iterator[str]:
 
 
 def _as_degrees(angle: float) -> str:
-    return f'{angle:g} rad are {abs(angle) / _TURN:.1f} turns; degrees? write "deg({angle:g})"'
+    return f'{angle:g} rad are {round(abs(angle) / _TURN, 1):.6g} turns; degrees? write "deg({angle:g})"'
 
 
 def _of_blade(blade: Blade) -> Iterator[str]:

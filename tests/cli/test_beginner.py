@@ -91,6 +91,8 @@ def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_u
     assert line.startswith("bearing.rest (blade 1): 5 rad are 0.8 turns")
     (line,) = doubts(rm.scene("paper/fig11").replace(**{"blade.inertia": [9e7, 9e7, 1e3, 0, 0, 0]}))
     assert line.startswith("blade.inertia: a radius of gyration of 77.5 m")  # sqrt(9e7 / 15000)
+    (line,) = doubts(rm.scene("paper/fig11").replace(**{"initial.angles[0]": 1e100}))
+    assert "1e+100 rad are 1.59155e+99 turns" in line
     for name, _ in list_scenes():
         assert not [line for line in doubts(rm.scene(name)) if "gyration" in line or "rest" in line], name
 

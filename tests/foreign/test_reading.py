@@ -149,6 +149,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "text in numbers": (_write(HEAD + "0,1\n1,two\n2,3\n"), "'two' in column 2; allowed: a number"),
     "nothing": (lambda path: path.touch(), "empty"),
     "names alone": (_write(HEAD), "no row of numbers"),
+    "one column": (_write("rotor\n0\n1\n2\n"), "one column of numbers; allowed: a column of times"),
     "no header": (_write("0,1\n1,2\n2,3\n"), "no line of names"),
     "2 GB": (_sparse, "2.0 GB; allowed: up to 0.5 GB"),
     "wrong unit": (_write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"), "'kg'; allowed: rad, deg, turns"),

@@ -167,3 +167,24 @@ def test_a_folder_is_no_output(command: list[str], place: str, capsys: pytest.Ca
     message = capsys.readouterr().err.strip()
     assert "allowed: a file's name, not a folder" in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["compare", "none.csv", "--scene", "paper/fig03", "-o"],
+        ["reproduce", "-o"],
+        ["modes", "paper/fig03", "--report"],
+    ],
+    ids=lambda command: command[0],
+)
+@pytest.mark.parametrize("place", ["there.csv", "there.csv/new"])
+def test_a_file_is_no_folder_for_pages(
+    command: list[str], place: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Refused with the arguments, before anything is read or computed."""
+    (tmp_path / "there.csv").touch()
+    with pytest.raises(SystemExit, match="2"):
+        main([*command, str(tmp_path / place)])
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "allowed: a folder that can be written" in line

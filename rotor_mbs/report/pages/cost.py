@@ -42,11 +42,6 @@ _POINT_COLUMNS = (
     "method", "setting", "angle error (rad)", "at the end (rad)", "tip error (m)", "energy drift", "median",
     "quartiles", "shortest", "set-up", "again", "read-out", "repeats", "steps", "status",
 )  # fmt: skip
-_CSV_COLUMNS = (
-    "setting", "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "run_time_s",
-    "run_time_min_s", "run_time_q1_s", "run_time_q3_s", "setup_time_s", "setup_again_time_s", "output_time_s",
-    "repeats", "steps", "false_success",
-)  # fmt: skip
 
 
 def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
@@ -101,11 +96,12 @@ def _target_text(target: float) -> str:
 def csv_text(curves: Sequence[Record]) -> str:
     """Every point, unrounded, with a heading line; units are those of the results file (s, rad, m)."""
     stream = io.StringIO()
+    columns = [name for name in (curves[0].arrays if curves else ()) if name != "status"]
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["scene", "method", "setting_kind", *_CSV_COLUMNS, "status", "message"])
+    writer.writerow(["scene", "method", "setting_kind", *columns, "status", "message"])
     for curve in curves:
         for i, (status, message) in enumerate(zip(curve.statuses, curve.messages, strict=True)):
-            values = [curve.arrays[column][i].item() for column in _CSV_COLUMNS]
+            values = [curve.arrays[column][i].item() for column in columns]
             writer.writerow([curve.scene, curve.name, curve.attributes["setting_kind"], *values, status, message])
     return stream.getvalue()
 
