@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,9 @@ from rotor_mbs.store.read import OpenResults, open_results
 from rotor_mbs.store.records import Record, read_record, records_in
 
 KIND, SHARES, NUMBERS = "claims", "shares", "numbers"
+# The fields of `Conditions` behind the first as datasets; all of them as attributes, of the usual ones.
+_NUMBERS_OF_CONDITIONS = ("duration", "relative_tolerance", "absolute_tolerance")
+_USUAL = ("usual_row", "usual_duration_s", "usual_relative_tolerance", "usual_absolute_tolerance")
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def _shares(record: Record) -> ClaimShares:
 
 
 def _numbers_record(study: NumberTrials) -> Record:
-    trials, usual = study.trials, study.usual
+    trials = study.trials
     is_rate = {item.id: item.of is not None and item.of.quantity == "rate" for item in published()}
     texts = {
         "numbers": [one.number for one in trials],
@@ -95,39 +98,25 @@ def _numbers_record(study: NumberTrials) -> Record:
         "rows_of_56": [row.name for row in study.rows if row.is_of_56],
     }
     arrays: dict[str, Any] = {
-        "duration": np.array([one.conditions.duration for one in trials]),
-        "relative_tolerance": np.array([one.conditions.relative_tolerance for one in trials]),
-        "absolute_tolerance": np.array([one.conditions.absolute_tolerance for one in trials]),
+        **{name: np.array([getattr(one.conditions, name) for one in trials]) for name in _NUMBERS_OF_CONDITIONS},
         "remainder": np.array([one.remainder for one in trials]),
         "angle": np.array([np.nan if is_rate[one.number] else one.value for one in trials]),
         "rate": np.array([one.value if is_rate[one.number] else np.nan for one in trials]),
         "reproduced": np.array([one.reproduced for one in trials], dtype=np.int8),
     }
-    facts = {
-        "usual_row": usual.gravity_row,
-        "usual_duration_s": usual.duration,
-        "usual_relative_tolerance": usual.relative_tolerance,
-        "usual_absolute_tolerance": usual.absolute_tolerance,
-    }
+    facts = dict(zip(_USUAL, astuple(study.usual), strict=True))
     return Record(KIND, "", NUMBERS, {**facts, **texts}, arrays)
 
 
 def _numbers(record: Record) -> NumberTrials:
     facts, arrays = record.attributes, {name: values.tolist() for name, values in record.arrays.items()}
-    conditions = map(
-        Conditions, facts["gravity_rows"], arrays["duration"], arrays["relative_tolerance"],
-        arrays["absolute_tolerance"],
-    )  # fmt: skip
+    conditions = map(Conditions, facts["gravity_rows"], *(arrays[name] for name in _NUMBERS_OF_CONDITIONS))
     values = [rate if np.isnan(angle) else angle for angle, rate in zip(arrays["angle"], arrays["rate"], strict=True)]
     trials = map(
         NumberTrial, facts["numbers"], conditions, values, map(bool, arrays["reproduced"]), arrays["remainder"]
     )
-    usual = Conditions(
-        facts["usual_row"], facts["usual_duration_s"], facts["usual_relative_tolerance"],
-        facts["usual_absolute_tolerance"],
-    )  # fmt: skip
     rows = [
         GravityRowText(name, formula, name in facts["rows_of_56"])
         for name, formula in zip(facts["row_names"], facts["row_formulas"], strict=True)
     ]
-    return NumberTrials(tuple(trials), usual, tuple(rows))
+    return NumberTrials(tuple(trials), Conditions(*(facts[name] for name in _USUAL)), tuple(rows))

@@ -9,7 +9,7 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.store.read import StoredScene
+from rotor_mbs.store.read import StoredRun, StoredScene
 
 # Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that
 # (3e-7 of the scale at most, on the corrected equations).
@@ -40,7 +40,7 @@ class PrintedEnergy:
 
 @dataclass(frozen=True)
 class Agreement:
-    """A corrected model's largest errors over the scenes.
+    """A method's largest errors over its runs that are ok, and its longest run (s).
 
     angle_error rad up to each horizon, energy_drift relative to the energy scale; None without data.
     """
@@ -49,6 +49,7 @@ class Agreement:
     runs: Tally  # ok, of all
     angle_error: float | None
     energy_drift: float | None
+    longest_s: float
 
 
 @dataclass(frozen=True)
@@ -96,13 +97,23 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
 
 
 def _agreement(scenes: Mapping[str, StoredScene]) -> tuple[Agreement, ...]:
-    names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
-    return tuple(_worst(name, scenes) for name in run_selection.in_catalogue_order(names))
+    return agreement(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values())
 
 
-def _worst(method: str, scenes: Mapping[str, StoredScene]) -> Agreement:
-    runs = [scene.methods[method] for scene in scenes.values() if method in scene.methods]
-    ok = [run for run in runs if run.status == "ok"]
-    errors = [run.attributes["angle_error_max"] for run in ok if "angle_error_max" in run.attributes]
-    drifts = [run.attributes["energy_drift_max"] for run in ok if "energy_drift_max" in run.attributes]
-    return Agreement(method, Tally(len(ok), len(runs)), max(errors, default=None), max(drifts, default=None))
+def agreement(runs: Iterable[StoredRun]) -> tuple[Agreement, ...]:
+    """A row for each method, in the order of the catalogue."""
+    by_method: dict[str, list[StoredRun]] = {}
+    for run in runs:
+        by_method.setdefault(run.method, []).append(run)
+    found = []
+    for method in run_selection.in_catalogue_order(by_method):
+        own = by_method[method]
+        ok = [run for run in own if run.status == "ok"]
+        error, drift = _largest(ok, "angle_error_max"), _largest(ok, "energy_drift_max")
+        longest = _largest(own, "run_time_s") or 0.0
+        found.append(Agreement(method, Tally(len(ok), len(own)), error, drift, longest))
+    return tuple(found)
+
+
+def _largest(runs: Iterable[StoredRun], name: str) -> float | None:
+    return max((float(run.attributes[name]) for run in runs if name in run.attributes), default=None)

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from rotor_mbs.analysis.claim_shares import ClaimShares
-from rotor_mbs.analysis.finding import Finding
-from rotor_mbs.analysis.run_selection import in_catalogue_order
+from rotor_mbs.analysis.finding import Finding, agreement
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.solution.text_table import TextTable
@@ -44,15 +43,10 @@ def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[s
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
     """A row for each method: how many of its runs are ok, and the largest numbers among those."""
-    by_method: dict[str, list[StoredRun]] = {}
-    for run in runs:
-        by_method.setdefault(run.method, []).append(run)
     rows = []
-    for method in in_catalogue_order(by_method):
-        own = by_method[method]
-        ok = [run for run in own if run.status == "ok"]
-        worst = {name: _largest(ok, name) for name in ("angle_error_max", "energy_drift_max")}
-        rows.append(run_row(method, f"{len(ok)} of {len(own)} ok", worst, _largest(own, "run_time_s") or 0.0))
+    for one in agreement(runs):
+        worst = {"angle_error_max": one.angle_error, "energy_drift_max": one.energy_drift}
+        rows.append(run_row(one.method, f"{one.runs.count} of {one.runs.of} ok", worst, one.longest_s))
     return TextTable(("method", "runs", "largest error (rad)", "largest drift", "longest (s)"), rows)
 
 
@@ -97,10 +91,6 @@ def _row(run: StoredRun) -> tuple[str, ...]:
     if run.method == REFERENCE:  # it has no error against itself
         facts = {name: value for name, value in facts.items() if name != "angle_error_max"}
     return run_row(run.method, run.status, facts, None if "frozen_with" in facts else facts.get("run_time_s", 0.0))
-
-
-def _largest(runs: Iterable[StoredRun], name: str) -> float | None:
-    return max((float(run.attributes[name]) for run in runs if name in run.attributes), default=None)
 
 
 def _short(value: object) -> str:

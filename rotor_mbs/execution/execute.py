@@ -111,7 +111,7 @@ def execute(
         made: list[Outcome] = []
         work = sum(case.work for case in missing)
         for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
-            jobs = [Job(case, _part(parts, case.key), _place(case, parts, store, stored)) for case in wave]
+            jobs = [Job(case, parts / f"{case.key}.h5", _place(case, parts, store, stored)) for case in wave]
             for outcome in _outcomes(jobs, run_jobs):
                 done = outcome.case.work + sum(one.case.work for one in made)
                 made.append(replace(outcome, share=done / work))
@@ -179,12 +179,8 @@ def _outcomes(jobs: Sequence[Job], run_jobs: JobRunner) -> Iterator[Outcome]:
         yield Outcome(job.case, result)
 
 
-def _part(parts: Path, key: str) -> Path:
-    return parts / f"{key}.h5"
-
-
 def _place(case: Case, parts: Path, store: Store, stored: AbstractSet[str]) -> Path | None:
     """The file with the record of the case's reference."""
     if not case.reference:
         return None
-    return store.path if case.reference in stored else _part(parts, case.reference)
+    return store.path if case.reference in stored else parts / f"{case.reference}.h5"

@@ -162,8 +162,8 @@ def facts_of(case: Case, short: Scene, reference: Trajectory) -> dict[str, Any]:
 def points_of(ladder: Ladder, interval: float) -> list[Point]:
     """A point per rung, on a scene whose samples are `interval` s apart."""
     return [
-        Point(ladder.curve, ladder.method, i, rung.setting, tuple(sorted(rung.settings.items())))
-        for i, rung in enumerate(ladder.rungs(interval))
+        Point(ladder.curve, ladder.method, rung.setting, tuple(sorted(rung.settings.items())))
+        for rung in ladder.rungs(interval)
     ]
 
 

@@ -39,7 +39,6 @@ class Point:
 
     curve: str
     method: str
-    rung: int
     setting: float
     settings: tuple[tuple[str, object], ...]
 

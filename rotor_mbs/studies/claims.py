@@ -9,7 +9,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -229,12 +229,8 @@ def number_trials(
 
 def perform(task: Trial) -> list[NumberTrial]:
     """The numbers of one run."""
-    settings = {
-        "gravity_row": task.conditions.gravity_row,
-        "relative_tolerance": task.conditions.relative_tolerance,
-        "absolute_tolerance": task.conditions.absolute_tolerance,
-    }
-    run = solve(PRINTED, replace(task.scene, duration=task.conditions.duration), settings).trajectory
+    settings = asdict(task.conditions)
+    run = solve(PRINTED, replace(task.scene, duration=settings.pop("duration")), settings).trajectory
     return [
         trial(item, task.conditions, measure(run, item.of), task.remainder)
         for item in task.items

@@ -100,8 +100,8 @@ def _time_by_study(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
     for study in cost_studies():
         points = {
             job: [
-                Point(job.case.method, job.case.method, i, size, tuple(sorted(job.case.settings.items())))
-                for i, size in enumerate(study.scenes)
+                Point(job.case.method, job.case.method, size, tuple(sorted(job.case.settings.items())))
+                for size in study.scenes
             ]
             for job in jobs
             if job.case.options["kind"] == study.kind

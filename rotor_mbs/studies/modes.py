@@ -224,18 +224,15 @@ def floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
         turn = periodic_turn(scene, speed, turns[-1] if turns and not turns[-1].message else None)
         turns.append(turn)
     turns.reverse()
-    found = [floquet(turn.transition, turn.flow, turn.gradient, turn.speed) for turn in turns]
-    known = [not turn.message for turn in turns]
-    return FloquetTable(
-        speeds,
-        np.array([one.multipliers for one in found]),
-        np.array([one.largest for one in found]),
-        np.array([int(one.is_stable) if ok else -1 for one, ok in zip(found, known, strict=True)]),
-        np.array([_product_error(one, turn) for one, turn in zip(found, turns, strict=True)]),
-        np.array([turn.torque for turn in turns]),
-        np.array([turn.mismatch for turn in turns]),
-        tuple(turn.message for turn in turns),
-    )
+    rows = []
+    for turn in turns:
+        found = floquet(turn.transition, turn.flow, turn.gradient, turn.speed)
+        is_stable = -1 if turn.message else int(found.is_stable)
+        error = _product_error(found, turn)
+        rows.append((found.multipliers, found.largest, is_stable, error, turn.torque, turn.mismatch))
+    multipliers, largest, stable, errors, torques, mismatches = map(np.array, zip(*rows, strict=True))
+    messages = tuple(turn.message for turn in turns)
+    return FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
 
 
 def _product_error(found: Floquet, turn: Turn) -> float:

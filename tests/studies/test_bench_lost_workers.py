@@ -34,7 +34,7 @@ def ask_dying(request: tuple[str, Point]) -> Any:
 
 
 def point(curve: str) -> Point:
-    return Point(curve, "lagrange/ode45", 0, 1e-3, (("absolute_tolerance", 1e-3), ("relative_tolerance", 1e-3)))
+    return Point(curve, "lagrange/ode45", 1e-3, (("absolute_tolerance", 1e-3), ("relative_tolerance", 1e-3)))
 
 
 def _record(rows: list[dict[str, Any]]) -> Record:

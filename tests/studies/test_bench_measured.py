@@ -100,7 +100,7 @@ def measured(point: Point) -> dict[str, Any]:
     return here.judge(point)
 
 
-DOP853 = Point("x", "lagrange/dop853", 0, 1e-5, (("absolute_tolerance", 1e-7), ("relative_tolerance", 1e-5)))
+DOP853 = Point("x", "lagrange/dop853", 1e-5, (("absolute_tolerance", 1e-7), ("relative_tolerance", 1e-5)))
 
 
 def test_a_wrong_sign_moves_the_point_to_the_left(monkeypatch: pytest.MonkeyPatch) -> None:

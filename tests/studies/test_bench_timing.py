@@ -68,7 +68,7 @@ def still(rows: int = SCENE.samples) -> Trajectory:
 
 
 def point(curve: str = "a", rung: int = 0) -> Point:
-    return Point(curve, curve, rung, 0.5**rung, ())
+    return Point(curve, curve, float(rung), ())
 
 
 def timing_process(fake: FakeMethod, monkeypatch: pytest.MonkeyPatch) -> PointTimer:
@@ -151,8 +151,8 @@ def test_a_rung_that_does_not_fit_the_budget_is_told_and_those_after_it_too() ->
     """1, 2, 4 s warm up of the 9 s (three tenths of 30); the next, 8 s, would not fit, nor what comes after it."""
     seconds = {point("a", rung): 2.0**rung for rung in range(6)}
     timings, _ = run_conduct(seconds, budget=30.0)
-    assert [one.rung for one in timings.warm] == [0, 1, 2]
-    assert [one.rung for one in timings.left_out] == [3, 4, 5]
+    assert [one.setting for one in timings.warm] == [0, 1, 2]
+    assert [one.setting for one in timings.left_out] == [3, 4, 5]
     assert timings.left_out[point("a", 3)] == "not run: about 8 s more were not in the budget"
     assert set(timings.times) == set(timings.warm)
 
@@ -162,7 +162,7 @@ def test_a_cheap_ladder_is_not_cut_by_a_dear_one() -> None:
     seconds |= {point("cheap", rung): 0.01 for rung in range(9)}
     timings, _ = run_conduct(seconds, budget=30.0)
     assert sum(one.curve == "cheap" for one in timings.times) == 9
-    assert [one.rung for one in timings.left_out] == [1, 2]
+    assert [one.setting for one in timings.left_out] == [1, 2]
 
 
 def test_a_point_that_never_came_back_is_not_repeated() -> None:
