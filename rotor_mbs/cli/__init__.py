@@ -1,21 +1,30 @@
-"""The command line: the only layer that knows all the others. Loads a command's code when that command is given."""
+"""The command line: the only layer that knows all the others. Loads a command's code when that command is given.
+
+Standard output and standard error are plain: a title or a message that comes from a file may have escape sequences, and
+a closed standard error must not end a batch.
+"""
 
 from __future__ import annotations
 
 import _thread
+import os
 import signal
 import sys
 import threading
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Any, TextIO
 
-from rotor_mbs.cli.streams import drop_what_is_left, plain_streams, show
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, StoreError
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed nothing.
 _ONLY_PRINT = ("list", "show")
+
+# C0 but for tab and line feed, DEL, C1, and the marks that change the direction of writing.
+_CONTROLS = (*range(0x20), *range(0x7F, 0xA0), *range(0x200E, 0x2010), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+_SHOWN = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\t\n"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -94,3 +103,51 @@ def _ended_in_order() -> Iterator[None]:
         sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def printable(text: str) -> str:
+    r"""The text with every control character but tab and line feed as its escape.
+
+    >>> printable("\x1b[2J")
+    '\\x1b[2J'
+    """
+    return text.translate(_SHOWN)
+
+
+class PlainStream:
+    """A text stream that writes control characters as their escapes; `unfiltered` is the stream itself."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.unfiltered = stream
+
+    def write(self, text: str) -> int:
+        self.unfiltered.write(printable(text))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.unfiltered, name)
+
+
+@contextmanager
+def plain_streams() -> Iterator[None]:
+    """In the block, standard output and standard error are plain; one that is closed is a device that takes all."""
+    before = sys.stdout, sys.stderr
+    with ExitStack() as stack:
+        streams: list[TextIO] = [one or stack.enter_context(open(os.devnull, "w")) for one in before]  # noqa: PTH123  (a device)
+        sys.stdout, sys.stderr = (PlainStream(stream) for stream in streams)
+        try:
+            yield
+        finally:
+            sys.stdout, sys.stderr = before
+
+
+def show(text: str, stream: TextIO) -> None:
+    """Prints a line of which nothing depends: where nobody reads it any more, or the disk is full, it is dropped."""
+    with suppress(OSError, ValueError):
+        print(text, file=stream, flush=True)
+
+
+def drop_what_is_left() -> None:
+    """After a failed write: what is still in the buffer must not fail again when the interpreter ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno())  # type: ignore[union-attr]

@@ -6,7 +6,7 @@ import argparse
 import webbrowser
 from pathlib import Path
 
-from rotor_mbs.cli.argument_values import pages_beside
+from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.execution import cores
 
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from rotor_mbs.cli.argument_values import pages_beside
+from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution import cores

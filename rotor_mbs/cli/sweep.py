@@ -10,7 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotor_mbs.cli.streams import show
+from rotor_mbs.cli import show
 from rotor_mbs.cli.terminal import SweepProgress, span
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.execution.dask_cluster import open_task_pool

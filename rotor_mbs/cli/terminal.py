@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TextIO
 
-from rotor_mbs.cli.streams import printable
+from rotor_mbs.cli import printable
 from rotor_mbs.solution.status import STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile

@@ -15,8 +15,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.files import write_page
-from rotor_mbs.report.pages.modes import modes_page
-from rotor_mbs.report.plots import modes as plots
+from rotor_mbs.report.pages import modes as pages
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
@@ -92,7 +91,7 @@ class Modes(SceneModes):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""
-        return write_page(folder, "modes", modes_page([self]))
+        return write_page(folder, "modes", pages.modes_page([self]))
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
@@ -108,26 +107,26 @@ class ModePlots:
     def __call__(self) -> Panels:
         """Campbell diagram: damped frequencies (rad/s) over rotor speed. Raises InputError without speeds."""
         rotation = self._rotation()
-        panels = plots.campbell(rotation)
-        looks = [plots.mode_look(k) for k in range(len(rotation.names))]
+        panels = pages.campbell(rotation)
+        looks = [pages.mode_look(k) for k in range(len(rotation.names))]
         canvas.legend(panels.axes[0], list(zip(rotation.names, looks, strict=True)))
         return panels
 
     def damping(self) -> Panels:
         """Damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
-        return plots.damping(self._rotation())
+        return pages.damping(self._rotation())
 
     def multipliers(self) -> Panels:
         """Moduli of the Floquet multipliers over rotor speed. Raises InputError where there are none."""
         if self._modes.floquet is None:
             raise InputError(f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0")
-        return plots.multipliers(self._modes.floquet)
+        return pages.multipliers(self._modes.floquet)
 
     def chart(self) -> Panels:
         """Growth over a turn over speed and bearing stiffness. Raises InputError where there is none."""
         if self._modes.chart is None:
             raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
-        return plots.chart(self._modes.chart)
+        return pages.chart(self._modes.chart)
 
     def _rotation(self) -> LinearModes:
         for one in self._modes.rotation.values():

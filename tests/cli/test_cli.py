@@ -15,8 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from rotor_mbs.cli.argument_values import pages_beside
-from rotor_mbs.cli.arguments import parse
+from rotor_mbs.cli.arguments import pages_beside, parse
 from rotor_mbs.store.read import open_results
 
 RUN = [sys.executable, "-m", "rotor_mbs"]

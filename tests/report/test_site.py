@@ -15,7 +15,7 @@ from support.sweeps import made_sweep
 
 from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.formulas import matrices
+from rotor_mbs.report.pages.errata import matrices
 from rotor_mbs.report.pages.sweep import distribution, field_name
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.studies.check import judge_file

@@ -14,7 +14,7 @@ from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of
 from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.claim_tables import description_of
-from rotor_mbs.report.pages.error_pictures import angle_difference
+from rotor_mbs.report.pages.quantities import angle_difference
 from rotor_mbs.report.pages.scene_tables import path_table
 from rotor_mbs.report.plots import comparisons, paths
 from rotor_mbs.report.plots.comparisons import VISIBLE, Mark

@@ -1,8 +1,15 @@
-"""The errata page: the errors in print, every entry that was checked, the effect of each erratum on each scene."""
+"""The errata page: the errors in print, every entry that was checked, the effect of each erratum on each scene.
+
+Formulas of the paper's plain notation, "c² m c3² - d s2" with c3 the cosine of q3, and whole matrices are MathML.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from html import escape
+
+from markupsafe import Markup
 
 from rotor_mbs.analysis.errata import Effect, effects
 from rotor_mbs.analysis.errata import entries as checked_entries
@@ -11,9 +18,17 @@ from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages import Context
-from rotor_mbs.report.pages.formulas import matrices
 from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.store.read import OpenResults, StoredScene
+
+_TOKEN = re.compile(
+    r"(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)(?P<square>[²³]?)"
+    r"|(?P<rate>q̇)(?P<rate_index>\d)(?P<rate_square>[²³]?)"
+    r"|(?P<name>[A-Za-zα-ω])(?P<name_square>[²³]?)"
+    r"|(?P<number>\d+(?:/\d+)?)|(?P<sign>[-+=()])|(?P<space>\s+)"
+)
+_POWERS = {"²": "2", "³": "3"}
+_PLACE = re.compile(r"row (\d) column (\d)")
 
 
 def errata_page(opened: OpenResults, context: Context) -> dict[str, object]:
@@ -67,3 +82,68 @@ def _effect_cells(effect: Effect | None) -> Row:
         number(effect.angle_whole),
         prefixed(effect.energy_gain, "J"),
     ]
+
+
+def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, Markup]]:
+    """(equation, its matrix as printed) of those of `equations` that are matrices; entries that differ are marked."""
+    found = []
+    for equation in equations:
+        places = {}
+        for entry in entries:
+            place = _PLACE.fullmatch(entry.entry)
+            if entry.equation == equation and place is not None:
+                places[int(place[1]), int(place[2])] = entry
+        if places:
+            found.append((equation, _matrix(places)))
+    return found
+
+
+def _matrix(places: dict[tuple[int, int], CheckedEntry]) -> Markup:
+    rows, columns = (max(place[axis] for place in places) for axis in (0, 1))
+    lines = []
+    for row in range(1, rows + 1):
+        cells = [_cell(places.get((row, column))) for column in range(1, columns + 1)]
+        lines.append(f"<mtr>{''.join(cells)}</mtr>")
+    return Markup(f"<math display='block'><mtable>{''.join(lines)}</mtable></math>")
+
+
+def _cell(entry: CheckedEntry | None) -> str:
+    """The entry as printed; a faulty one is struck out, with the correct one beside it."""
+    if entry is None:
+        return "<mtd></mtd>"
+    printed, right = (_row(text) or f"<mtext>{escape(text)}</mtext>" for text in (entry.printed, entry.right))
+    if entry.agrees:
+        return f"<mtd>{printed}</mtd>"
+    marked = f'<mrow class="printed">{printed}</mrow><mspace width="0.6em"/><mrow class="right">{right}</mrow>'
+    return f'<mtd class="fault">{marked}</mtd>'
+
+
+def _row(text: str) -> str | None:
+    """MathML of a formula; None where a part of it is not understood."""
+    parts, at = [], 0
+    while at < len(text):
+        found = _TOKEN.match(text, at)
+        if found is None:
+            return None
+        parts.append(_element(found))
+        at = found.end()
+    return "<mrow>" + "".join(parts) + "</mrow>"
+
+
+def _element(found: re.Match[str]) -> str:
+    if found["trig"]:
+        return _power(f"<msub><mi>{found['trig']}</mi><mn>{found['index']}</mn></msub>", found["square"])
+    if found["rate"]:
+        dotted = "<mover><mi>q</mi><mo>˙</mo></mover>"
+        return _power(f"<msub>{dotted}<mn>{found['rate_index']}</mn></msub>", found["rate_square"])
+    if found["name"]:
+        return _power(f"<mi>{found['name']}</mi>", found["name_square"])
+    if found["number"]:
+        return f"<mn>{found['number']}</mn>"
+    if found["sign"]:
+        return f"<mo>{found['sign'].replace('-', '−')}</mo>"
+    return '<mspace width="0.2em"/>'
+
+
+def _power(base: str, sign: str) -> str:
+    return f"<msup>{base}<mn>{_POWERS[sign]}</mn></msup>" if sign else base

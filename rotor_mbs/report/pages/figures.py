@@ -18,7 +18,7 @@ from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, with_u
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.claim_tables import description_of, unit_of
 from rotor_mbs.report.pages.comparison_pictures import parting
-from rotor_mbs.report.pages.error_pictures import angle_difference
+from rotor_mbs.report.pages.quantities import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.report.paper_figures import HEADINGS, PATHS, TORQUES, PaperFigure, compared_runs
 from rotor_mbs.solution.status import COMPLETE

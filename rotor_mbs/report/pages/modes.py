@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence
-from rotor_mbs.analysis.modes import multiblade
+from rotor_mbs.analysis.campbell import FloquetTable, LinearModes, SceneModes, StabilityChart, floquet_sentence
+from rotor_mbs.analysis.modes import GROWTH, multiblade
+from rotor_mbs.report.core.canvas import Panels, curve, growth_map, panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.looks import with_capital
+from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.plots import modes as plots
+
+SPEED_AXIS = "rotor speed (rad/s)"
+# Multiples of the rotor speed drawn as lines: gravity acts once a turn, a tower or yaw error on each blade in turn.
+_HARMONICS = (1, 2, 3, 6)
+_MARKS = ("o", "s", "^", "D", "v", "P", "x")
+# Growth over a turn beyond which the colours of the chart end.
+_MOST_GROWTH = 1e3
 
 
 def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
@@ -63,12 +71,12 @@ def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Sect
     caption = (
         "Campbell diagram: damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
     )
-    drawn = [picture(plots.campbell(rotation), f"{name}-campbell", caption, caption)]
+    drawn = [picture(campbell(rotation), f"{name}-campbell", caption, caption)]
     ratios = rotation.over_speed("damping_ratios")
     if np.nanmax(np.abs(ratios), initial=0.0) > 1e-9 or np.nanmax(rotation.over_speed("growth_rates")) > 1e-9:
         caption = "Damping ratios and growth rates"
-        drawn.append(picture(plots.damping(rotation), f"{name}-damping", caption, caption))
-    legend = [LegendEntry(label, plots.mode_look(k)) for k, label in enumerate(rotation.names)]
+        drawn.append(picture(damping(rotation), f"{name}-damping", caption, caption))
+    legend = [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
     return Section(drawn, legend), fastest
 
 
@@ -126,10 +134,10 @@ def _turning(modes: SceneModes, name: str) -> Section:
     drawn: list[Picture] = []
     if len(table.speeds) > 1 and np.isfinite(table.largest).any():
         caption = "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
-        drawn.append(picture(plots.multipliers(table), f"{name}-multipliers", caption, caption))
+        drawn.append(picture(multipliers(table), f"{name}-multipliers", caption, caption))
     if modes.chart is not None:
         caption = "Stability chart: growth over a turn under gravity, over rotor speed and bearing stiffness"
-        drawn.append(picture(plots.chart(modes.chart), f"{name}-chart", caption, caption))
+        drawn.append(picture(chart(modes.chart), f"{name}-chart", caption, caption))
     rows: list[Row] = [
         [
             number(float(table.speeds[i]), 4),
@@ -144,3 +152,73 @@ def _turning(modes: SceneModes, name: str) -> Section:
     ]
     head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
     return Section(drawn, (), [PageTable(f"{modes.scene}: multipliers", head, rows, (0, 1, 2, 3, 4))])
+
+
+def mode_look(index: int) -> Look:
+    """Line and marker of a mode: equal frequencies lie on each other, so that each mode has its own marker."""
+    look = coordinate_look(index)
+    return Look(look.colour, look.line, _MARKS[index % len(_MARKS)])
+
+
+def campbell(modes: LinearModes) -> Panels:
+    """Damped frequencies (rad/s) over speed above their change since the lowest speed, with multiples of the speed."""
+    panel = panels((2.9, 1.7), SPEED_AXIS)
+    frequencies = modes.over_speed("damped_frequencies")
+    speeds = modes.speeds
+    top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
+    apart = float(speeds[-1]) > 0.05 * top  # else the labels would lie on each other
+    for k in _HARMONICS:
+        panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")
+        if not apart and k != _HARMONICS[-1]:
+            continue
+        end = min(float(speeds[-1]), top / k)
+        panel.axes[0].text(end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
+    for k, known in enumerate(frequencies.T):
+        change = np.where(np.nanmax(known) > 1e-6 * top, known - known[np.flatnonzero(np.isfinite(known))[:1]], np.nan)
+        every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
+        for axes, values in zip(panel.axes, (known, change), strict=True):
+            curve(axes, speeds, values, mode_look(k), markevery=every, markersize=4.0)
+    panel.axes[0].set_ylim(0.0, top)
+    panel.axes[0].set_ylabel("frequency (rad/s)")
+    panel.axes[1].set_ylabel("change (rad/s)")
+    return panel
+
+
+def damping(modes: LinearModes) -> Panels:
+    """Damping ratio and growth rate (1/s) of each mode over speed."""
+    panel = panels((2.0, 2.0), SPEED_AXIS)
+    for axes, name, label in (
+        (panel.axes[0], "damping_ratios", "damping ratio"),
+        (panel.axes[1], "growth_rates", "growth rate (1/s)"),
+    ):
+        for k, values in enumerate(modes.over_speed(name).T):
+            curve(axes, modes.speeds, values, replace(mode_look(k), marker=""))
+        axes.set_ylabel(label)
+    return panel
+
+
+def multipliers(table: FloquetTable) -> Panels:
+    """Modulus of every multiplier over speed on a log scale, with the largest one marked."""
+    panel = panels((2.6,), SPEED_AXIS)
+    axes = panel.axes[0]
+    sizes = np.abs(table.multipliers)
+    shown = np.where(sizes > 0.0, sizes, np.nan)
+    curve(axes, table.speeds, shown, Look(BLUE, "", "o"), markersize=2.0, markerfacecolor=BLUE)
+    curve(axes, table.speeds, table.largest, Look(VERMILLION, "-", ""), 1.5)
+    axes.axhline(1.0, color=GREY, linewidth=0.8)
+    known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+    if len(known) and known.max() / known.min() > 10.0:
+        axes.set_yscale("log")
+    elif len(known) and known.max() / known.min() < 1.0 + 10.0 * GROWTH:
+        axes.set_ylim(0.9, 1.1)
+    axes.set_ylabel("modulus of the multipliers")
+    return panel
+
+
+def chart(found: StabilityChart) -> Panels:
+    """Growth over a turn as colour over speed and stiffness, with the boundary of stability."""
+    panel = panels((3.6,), SPEED_AXIS)
+    label = "growth over a turn (powers of ten)"
+    growth_map(panel, found.speeds, found.stiffnesses, found.largest, _MOST_GROWTH, label, 1.0 + GROWTH)
+    panel.axes[0].set_ylabel("bearing stiffness (N m/rad)")
+    return panel

@@ -1,11 +1,11 @@
-"""Pictures of the stored quantities that say themselves how they are drawn, by their declarations alone.
+"""Pictures over time: errors with a curve per run, and stored quantities as their declarations say.
 
 Those that are judged against the reference, such as loads, are drawn of the reference, beside the others' errors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,12 +17,14 @@ from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Sect
 from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.error_pictures import Curves, Runs, error_picture, run_legend, visible
 from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.time_histories import Array, Series
+from rotor_mbs.report.plots.time_histories import LOWEST, Array, Series
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities
 from rotor_mbs.solution.quantities import sizes as lengths
 from rotor_mbs.store.read import StoredRun, StoredScene
+
+Runs = Mapping[str, StoredRun]
+Curves = dict[str, Series]  # by method
 
 
 class Component(NamedTuple):
@@ -153,3 +155,57 @@ def _extremes(quantity: Quantity, time: Array, parts: Sequence[Component]) -> Pa
         rows.append([f"{one.label} {one.group}".strip(), *cells])
     head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
     return PageTable("Extremes in the reference", head, rows, numeric=(1, 2, 3, 4))
+
+
+def error_picture(
+    curves: Curves, axis: str, name: str, caption: str, horizon: float | None = None, others: Sequence[Series] = (),
+    *, signed: bool = False,
+) -> Picture | None:  # fmt: skip
+    """The curves and `others`, which have no marker; None where there is nothing to draw or to note."""
+    if not curves:
+        return None
+    exact = [label_of(method) for method in curves if method not in visible(curves)]
+    notes = [f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else []
+    sizes = {label_of(method): float(np.abs(one.values).max()) for method, one in curves.items()}
+    largest = "; ".join(f"{label} up to {number(size)}" for label, size in sizes.items())
+    panels = histories.errors([*others, *visible(curves).values()], axis, horizon, signed=signed)
+    return picture(panels, name, caption, f"{caption}, logarithmic axis: {largest}", notes)
+
+
+def visible(curves: Curves) -> Curves:
+    """The curves that a logarithmic axis can show."""
+    return {method: one for method, one in curves.items() if np.abs(one.values).max() > LOWEST}
+
+
+def run_legend(methods: Sequence[str]) -> list[LegendEntry]:
+    """An entry per method, as its error curves are drawn."""
+    return [LegendEntry(label_of(method), look_of(method)) for method in methods]
+
+
+def differences(runs: Runs, reference: StoredRun | None) -> Curves:
+    """Largest angle difference (rad) from the reference over the coordinates, at the samples that both have."""
+    if reference is None or "angles" not in reference or not len(reference.array("time")):
+        return {}
+    gaps = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
+    return {method: Series(reference.array("time")[: len(gap)], gap, look_of(method)) for method, gap in gaps.items()}
+
+
+def angle_difference(one: StoredRun, other: StoredRun) -> Array:
+    """(common samples,) rad: the largest over the coordinates."""
+    n = min(len(one.array("time")), len(other.array("time")))
+    found: Array = np.abs(one.array("angles")[:n] - other.array("angles")[:n]).max(axis=1)
+    return found
+
+
+def energy_picture(runs: Runs, horizon: float | None = None) -> tuple[Picture | None, list[str]]:
+    """Total energy less work, from its start (J), of each run that has it; None without. The methods that are drawn."""
+    curves = {
+        method: Series(run.array("time"), run.array("energy_error"), look_of(method))
+        for method, run in runs.items()
+        if "energy_error" in run
+    }
+    caption = (
+        "Energy that comes from nothing (total energy less work, from its start): filled marks gained, open ones lost"
+    )
+    shown = error_picture(curves, "|energy from nothing| (J)", "energy", caption, horizon, signed=True)
+    return shown, list(visible(curves))

@@ -16,10 +16,9 @@ from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_e
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context, claim_tables, comparison_pictures, error_pictures, scene_tables
+from rotor_mbs.report.pages import Context, claim_tables, comparison_pictures, quantities, scene_tables
 from rotor_mbs.report.pages.cost import cost_section
 from rotor_mbs.report.pages.drive import drive_section
-from rotor_mbs.report.pages.quantities import quantity_sections
 from rotor_mbs.report.pages.scene_tables import metric
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.paper_figures import HEADINGS
@@ -96,7 +95,7 @@ def scene_page(scene: StoredScene, context: Context) -> dict[str, object]:
         "energy": energy_section(drawn),
         "drive": drive_section(scene, drawn.corrected),
         "cost": cost_section(scene, context.curves.get(scene.name, ())),
-        "quantities": quantity_sections(scene, drawn.all, drawn.horizon),
+        "quantities": quantities.quantity_sections(scene, drawn.all, drawn.horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
         "has_horizon": drawn.horizon is not None,
         "previous": pages[place - 1],
@@ -178,11 +177,11 @@ def difference_section(drawn: DrawnRuns) -> Section:
     """Each run's largest angle difference from the reference, and the reference's own uncertainty."""
     reference = drawn.scene.reference
     runs = {name: run for name, run in drawn.all.items() if name != REFERENCE}
-    curves = error_pictures.differences(runs, reference)
+    curves = quantities.differences(runs, reference)
     if not curves or reference is None:
         return Section()
     others, notes = [], []
-    legend = error_pictures.run_legend(list(error_pictures.visible(curves)))
+    legend = quantities.run_legend(list(quantities.visible(curves)))
     time = reference.array("time")
     if "error_growth" in reference:
         growth = np.maximum(np.maximum.accumulate(reference.array("error_growth")), 1.0)
@@ -207,7 +206,7 @@ def difference_section(drawn: DrawnRuns) -> Section:
             known = own[run.array("time") <= (drawn.horizon or np.inf)]
             size = with_unit(float(known.max()), "rad")
             notes.append(f"{label}: uncertain by {size} up to the horizon, by its own estimate.")
-    shown = error_pictures.error_picture(
+    shown = quantities.error_picture(
         curves, "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", drawn.horizon, others,
     )  # fmt: skip
@@ -217,10 +216,10 @@ def difference_section(drawn: DrawnRuns) -> Section:
 def energy_section(drawn: DrawnRuns) -> Section:
     """Energy less work from its start, of every run."""
     runs = {name: run for name, run in drawn.all.items() if "energy_error" in run}
-    shown, methods = error_pictures.energy_picture(runs, drawn.horizon)
+    shown, methods = quantities.energy_picture(runs, drawn.horizon)
     if shown is None:
         return Section()
-    legend = [*error_pictures.run_legend(methods), *_horizon_entry(drawn)]
+    legend = [*quantities.run_legend(methods), *_horizon_entry(drawn)]
     return Section([shown], legend, [scene_tables.energy_table(runs)])
 
 

@@ -14,8 +14,7 @@ from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
 from rotor_mbs.report.core.numbers import number
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import error_pictures
-from rotor_mbs.report.pages.quantities import plotted_quantities, sizes
+from rotor_mbs.report.pages import quantities
 from rotor_mbs.report.pages.scene import motion_of, opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell
 from rotor_mbs.report.plots import time_histories as histories
@@ -202,19 +201,19 @@ def _unresolved(run: StoredRun) -> list[str]:
     return [label for label, a, w in zip(run.labels, ranges, fastest, strict=True) if w * interval > a > 0.0]
 
 
-def _errors(scene: StoredScene, runs: error_pictures.Runs) -> Section:
-    differences = error_pictures.differences(runs, scene.reference)
+def _errors(scene: StoredScene, runs: quantities.Runs) -> Section:
+    differences = quantities.differences(runs, scene.reference)
     caption = "Largest angle difference from the reference"
     kinds = [(differences, "largest angle difference (rad)", "difference", caption, horizon(scene))]
     kinds += [
-        (sizes(quantity, runs), plot.axis, quantity.name, plot.title, None)
-        for quantity, plot in plotted_quantities(scene)
+        (quantities.sizes(quantity, runs), plot.axis, quantity.name, plot.title, None)
+        for quantity, plot in quantities.plotted_quantities(scene)
         if plot.logarithmic
     ]
-    energy, drawn = error_pictures.energy_picture(runs)
-    pictures = [error_pictures.error_picture(*kind) for kind in kinds if error_pictures.visible(kind[0])]
-    drawn += [name for kind in kinds for name in error_pictures.visible(kind[0])]
-    legend = error_pictures.run_legend([name for name in runs if name in drawn])
+    energy, drawn = quantities.energy_picture(runs)
+    pictures = [quantities.error_picture(*kind) for kind in kinds if quantities.visible(kind[0])]
+    drawn += [name for kind in kinds for name in quantities.visible(kind[0])]
+    legend = quantities.run_legend([name for name in runs if name in drawn])
     return Section([one for one in (*pictures, energy) if one is not None], legend)
 
 
@@ -225,4 +224,4 @@ def _error_over_step(ladders: Sequence[Record]) -> Section:
     curves = [(arrays["step"], arrays["angle_error_max"], look_of(name)) for name, arrays in drawn.items()]
     caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
     shown = picture(histories.error_over_step(curves, TARGET), "steps", caption, caption)
-    return Section([shown], error_pictures.run_legend(list(drawn)))
+    return Section([shown], quantities.run_legend(list(drawn)))
