@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeAlias
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.output_lock import RESULTS, writing
-from rotor_mbs.execution.pool import run_tasks
+from rotor_mbs.execution.pool import WorkerPool, run_in
 
 # Statuses of a case of which there is no record: the same call tries it again.
 NOT_COMPUTED = ("worker_died", "error", "no_reference")
@@ -81,7 +81,7 @@ class Store(Protocol):
 
 
 Perform: TypeAlias = Callable[[Job], Result]
-JobRunner: TypeAlias = Callable[[Sequence[Job]], Iterable[tuple[Job, Result]]]
+JobRunner: TypeAlias = Callable[[Iterable[Sequence[Job]]], Iterable[tuple[Job, Result]]]
 OnProgress: TypeAlias = Callable[[int, int, Outcome], None]
 OnTimeOut: TypeAlias = Callable[[Job, str], Result]
 
@@ -98,8 +98,8 @@ def execute(
 ) -> list[Outcome]:
     """The outcomes of the cases that `store` did not have; those that others are compared with come first.
 
-    run_jobs      computes a list of jobs and writes their parts: `in_pool`, or a study's own way (a bench times its
-                  jobs together)
+    run_jobs      computes lists of jobs, each when the one before has ended, and writes their parts: `in_pool`, or a
+                  study's own way (a bench times its jobs together)
     on_progress   called with (cases done, of how many, outcome) after each
 
     Raises InputError where another process is writing the output, StoreError, and what `run_jobs` raises of RotorError.
@@ -110,12 +110,12 @@ def execute(
         missing = _missing(list(cases), stored)
         made: list[Outcome] = []
         work = sum(case.work for case in missing)
-        for wave in ([c for c in missing if not c.reference], [c for c in missing if c.reference]):
-            jobs = [Job(case, parts / f"{case.key}.h5", _place(case, parts, store, stored)) for case in wave]
-            for outcome in _outcomes(jobs, run_jobs):
-                done = outcome.case.work + sum(one.case.work for one in made)
-                made.append(replace(outcome, share=done / work))
-                on_progress(len(made), len(missing), made[-1])
+        jobs = [Job(case, parts / f"{case.key}.h5", _place(case, parts, store, stored)) for case in missing]
+        waves = [[job for job in jobs if bool(job.case.reference) is refers] for refers in (False, True)]
+        for outcome in _outcomes(waves, run_jobs) if jobs else ():
+            done = outcome.case.work + sum(one.case.work for one in made)
+            made.append(replace(outcome, share=done / work))
+            on_progress(len(made), len(missing), made[-1])
         _merge(store, parts, even_none=not store.path.exists())
     return made
 
@@ -137,7 +137,7 @@ def _merge(store: Store, parts: Path, *, even_none: bool = False) -> None:
 
 def compute(cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float) -> Iterator[Outcome]:
     """Outcomes of cases of which nothing is stored, as they come."""
-    return _outcomes([Job(case, Path()) for case in cases], in_pool(perform, workers, timeout_s))
+    return _outcomes([[Job(case, Path()) for case in cases]], in_pool(perform, workers, timeout_s))
 
 
 def in_pool(perform: Perform, workers: int, timeout_s: float, on_time_out: OnTimeOut | None = None) -> JobRunner:
@@ -151,13 +151,18 @@ def in_pool(perform: Perform, workers: int, timeout_s: float, on_time_out: OnTim
     Raises what a job raised of RotorError.
     """
 
-    def run_jobs(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
-        limited = [replace(job, time_limit_s=timeout_s) for job in jobs]
+    def run_jobs(waves: Iterable[Sequence[Job]]) -> Iterator[tuple[Job, Result]]:
+        limited = ([replace(job, time_limit_s=timeout_s) for job in jobs] for jobs in waves)
         if not workers:
-            yield from ((job, perform(job)) for job in limited)
+            yield from ((job, perform(job)) for jobs in limited for job in jobs)
             return
+        with WorkerPool(workers) as pool:
+            for jobs in limited:
+                yield from ends(pool, jobs)
+
+    def ends(pool: WorkerPool, jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
         # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
-        for end in run_tasks(perform, limited, workers, 1.2 * timeout_s + 10.0):
+        for end in run_in(pool, perform, jobs, 1.2 * timeout_s + 10.0):
             if isinstance(end.error, RotorError):
                 raise end.error
             if end.failure == "timed_out" and on_time_out is not None:
@@ -168,15 +173,20 @@ def in_pool(perform: Perform, workers: int, timeout_s: float, on_time_out: OnTim
     return run_jobs
 
 
-def _outcomes(jobs: Sequence[Job], run_jobs: JobRunner) -> Iterator[Outcome]:
-    ready = []
-    for job in jobs:
-        if job.reference is None or job.reference.exists():
-            ready.append(job)
-        else:
-            yield Outcome(job.case, Result("no_reference", "its reference was not computed"))
-    for job, result in run_jobs(ready):
+def _outcomes(waves: Iterable[Sequence[Job]], run_jobs: JobRunner) -> Iterator[Outcome]:
+    lost: list[Job] = []
+
+    def ready() -> Iterator[Sequence[Job]]:
+        for jobs in waves:
+            there: list[Job] = []
+            for job in jobs:
+                (there if job.reference is None or job.reference.exists() else lost).append(job)
+            yield there
+
+    for job, result in run_jobs(ready()):
         yield Outcome(job.case, result)
+    for job in lost:
+        yield Outcome(job.case, Result("no_reference", "its reference was not computed"))
 
 
 def _place(case: Case, parts: Path, store: Store, stored: AbstractSet[str]) -> Path | None:

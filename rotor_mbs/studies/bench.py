@@ -9,9 +9,10 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -116,10 +117,10 @@ def store_curve(job: Job, record: Record) -> Result:
     return Result("ok", counts)
 
 
-def _time_by_scene(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
+def _time_by_scene(waves: Iterable[Sequence[Job]]) -> Iterator[tuple[Job, Result]]:
     """Times, judges and collects every point of the curves of one scene, then of the next."""
     by_scene: dict[str, list[Job]] = {}
-    for job in jobs:
+    for job in chain.from_iterable(waves):
         by_scene.setdefault(job.case.scene.name, []).append(job)
     for own in by_scene.values():
         yield from _measure_scene(own)

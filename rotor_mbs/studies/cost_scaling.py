@@ -7,9 +7,10 @@ sizes are left out likewise.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +97,8 @@ def run_cost_scaling(
     return execute(cases, _time_by_study, ResultsStore(output), on_progress)
 
 
-def _time_by_study(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
+def _time_by_study(waves: Iterable[Sequence[Job]]) -> Iterator[tuple[Job, Result]]:
+    jobs = list(chain.from_iterable(waves))
     for study in cost_studies():
         points = {
             job: [
