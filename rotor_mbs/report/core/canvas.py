@@ -16,6 +16,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -57,7 +58,7 @@ class Panels:
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     """Panels one below the other; heights in inches, that of the top one first. x_label: of the last one."""
-    with style():
+    with style(), _without_ticks():
         figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
         grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
         axes: list[Axes] = []
@@ -69,6 +70,19 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
         height = float(figure.get_figheight())
         figure.subplots_adjust(left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09)
     return Panels(figure, axes)
+
+
+@contextmanager
+def _without_ticks() -> Iterator[None]:
+    """Axes made here have no tick objects before they are drawn; those of a page are not, and these took a quarter."""
+    known = {name: vars(Axis)[name] for name in ("majorTicks", "minorTicks")}
+    try:
+        for name in known:
+            setattr(Axis, name, ())
+        yield
+    finally:
+        for name, made_when_read in known.items():
+            setattr(Axis, name, made_when_read)
 
 
 def print_grid(rows: int, columns: int, height: float) -> Panels:
