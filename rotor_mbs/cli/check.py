@@ -15,15 +15,7 @@ from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.report import verdict_formats
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.studies.check import (
-    check_default_set,
-    check_file,
-    check_speed,
-    default_set,
-    judge_file,
-    judged_runs,
-    regressions,
-)
+from rotor_mbs.studies import check as study
 
 _STANDARD_OUTPUT = Path("-")
 
@@ -32,16 +24,16 @@ def check(arguments: argparse.Namespace) -> int:
     """Judges the file given, or a default set that is computed."""
     bounds = load_bounds(arguments.bounds)
     required = check_names(arguments.require or ())
-    earlier = None if arguments.against is None else judge_file(arguments.against, bounds)
+    earlier = None if arguments.against is None else study.judge_file(arguments.against, bounds)
     if arguments.file is not None:
-        found = check_file(arguments.file, bounds, required)
+        found = study.check_file(arguments.file, bounds, required)
     else:
         with ProgressLine() as progress:
-            found = check_default_set(default_set(), bounds, arguments.jobs, progress)
+            found = study.check_default_set(study.default_set(), bounds, arguments.jobs, progress)
     if arguments.speed:
-        found += check_speed(bounds)
+        found += study.check_speed(bounds)
     if found and earlier is not None:
-        found += regressions(found, earlier, arguments.shrink)
+        found += study.regressions(found, earlier, arguments.shrink)
     _write(arguments, found)
     # With --json - the standard output is the JSON's alone.
     stream = sys.stderr if arguments.json == _STANDARD_OUTPUT else sys.stdout
@@ -52,7 +44,7 @@ def check(arguments: argparse.Namespace) -> int:
         print(verdict_formats.margins(found), file=stream)
     if arguments.github:
         _tell_github(found, stream)
-    runs = ", ".join(f"{count} {method}" for method, count in judged_runs(found).items())
+    runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(found).items())
     print(f"runs judged: {runs or 'none'}", file=stream)
     print(f"{len(found) - len(failed)} passed, {len(failed)} failed", file=stream)
     return 1 if failed or not found else 0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,11 +85,10 @@ def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image
     return (_picture(drawn, i, float(at[i]), factor) for i in range(0, len(at), _PATH_POINTS)), 1.0 / RATE
 
 
-@dataclass(frozen=True)
-class Wires:
-    """A run at equally spaced times, projected, in m.
+class Wires(NamedTuple):
+    """A run at equally spaced times, as points (frames, blades, 2) in m, projected.
 
-    axis, edge, root   (frames, blades, 2): the pitch axis' end, the tip, and the tip's offset at the hub
+    axis, edge, root   the pitch axis' end, the tip, and the tip's offset at the hub
     reach              m from the hub to the farthest tip
     ended              the frame after the last that the run has
     """
@@ -104,12 +103,9 @@ class Wires:
 def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Wires:
     """At the times `at` (s); distances from the pitch axis are drawn `magnified` times."""
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
+    axis, edge, root = (_points(scene, moved, *scales) for scales in ((0.0, 1.0), (magnified, 1.0), (magnified, 0.06)))
     reach = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades)
-    near = np.searchsorted(at, time[-1], side="right")
-    return Wires(
-        _points(scene, moved, 0.0, 1.0), _points(scene, moved, magnified, 1.0), _points(scene, moved, magnified, 0.06),
-        reach, int(near),
-    )  # fmt: skip
+    return Wires(axis, edge, root, reach, int(np.searchsorted(at, time[-1], side="right")))
 
 
 def _points(scene: Scene, angles: Array, across: float, along: float) -> Array:

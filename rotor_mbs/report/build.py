@@ -16,20 +16,8 @@ from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.pool import run_tasks
 from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.report.core.files import (
-    BENCH,
-    CHECK,
-    COMPARISON,
-    ERRATA,
-    INDEX,
-    MODES,
-    WALK,
-    Site,
-    page_names,
-    render,
-    write_page,
-    write_pages,
-)
+from rotor_mbs.report.core import files
+from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.bench import bench_pages
 from rotor_mbs.report.pages.check import check_page
@@ -64,11 +52,11 @@ def write_report(
     report, or where the folder cannot be written.
     """
     if is_sweep(results):
-        return write_page(output, "sweep", sweep_page(StoredSweep(results)))
+        return files.write_page(output, "sweep", sweep_page(StoredSweep(results)))
     with open_results(results) as opened:
         pages = _pages(in_memory(opened), jobs, on_page, checked)
-    write_pages(output, pages)
-    return output / INDEX
+    files.write_pages(output, pages)
+    return output / files.INDEX
 
 
 def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> dict[str, str]:
@@ -78,33 +66,33 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
     is_suite = has_runs and is_stability_suite(opened)
     figures = available(opened.scenes) if has_runs and not is_suite else ()
     has_errata = has_runs and not is_suite and _has_errata(opened)
-    data_files = [f"data--{i + 1}.html" if i else COMPARISON for i in range(len(compared))]
+    data_files = [f"data--{i + 1}.html" if i else files.COMPARISON for i in range(len(compared))]
     kinds = [
-        (has_runs, INDEX, "Stability suite" if is_suite else "Overview"),
-        (bool(figures), WALK, "The paper's figures"),
-        (has_errata, ERRATA, "Errata"),
-        (bool(bench), BENCH, "Error against run time"),
-        (bool(modes), MODES, "Modes"),
+        (has_runs, files.INDEX, "Stability suite" if is_suite else "Overview"),
+        (bool(figures), files.WALK, "The paper's figures"),
+        (has_errata, files.ERRATA, "Errata"),
+        (bool(bench), files.BENCH, "Error against run time"),
+        (bool(modes), files.MODES, "Modes"),
         *((True, file, f"Data against {one.scene}") for file, one in zip(data_files, compared, strict=True)),
-        (has_runs and checked, CHECK, "Accuracy check"),
+        (has_runs and checked, files.CHECK, "Accuracy check"),
     ]
     there = {file: label for has, file, label in kinds if has}
-    names = {file: file if place else INDEX for place, file in enumerate(there)}
+    names = {file: file if place else files.INDEX for place, file in enumerate(there)}
     site = [(names[file], label) for file, label in there.items()]
     pages: dict[str, str] = {}
     if is_suite:
-        pages |= stability_pages(opened, INDEX, site)
+        pages |= stability_pages(opened, files.INDEX, site)
     elif has_runs:
         pages |= _run_pages(opened, site, figures, jobs, on_page)
-    if bench and names[BENCH] not in pages:
-        pages |= bench_pages(opened, names[BENCH], site)
+    if bench and names[files.BENCH] not in pages:
+        pages |= bench_pages(opened, names[files.BENCH], site)
     if modes:
         page = modes_page(list(read_modes(opened.path).values()))
-        pages[names[MODES]] = render("modes", page, site, names[MODES])
+        pages[names[files.MODES]] = render("modes", page, site, names[files.MODES])
     for file, record in zip(data_files, compared, strict=True):
         pages[names[file]] = render("data_comparison", comparison_page(record), site, names[file])
     if has_runs and checked:
-        pages[CHECK] = render("check", check_page(opened.path), site, CHECK)
+        pages[files.CHECK] = render("check", check_page(opened.path), site, files.CHECK)
     return pages
 
 
@@ -128,17 +116,17 @@ def _run_pages(
         published.conditions() if decided else {},
         stored_claims(opened) if decided else None,
         by_scene(read_records(opened.path, "bench")),
-        published.errata() if ERRATA in dict(site) else (),
+        published.errata() if files.ERRATA in dict(site) else (),
         site,
     )
-    made: list[Part] = [Path(file) for file in (INDEX, ERRATA, BENCH) if file in dict(site)]
+    made: list[Part] = [Path(file) for file in (files.INDEX, files.ERRATA, files.BENCH) if file in dict(site)]
     made += context.files
     parts = _parts(context, [*made, *figures], jobs, on_page)
     pages: dict[str, str] = {}
     for part in made:
         pages |= parts[part]
     if figures:
-        pages[WALK] = render("walk", {"figures": [parts[figure] for figure in figures]}, site, WALK)
+        pages[files.WALK] = render("walk", {"figures": [parts[figure] for figure in figures]}, site, files.WALK)
     return pages
 
 
@@ -169,10 +157,10 @@ def _part(context: Context, opened: OpenResults, part: Part) -> Any:
     site = context.site
     if isinstance(part, PaperFigure):
         return walk_figure(part, opened.scenes, context)
-    if part == Path(INDEX):
-        return {INDEX: render("index", index_page(opened, context), site, INDEX)}
-    if part == Path(ERRATA):
-        return {ERRATA: render("errata", errata_page(opened, context), site, ERRATA)}
-    if part == Path(BENCH):
-        return bench_pages(opened, BENCH, site)
+    if part == Path(files.INDEX):
+        return {files.INDEX: render("index", index_page(opened, context), site, files.INDEX)}
+    if part == Path(files.ERRATA):
+        return {files.ERRATA: render("errata", errata_page(opened, context), site, files.ERRATA)}
+    if part == Path(files.BENCH):
+        return bench_pages(opened, files.BENCH, site)
     return {context.files[str(part)]: render("scene", scene_page(opened.scenes[str(part)], context), site)}

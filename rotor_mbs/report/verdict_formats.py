@@ -31,8 +31,8 @@ def line(verdict: Verdict) -> str:
 
 def github(verdict: Verdict) -> str:
     """A workflow command that GitHub shows as an error annotation."""
-    title = f"rotor-mbs {verdict.check} {verdict.scene} {verdict.method}"
-    return f"::error title={_property(title)}::{_data(line(verdict))}"
+    title = _data(printable(f"rotor-mbs {verdict.check} {verdict.scene} {verdict.method}"))
+    return f"::error title={title.replace(':', '%3A').replace(',', '%2C')}::{_data(line(verdict))}"
 
 
 def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
@@ -88,11 +88,6 @@ def badge(verdicts: Sequence[Verdict]) -> str:
 def _data(text: str) -> str:
     """As GitHub's own toolkit escapes the text of a command."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-
-
-def _property(text: str) -> str:
-    """As GitHub's own toolkit escapes a property of a command."""
-    return _data(printable(text)).replace(":", "%3A").replace(",", "%2C")
 
 
 def as_json(verdicts: Sequence[Verdict]) -> str:

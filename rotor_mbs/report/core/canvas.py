@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,11 +98,9 @@ def print_grid(rows: int, columns: int, height: float) -> Panels:
     return Panels(figure, list(made.flat))
 
 
-@contextmanager
-def style(*, for_print: bool = False) -> Iterator[None]:
+def style(*, for_print: bool = False) -> AbstractContextManager[None]:
     """A context in which figures are drawn in the style of the pages, or in that of manuscripts."""
-    with matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE):
-        yield
+    return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
 
 
 def font_file() -> Path:

@@ -132,8 +132,3 @@ class Section:
 def line_entry(label: str, colour: str = GREY, line: str = "-", width: float = 2.0) -> LegendEntry:
     """An entry for a line without a marker."""
     return LegendEntry(label, Look(colour, line, ""), width)
-
-
-def mark_entry(label: str, marker: str) -> LegendEntry:
-    """An entry for a marker without a line."""
-    return LegendEntry(label, Look(GREY, "", marker))

@@ -139,9 +139,8 @@ class _Page:
                 x = right + 30.0 if is_scale else left - 46.0 + 5.0 * (2 * i + 1 - len(lines))
                 turned = f'transform="translate({_short(x)} {_short(0.5 * (top + bottom))})rotate(-90)"'
                 yield f'<text {turned} text-anchor="middle">{escape(line)}</text>'
-        for place, x in (("left", left), ("center", middle)):
-            if axes.get_title(loc=place):
-                yield _words(x, top - 6.0, axes.get_title(loc=place), _ANCHORS[place])
+        if title := axes.get_title(loc="left"):
+            yield _words(left, top - 6.0, title, "start")
 
     def _line(self, line: Any) -> Iterator[str]:
         """A curve, then its markers: one path, which begins at the place of each and goes on in relative steps."""

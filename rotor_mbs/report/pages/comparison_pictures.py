@@ -18,7 +18,7 @@ from rotor_mbs.report.pages.quantities import angle_difference
 from rotor_mbs.report.pages.scene_tables import path_table
 from rotor_mbs.report.plots import comparisons, paths
 from rotor_mbs.report.plots.comparisons import VISIBLE, Mark
-from rotor_mbs.report.plots.time_histories import Series
+from rotor_mbs.report.plots.time_histories import Series, errors
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 _PUBLISHED = 2  # published values at most on one picture
@@ -133,11 +133,11 @@ def tips_section(stored: StoredScene, runs: Mapping[str, StoredRun], horizon: fl
     if len(runs) > 1:
         one, other = runs.values()
         count = min(len(one.array("time")), len(other.array("time")))
-        panels = comparisons.tip_difference(
-            one.array("time")[:count], one.array("tip")[:count], other.array("tip")[:count], horizon
-        )
-        largest = float(np.linalg.norm(one.array("tip")[:count] - other.array("tip")[:count], axis=2).max())
-        caption = f"Distance of each printed tip from the corrected one: up to {prefixed(largest, 'm')}"
+        time = one.array("time")[:count]
+        gaps = np.linalg.norm(one.array("tip")[:count] - other.array("tip")[:count], axis=2)
+        series = [Series(time, np.maximum(gap, 1e-6), coordinate_look(1 + i)) for i, gap in enumerate(gaps.T)]
+        panels = errors(series, "printed − corrected (m)", horizon)
+        caption = f"Distance of each printed tip from the corrected one: up to {prefixed(float(gaps.max()), 'm')}"
         pictures.append(picture(panels, "tip-difference", caption, f"{caption}."))
     ends = [line_entry("blade at the start", line="--"), line_entry("at the end"), line_entry("shaft", width=4)]
     return Section(pictures, [*lines, *ends], [path_table(runs)])

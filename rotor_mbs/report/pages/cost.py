@@ -10,27 +10,9 @@ from itertools import chain
 
 import numpy as np
 
-from rotor_mbs.analysis.work_precision import (
-    TARGETS_RAD,
-    Reach,
-    cost_exponent,
-    fastest,
-    left_out,
-    own_points,
-    reaches,
-    succeeded,
-)
-from rotor_mbs.report.core.elements import (
-    LegendEntry,
-    PageTable,
-    Picture,
-    Row,
-    Section,
-    TableCell,
-    line_entry,
-    mark_entry,
-)
-from rotor_mbs.report.core.looks import label_of, look_of
+from rotor_mbs.analysis import work_precision
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
+from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import method_cell, status_text
@@ -46,7 +28,7 @@ _POINT_COLUMNS = (
 
 def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
     """The curves measured on the scene, else its own runs, a point each; empty where no run has an error."""
-    known = [*curves] or own_points(scene)
+    known = [*curves] or work_precision.own_points(scene)
     shown = cost_picture(known, f"Error against run time, {scene.name}")
     if shown is None:
         return Section()
@@ -58,7 +40,7 @@ def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
 
 def cost_picture(curves: Sequence[Record], caption: str) -> Picture | None:
     """The diagram; None where no point stands on it."""
-    if not any(succeeded(curve).any() for curve in curves):
+    if not any(work_precision.succeeded(curve).any() for curve in curves):
         return None
     described = f"{caption}. {cheapest(curves)}"
     return picture(diagram(curves, height=3.4), "cost", f"{caption}: the lower right corner is best", described)
@@ -68,8 +50,8 @@ def cost_legend(curves: Sequence[Record]) -> list[LegendEntry]:
     """Methods, front, failed points and uncertainty, as far as they are in the diagram."""
     entries = [LegendEntry(label_of(curve.name), look_of(curve.name)) for curve in curves]
     entries.append(line_entry("best of all (Pareto front)", FRONT_COLOUR, width=6.0))
-    if any(not succeeded(curve).all() for curve in curves):
-        entries.append(mark_entry("failed: drawn at its time", "x"))
+    if any(not work_precision.succeeded(curve).all() for curve in curves):
+        entries.append(LegendEntry("failed: drawn at its time", Look(GREY, "", "x")))
     if has_visible_uncertainty(curves):
         entries.append(line_entry("uncertainty of the reference", width=8.0))
     return entries
@@ -78,8 +60,8 @@ def cost_legend(curves: Sequence[Record]) -> list[LegendEntry]:
 def cheapest(curves: Sequence[Record]) -> str:
     """ "Cheapest within 10⁻³ rad: closed form, Taylor (lagrange/taylor), 3 ms; within 10⁻⁶ rad: ..."."""
     parts = []
-    for target in TARGETS_RAD:
-        found = fastest(curves, target)
+    for target in work_precision.TARGETS_RAD:
+        found = work_precision.fastest(curves, target)
         best = "none of these"
         if found:
             curve, reach = found[0]
@@ -108,10 +90,10 @@ def csv_text(curves: Sequence[Record]) -> str:
 
 def reach_table(curves: Sequence[Record]) -> PageTable:
     """A row per curve: time and ratio for each target."""
-    found = reaches(curves)
-    head = ["method", *map(_target_text, TARGETS_RAD)]
+    found = work_precision.reaches(curves)
+    head = ["method", *map(_target_text, work_precision.TARGETS_RAD)]
     rows: list[Row] = [
-        [method_cell(curve.name), *(_reach_cell(curve, found[curve.name][target]) for target in TARGETS_RAD)]
+        [method_cell(curve.name), *(_reach_cell(curve, reach) for reach in found[curve.name].values())]
         for curve in curves
     ]
     caption = (
@@ -122,23 +104,23 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
     return PageTable(caption, head, rows, numeric=range(1, len(head)))
 
 
-def _reach_cell(curve: Record, reach: Reach | None) -> TableCell:
+def _reach_cell(curve: Record, reach: work_precision.Reach | None) -> TableCell:
     """Time and ratio, or whether the method cannot, or was not asked to."""
     if reach is not None:
         return TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
-    count = left_out(curve)
+    count = work_precision.left_out(curve)
     if count:
         return TableCell("not measured", note=f"{count} finer {'setting' if count == 1 else 'settings'} left out")
-    errors = curve.arrays["angle_error_max"][succeeded(curve)]
+    errors = curve.arrays["angle_error_max"][work_precision.succeeded(curve)]
     best = f"{with_unit(float(errors.min()), 'rad')} at best" if len(errors) else "no run is ok"
     return TableCell(NOTHING, note=best)
 
 
 def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, str]) -> PageTable:
     """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
-    head = ["scene", *map(_target_text, TARGETS_RAD)]
+    head = ["scene", *map(_target_text, work_precision.TARGETS_RAD)]
     rows: list[Row] = [
-        [TableCell(scene, href=files[scene]), *(_fastest_cell(curves, target) for target in TARGETS_RAD)]
+        [TableCell(scene, href=files[scene]), *(_fastest_cell(curves, target) for target in work_precision.TARGETS_RAD)]
         for scene, curves in scenes.items()
     ]
     return PageTable(
@@ -147,7 +129,7 @@ def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, s
 
 
 def _fastest_cell(curves: Sequence[Record], target: float) -> TableCell:
-    found, is_cut = fastest(curves, target), any(map(left_out, curves))
+    found, is_cut = work_precision.fastest(curves, target), any(map(work_precision.left_out, curves))
     if not found:
         return TableCell("not measured" if is_cut else NOTHING)
     (first, reach), *others = found
@@ -225,7 +207,7 @@ def scaling_table(curves: Sequence[Record]) -> PageTable:
         ok = np.array([status == "ok" for status in curve.statuses])
         rate = curve.arrays["run_time_s"] / np.array(curve.arrays["simulated_s"])
         at = dict(zip(curve.arrays["setting"][ok].tolist(), rate[ok].tolist(), strict=True))
-        exponent = cost_exponent(curve.arrays["setting"][ok], rate[ok])
+        exponent = work_precision.cost_exponent(curve.arrays["setting"][ok], rate[ok])
         rows.append([method_cell(curve.name), *(prefixed(at.get(size), "s", 3) for size in sizes), number(exponent)])
     caption = "Run time of one simulated second, and the exponent fitted on the larger half of the sizes."
     return PageTable(caption, head, rows, numeric=range(1, len(head)))

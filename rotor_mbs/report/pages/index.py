@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
@@ -21,7 +21,6 @@ from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, st
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import comparisons, paths
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
-from rotor_mbs.store.records import Record
 
 Scenes = Mapping[str, StoredScene]
 # Attributes of a results file that say what made it.
@@ -69,6 +68,8 @@ def _glance(scenes: Scenes, context: Context) -> dict[str, object]:
     benched = next((one for one in context.curves if one in scenes), "")
     tips = next((run for run in reversed(sides) if "tip" in run), None)
     own = [claim for claim in context.claims if name in claim.published.scenes]
+    curves = context.curves.get(benched, ())
+    cost = cost_picture(curves, f"Error against run time of all methods, {benched}")
     described = f"{name}: paths of the tips"
     return {
         "sentences": short_sentences(finding(scenes, context.claims)),
@@ -77,7 +78,7 @@ def _glance(scenes: Scenes, context: Context) -> dict[str, object]:
         "still": None if tips is None else picture(paths.paths(tips.array("tip")), "still", name, described),
         "crest": key_picture(sides, own, horizon(scenes[name]), "crest"),
         "energy": _energy(scenes),
-        "cost": _cost(benched, context.curves.get(benched, ())),
+        "cost": None if cost is None else replace(cost, legend=cost_legend(curves)),
         "heat": heat_map(scenes, context.files),
     }
 
@@ -149,13 +150,6 @@ def _energy(scenes: Scenes) -> Picture | None:
     caption = f"Energy made from nothing: the printed equations, more than a thousandth in {made} of {len(rows)} scenes"
     legend = [LegendEntry(label_of(name), Look(look.colour, "", look.marker)) for name, look in drawn.items()]
     return picture(comparisons.energy_of_scenes(rows), "energy-scenes", caption, f"{caption}.", legend=legend)
-
-
-def _cost(scene: str, curves: Sequence[Record]) -> Picture | None:
-    if not curves:
-        return None
-    shown = cost_picture(curves, f"Error against run time of all methods, {scene}")
-    return None if shown is None else Picture(shown.svg, shown.caption, shown.notes, cost_legend(curves))
 
 
 def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:

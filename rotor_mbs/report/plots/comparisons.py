@@ -15,7 +15,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.core.numbers import power
-from rotor_mbs.report.plots.time_histories import Array, Series, errors, mark_time, set_range, thin
+from rotor_mbs.report.plots.time_histories import Array, Series, mark_time, set_range, thin
 
 VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 _LOWEST = 1e-16  # relative energy at which a mark below it is drawn
@@ -71,13 +71,6 @@ def offsets_over_azimuth(angles: Array, tip: Array, phases: Sequence[float]) -> 
     axes.set(xlim=(0.0, 360.0), ylabel="tip out of plane (mm)")
     canvas.ticks(axes.xaxis, {angle: str(angle) for angle in range(0, 361, 60)})
     return picture
-
-
-def tip_difference(time: Array, printed: Array, corrected: Array, horizon: float | None = None) -> Panels:
-    """Distance (m) of each printed tip from the corrected one, at least 1e-6; both (n, blades, 3) m."""
-    gaps = np.maximum(np.linalg.norm(printed - corrected, axis=2), 1e-6)
-    series = [Series(time, gap, coordinate_look(1 + i)) for i, gap in enumerate(gaps.T)]
-    return errors(series, "printed − corrected (m)", horizon)
 
 
 def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels:
