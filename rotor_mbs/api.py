@@ -35,6 +35,7 @@ from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import StoredRun, StoredScene, is_sweep, open_results
+from rotor_mbs.store.records import records_in
 from rotor_mbs.store.sweep_columns import MISSING
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 
@@ -362,7 +363,8 @@ def open(path: str | os.PathLike[str]) -> ResultsTree | SweepData:
     if is_sweep(file := Path(path)):
         return SweepData(file)
     with open_results(file) as results:
-        return ResultsTree(file, {name: tuple(scene.runs) for name, scene in results.scenes.items()})
+        runs = {name: tuple(scene.runs) for name, scene in results.scenes.items()}
+        return ResultsTree(file, runs, tuple(name for name, _ in records_in(results.root)))
 
 
 @dataclass(frozen=True)
@@ -373,10 +375,12 @@ class ResultsTree(Mapping[str, Run]):
     ----------
     path : of the file, which is open only while something is read.
     scenes : names of the methods (and "reference") by the name of each scene.
+    records : paths of what other studies stored: curves of a bench, modes, comparisons, ...
     """
 
     path: Path
     scenes: Mapping[str, tuple[str, ...]]
+    records: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Run:
         """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
@@ -398,7 +402,10 @@ class ResultsTree(Mapping[str, Run]):
         return need_xarray().open_datatree(self.path)
 
     def __repr__(self) -> str:
-        return "\n".join([f"{self.path}: {len(self.scenes)} scenes, {len(self)} runs", *map("  {}".format, self)])
+        head = f"{self.path}: {len(self.scenes)} scenes, {len(self)} runs"
+        if self.records:
+            head += f", {len(self.records)} records"
+        return "\n".join([head, *map("  {}".format, (*self, *self.records))])
 
 
 def _loaded(scene: StoredScene, stored: StoredRun) -> Run:

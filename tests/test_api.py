@@ -107,6 +107,14 @@ def test_a_comparison_is_saved_opened_and_rendered(study: rm.Comparison, tmp_pat
     assert len(list(index.parent.glob("*.html"))) >= 2
 
 
+def test_a_file_of_records_alone_lists_them(tmp_path: Path) -> None:
+    run = rm.run(rm.scene("paper/fig03").replace(duration=0.1, samples=11), "lagrange/dop853")
+    rm.compare_data({"t": run.time, "rotor": run.angles[:, 0]}, run.scene).save(tmp_path / "c.h5")
+    lines = repr(rm.open(tmp_path / "c.h5")).splitlines()
+    assert lines[0].endswith("c.h5: 0 scenes, 0 runs, 1 records")
+    assert lines[1:] == ["  comparison/paper/fig03/data/trajectory"]
+
+
 def test_notebooks_show_a_table_and_a_drawing(study: rm.Comparison) -> None:
     run = study["lagrange/dop853"]
     html = run._repr_html_()

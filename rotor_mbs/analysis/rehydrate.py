@@ -13,6 +13,7 @@ from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.store.freeze import KEPT
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 
@@ -60,11 +61,9 @@ def rehydrate(stored: StoredScene, run: StoredRun, reference: Trajectory | None 
     if faults and _faults(scene, run, complete=False):  # more is wrong than that the run stops early
         return Rehydrated(scene, None, reference, faults)
     facts = run.attributes
-    engine = Integration(
-        bool(facts.get("engine_success", 0)),
-        str(facts.get("engine_message", "")),
-        out_of_time=run.status == "timed_out" and not facts.get("engine_success", 0),
-    )
+    success = bool(facts.get("engine_success", not faults))  # which a frozen reference does not have
+    out_of_time = run.status == "timed_out" and not success
+    engine = Integration(success, str(facts.get("engine_message", "")), out_of_time=out_of_time)
     found = Solution(scene, run.method, _trajectory(scene, run), engine, run.settings)
     if (method := look_up(run.method)) is not None:
         found.is_corrected, found.bounds = method.is_corrected, method.bounds
@@ -72,10 +71,13 @@ def rehydrate(stored: StoredScene, run: StoredRun, reference: Trajectory | None 
 
 
 def _faults(scene: Scene, run: StoredRun, complete: bool = True) -> list[str]:
-    """complete: every sample must be there; else as many as there are times."""
+    """complete: every sample must be there; else as many as there are times. A frozen reference need not have what
+    follows from its angles and rates."""
     rows = scene.samples if complete or "time" not in run else len(run.array("time"))
     expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
     for quantity in quantities(scene.outputs):
+        if "frozen_with" in run.attributes and quantity.name not in (*KEPT, *run.names):
+            continue
         if quantity.required or (quantity.name == "angle_uncertainty" and run.method == REFERENCE):
             expected[quantity.name] = (rows, *row_shape(quantity, scene))
     return [fault for name, shape in expected.items() if (fault := _fault(run, name, shape))]

@@ -43,6 +43,8 @@ def solve(
                 start = time.perf_counter()
                 integration = solver.integrate()
                 run_times.append(time.perf_counter() - start)
+                if integration.out_of_time:  # another would not be stopped
+                    break
     finally:
         if gc_was_on:
             gc.enable()

@@ -17,7 +17,7 @@ from rotor_mbs.store.write import put_datasets
 
 # What cannot be computed again from angles and rates as precisely, and the scales.
 _SCALES = ("time", "coordinate", "blade", "axis")
-_ARRAYS = (*_SCALES, "angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
+KEPT = (*_SCALES, "angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
 _ATTRIBUTES = ("settings", "steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s", "status")
 
 
@@ -33,7 +33,7 @@ def freeze(source: Path, target: Path, date: str) -> None:
                 continue
             hdf5.put_attributes(hdf5.new_group(file, scene.name), scene.attributes)
             group = hdf5.new_group(file, f"{scene.name}/{REFERENCE}")
-            arrays = {name: reference.array(name) for name in _ARRAYS if name in reference}
+            arrays = {name: reference.array(name) for name in KEPT if name in reference}
             put_datasets(group, arrays, BUILT_IN, reference.labels)
             facts = {name: reference.attributes[name] for name in _ATTRIBUTES}
             made = f"heyoka {results.attributes['heyoka']}, {date}"

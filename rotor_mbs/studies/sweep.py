@@ -20,7 +20,6 @@ from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.pool import Finished, T, TaskPool, run_in
 from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
-from rotor_mbs.models.lagrange.heyoka_adapter import LEAST_LANES
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.solution.status import STATUSES, code_of
@@ -253,9 +252,8 @@ def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.i
 
 
 def _hard_limit(chunk: Chunk) -> float:
-    """When a worker is ended: LEAST_LANES runs go side by side, one such group after the other."""
-    groups = -(-len(chunk.values) // LEAST_LANES)
-    return chunk.time_limit_s * groups + _GRACE_S
+    """When a worker is ended: a method that computes many runs side by side may do so one after the other."""
+    return chunk.time_limit_s * len(chunk.values) + _GRACE_S
 
 
 def _is_ok(plan: SweepPlan, statuses: NDArray[np.int8]) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -281,6 +282,16 @@ def test_where_there_is_no_signal_the_clock_is_read() -> None:
 def test_the_limit_reaches_plain_python() -> None:
     with pytest.raises(OutOfTimeError), time_limit(0.05):
         time.sleep(5.0)
+
+
+def test_a_run_that_was_ended_is_not_repeated() -> None:
+    """Short runs are repeated: the second would not be stopped, and its status would be that of a run without limit."""
+    ended = Integration(False, "ended", out_of_time=True)
+    solver = SimpleNamespace(integrate=lambda: ended, observe=made("lagrange/taylor")[2].replace)
+    method = replace(find_method("lagrange/taylor"), build=lambda *_: solver)
+    found = solve(method, scene("paper/fig05"), {}, repeats=5)
+    assert found.integration.out_of_time
+    assert len(found.run_times_s) == 1
 
 
 def test_who_knows_that_time_is_up_is_not_interrupted_and_the_next_run_starts_afresh() -> None:

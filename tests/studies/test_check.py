@@ -37,7 +37,7 @@ from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.digests import seal
-from rotor_mbs.store.freeze import write_digests
+from rotor_mbs.store.freeze import freeze, write_digests
 from rotor_mbs.studies import check, check_probes
 from rotor_mbs.studies.check_probes import measure, probe, probes
 
@@ -86,6 +86,14 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
     assert {line.split(":")[0] for line in lines[:-2]} == {f"pass {name}" for name in checks}
     for judge in (check.judge_bounds, check.judge_frozen, check.judge_defaults):
         assert not failed(judge(load_bounds()))
+
+
+def test_a_file_of_references_passes(good: Path, tmp_path: Path) -> None:
+    """It has neither tips nor energies, which follow from angles and rates."""
+    freeze(good, tmp_path / "frozen.h5", "2026-01-01")
+    found = judged(tmp_path / "frozen.h5")
+    assert failed(found) == []
+    assert {one.scene for one in found if one.check == "complete"} == set(SCENES)
 
 
 def test_margins_are_a_table_of_seen_bound_and_ratio(good: Path, capsys: pytest.CaptureFixture[str]) -> None:

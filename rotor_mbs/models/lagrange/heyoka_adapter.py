@@ -12,9 +12,6 @@ import numpy as np
 
 from rotor_mbs.errors import MethodRefusal, ResourceError
 
-# Of any processor that the engine runs on. A time limit for a chunk counts on no more.
-LEAST_LANES = 2
-
 _HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-forge elsewhere"
 
 
