@@ -22,12 +22,12 @@ def doubts(scene: Scene) -> list[str]:
 
     >>> from rotor_mbs.scenario.catalogue import find_scenes
     >>> doubts(find_scenes(["paper/fig11"])[0].replace(**{"initial.angles[0]": 30}))
-    ['initial.angles (entry 1): 30 rad are 4.8 turns; degrees? write "deg(30)"']
+    ['initial.angles[0]: 30 rad are 4.8 turns; degrees? write "deg(30)"']
     """
     found = [*_of_start(scene)]
     blades = scene.blades[:1] if len(set(scene.blades)) == 1 else scene.blades
-    for number, blade in enumerate(blades, start=1):
-        where = "blade" if len(blades) == 1 else f"blade {number}"
+    for i, blade in enumerate(blades):
+        where = "blade" if len(blades) == 1 else f"blade[{i}]"
         found += [f"{where}.{line}" for line in _of_blade(blade)]
     if scene.gravity and not _GRAVITY[0] <= scene.gravity <= _GRAVITY[1]:
         found.append(f"gravity: {scene.gravity:g} m/s^2; 9.81 is usual, 0 is none")
@@ -37,16 +37,16 @@ def doubts(scene: Scene) -> list[str]:
 def _of_start(scene: Scene) -> Iterator[str]:
     # Where one is more than a turn, other whole numbers are in degrees, too.
     in_degrees = any(abs(angle) > _TURN for angle in scene.initial_angles)
-    for i, angle in enumerate(scene.initial_angles, start=1):
+    for i, angle in enumerate(scene.initial_angles):
         if abs(angle) > _TURN or (in_degrees and abs(angle) >= 1.0 and angle == round(angle)):
-            yield f"initial.angles (entry {i}): {_as_degrees(angle)}"
+            yield f"initial.angles[{i}]: {_as_degrees(angle)}"
     for blade in range(len(scene.blades)):
         rest = max((value for _, value in scene.pitch_load(blade)[1]), key=abs, default=0.0)
         if abs(rest) > 0.5 * _TURN:
-            yield f"bearing.rest (blade {blade + 1}): {_as_degrees(rest)}"
-    for i, rate in enumerate(scene.initial_rates, start=1):
+            yield f"bearing.rest[{blade}]: {_as_degrees(rest)}"
+    for i, rate in enumerate(scene.initial_rates):
         if abs(rate) > _FASTEST:
-            yield f'initial.rates (entry {i}): {rate:g} rad/s; degrees per second? write "deg({rate:g})"'
+            yield f'initial.rates[{i}]: {rate:g} rad/s; degrees per second? write "deg({rate:g})"'
 
 
 def _as_degrees(angle: float) -> str:

@@ -18,7 +18,7 @@ def load_scene(path: Path | str, name: str | None = None) -> Scene:
     """The scene in the TOML file `path`, under `name`, by default the file's name without its ending.
 
     Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`;
-    entries are counted from 1.
+    entries are counted from 0, as by `Scene.replace`.
     """
     path = Path(path)
     return _scene(*read_toml(path), path.stem if name is None else name, shown_path(path))

@@ -7,6 +7,7 @@ the validation's context (blades, wants_tip, bare_pitches), so that one pass fin
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
@@ -55,19 +56,6 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / max(abs(element) for element in inertia)
     trace = float(np.trace(J))
     return bool(np.linalg.eigvalsh(0.5 * trace * np.eye(3) - J)[0] >= -INERTIA_TOLERANCE * trace)
-
-
-def wrong_times(rows: Sequence[Sequence[float]]) -> str | None:
-    """What is wrong with the times (s) of rows (t, value), or None; two rows with one time are a jump."""
-    times = [row[0] for row in rows]
-    if times[0] < 0.0:
-        return "the first time is below 0"
-    for i in range(1, len(times)):
-        if times[i] < times[i - 1]:
-            return f"the time of row {i + 1} is before that of row {i}"
-        if i > 1 and times[i] == times[i - 2]:
-            return f"rows {i - 1}, {i} and {i + 1} have one time"
-    return None
 
 
 def values_per_sample(blades: int, outputs: Collection[str]) -> int:
@@ -177,9 +165,16 @@ def _as_rows(value: object) -> object:
 
 
 def _goes_forward(rows: list[list[float]]) -> list[list[float]]:
-    wrong = wrong_times(rows)
-    if wrong:
-        raise invalid(wrong)
+    """Raises where the times (s) of rows (t, value) go back; two rows with one time are a jump."""
+    times = [row[0] for row in rows]
+    if times[0] < 0.0:
+        raise invalid("the first time is below 0")
+    for before, time in pairwise(times):
+        if time < before:
+            raise invalid(f"t = {time:g} comes after t = {before:g}")
+    for time, after_next in zip(times, times[2:], strict=False):
+        if time == after_next:
+            raise invalid(f"three rows have t = {time:g}")
     return rows
 
 

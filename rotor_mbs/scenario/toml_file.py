@@ -60,6 +60,21 @@ def shown_path(path: Path) -> str:
     return text if text.isprintable() else ascii(text)
 
 
+def shown_key(path: KeyPath) -> str:
+    """The path as `Scene.replace` and sweeps take it, entries counted from 0; odd names in quotes.
+
+    >>> shown_key(("blade", 1, "centre_of_mass", 2))
+    'blade[1].centre_of_mass[2]'
+    """
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{_shown_name(part)}" for part in path)[1:]
+
+
+def _shown_name(name: str) -> str:
+    if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
+        return name
+    return json.dumps(name if len(name) <= 60 else name[:57] + "...")
+
+
 _TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
 
 

@@ -7,7 +7,6 @@ Importing this module costs 0.1 s (pydantic): it is imported only when a file is
 from __future__ import annotations
 
 import json
-import re
 import unicodedata
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
@@ -18,7 +17,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.scenario.expression import ALLOWED, ExpressionError, evaluate
 from rotor_mbs.scenario.time_table import is_one_table
-from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError, find_lines, line_of
+from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError, find_lines, line_of, shown_key
 
 MAX_NUMBER = 1e300
 MAX_TEXT = 200  # characters
@@ -40,10 +39,7 @@ _WRONG_KINDS = {
     "less_than": "out of range",
     "less_than_equal": "out of range",
 }
-_TABLES = ("blade", "row")  # of keys that have a table over time for each blade, or one for all
-_ENTRY_NAMES = {
-    "blade": ("blade",), "rotor": ("row",), "pitch": _TABLES, "rest": _TABLES, "axis": ("axis",), "bound": ("bound",),
-}  # fmt: skip
+_TABLES = ("pitch", "rest")  # keys that have a table over time for each blade, or one for all
 
 
 class Table(BaseModel):
@@ -128,10 +124,10 @@ Line = Annotated[Text, AfterValidator(_one_line)]
 
 
 def _problem(details: ErrorDetails, tables: Mapping[str, Any], root: type[BaseModel]) -> KeyProblem:
-    path, value, for_all = _in_tables(details["loc"], tables)
+    path, value = _in_tables(details["loc"], tables)
     model, description = _field(details["loc"], root)
     wrong, allowed = _explained(details, model, _shown(value))
-    message = f"{_shown_key(path, for_all=for_all)}: {wrong}; allowed: {allowed or description}"
+    message = f"{shown_key(path)}: {wrong}; allowed: {allowed or description}"
     return KeyProblem(path, message, details["type"] == "extra_forbidden")
 
 
@@ -163,19 +159,19 @@ def _field(loc: KeyPath, root: type[BaseModel]) -> tuple[type[BaseModel], str]:
     return model, (field.description or "") if field else ""
 
 
-def _in_tables(loc: KeyPath, tables: Mapping[str, Any]) -> tuple[KeyPath, object, bool]:
-    """Where in the tables `loc` is, the value that stands there (None where the key is missing), and for_all.
+def _in_tables(loc: KeyPath, tables: Mapping[str, Any]) -> tuple[KeyPath, object]:
+    """Where in the tables `loc` is, and the value that stands there; None where the key is missing.
 
     Left out are the entries of lists that the model made of single values ([blade], a constant torque), and the blade
-    (for_all) where one table over time is for all blades.
+    where one table over time is for all blades.
     """
     path: KeyPath = ()
     here: Any = tables
-    for_all = False
+    left_out = False
     for part in loc:
         if isinstance(part, int) and isinstance(here, list):
-            if not for_all and _ENTRY_NAMES.get(str(path[-1])) == _TABLES and is_one_table(here):
-                for_all = True
+            if not left_out and path[-1] in _TABLES and is_one_table(here):
+                left_out = True
                 continue
             here = here[part]
         elif isinstance(part, str) and isinstance(here, Mapping):
@@ -183,25 +179,7 @@ def _in_tables(loc: KeyPath, tables: Mapping[str, Any]) -> tuple[KeyPath, object
         else:
             continue
         path = (*path, part)
-    return path, here, for_all
-
-
-def _shown_key(path: KeyPath, *, for_all: bool = False) -> str:
-    """'blade.tip (blade 2, entry 3)' for ("blade", 1, "tip", 2): counted from 1, as blades are."""
-    names, numbers, following = [], [], list[str]()
-    for part in path:
-        if isinstance(part, str):
-            names.append(_shown_name(part))
-            following = [name for name in _ENTRY_NAMES.get(part, ()) if not (for_all and name == "blade")]
-        else:
-            numbers.append(f"{following.pop(0) if following else 'entry'} {part + 1}")
-    return f"{'.'.join(names)} ({', '.join(numbers)})" if numbers else ".".join(names)
-
-
-def _shown_name(name: str) -> str:
-    if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
-        return name
-    return json.dumps(name if len(name) <= 60 else name[:57] + "...")
+    return path, here
 
 
 def _shown(value: object) -> str:

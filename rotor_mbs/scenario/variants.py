@@ -17,7 +17,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.scenario.scene_file import scene_tables, scene_toml, validated_scene
 from rotor_mbs.scenario.time_table import is_one_table
-from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError
+from rotor_mbs.scenario.toml_file import KeyPath, KeyProblem, TableError, shown_key
 
 KEY_FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (entries counted from 0)"
 _PART = r"[A-Za-z_][A-Za-z0-9_]{0,59}(?:\[[0-9]{1,6}\])*"
@@ -86,7 +86,7 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
 
 def _check_step(here: Any, path: KeyPath, depth: int) -> None:
     """Raises TableError unless `here` is of the kind that path[depth] needs."""
-    part, shown = path[depth], _shown(path[:depth])
+    part, shown = path[depth], shown_key(path[:depth])
     if isinstance(part, str) and isinstance(here, dict):
         return
     if not isinstance(here, list):
@@ -102,11 +102,6 @@ def _wrong(path: KeyPath, message: str) -> TableError:
 
 def _names(path: KeyPath) -> str:
     return ".".join(part for part in path if isinstance(part, str))
-
-
-def _shown(path: KeyPath) -> str:
-    """ "initial.angles[1]" of ("initial", "angles", 1)."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
 
 
 def replaced_scene(scene: Scene, changes: Mapping[str, object]) -> Scene:

@@ -110,7 +110,7 @@ def test_the_number_of_blades_can_be_changed_with_what_depends_on_it() -> None:
         ("gravity.x", 1.0, "gravity is a single value; allowed: the path"),
         ("a b", 1.0, "'a b' is not the path of a key; allowed: the path"),
         ("blade.mass", -1, "blade.mass: -1 is out of range; allowed: a number above 0"),
-        ("outputs", ["angels"], r"outputs \(entry 1\): \"angels\" is not one of them, perhaps angles"),
+        ("outputs", ["angels"], r"outputs\[0\]: \"angels\" is not one of them, perhaps angles"),
     ],
 )
 def test_an_impossible_change_is_refused_with_its_key(key: str, value: object, message: str) -> None:
