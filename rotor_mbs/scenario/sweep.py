@@ -19,15 +19,14 @@ from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, scenarios_fol
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import scene_tables
 from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
-from rotor_mbs.scenario.sweep_design import Axis, Design
+from rotor_mbs.scenario.sweep_design import DRAWN, Axis, Design
 from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path, toml_value
 from rotor_mbs.scenario.validation import Line, Number, Table, invalid, validate_file
 from rotor_mbs.scenario.variants import KEY_FORM, Variants, is_key, parse_key, unit_of
 
 MAX_COUNT = 10**15  # values of a range; too many runs are reported where they are counted
 MAX_ROWS = 10_000_000
-VARIED = ("values", "linear", "log", "uniform", "normal", "sobol")
-DRAWN = ("uniform", "normal", "sobol")
+VARIED = ("values", "linear", "log", *DRAWN)
 _OF_ONE_SHAPE = ("blades", "samples", "duration")
 # Keys whose rule is an interval of its own: if the ends of an axis keep it, all values between them do.
 _INTERVALS = ("initial", "gravity", "hub", "shaft", "bearing")

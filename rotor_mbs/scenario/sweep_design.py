@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SPLITS = ("train", "validation", "test")
+DRAWN = ("uniform", "normal", "sobol")
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Axis:
 
     @property
     def is_drawn(self) -> bool:
-        return self.kind in ("uniform", "normal", "sobol")
+        return self.kind in DRAWN
 
 
 @dataclass(frozen=True)
@@ -45,12 +46,9 @@ class Design:
     axes: tuple[Axis, ...]
     combine: str
     seed: int
-    _digits: list[list[int]] = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_digits", self._group_axes())
-
-    def _group_axes(self) -> list[list[int]]:
+    @functools.cached_property
+    def _digits(self) -> list[list[int]]:
         """Axes that move together, as lists of axis numbers, slowest first."""
         if self.combine == "zip":
             return [list(range(len(self.axes)))]
@@ -66,7 +64,7 @@ class Design:
     @property
     def count(self) -> int:
         """Rows in all, counted without making one."""
-        return math.prod(self.axes[digit[0]].count for digit in self._digits)
+        return math.prod(self.shape)
 
     @property
     def shape(self) -> tuple[int, ...]:
