@@ -11,6 +11,7 @@ METHODS = {method.name: method for method in methods.METHODS}
 TREE = [name for name in METHODS if name.startswith("exudyn_tree")]
 CHAIN = [name for name in METHODS if name.startswith("exudyn_chain")]
 EXPLICIT = TREE[:3]
+KINDS = ("node", "object", "marker", "load", "sensor")
 
 
 def run(name, scene, **settings):
@@ -18,6 +19,12 @@ def run(name, scene, **settings):
     assert result.integration.success, result.integration.message
     assert len(result.trajectory.time) == scene.samples
     return result.trajectory
+
+
+def engine_counts(solver):
+    """How many nodes, objects, markers, loads and sensors the engine holds."""
+    data = solver.system._mbs.systemData
+    return {kind: getattr(data, f"NumberOf{kind.capitalize()}s")() for kind in KINDS}
 
 
 def energy_error(trajectory):

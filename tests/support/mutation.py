@@ -120,11 +120,12 @@ _TARGETS = (
             "hub_body",
             "_turned",
             "fixed_blade_rotation",
+            "on_body",
         ),
     ),
     # About the common centre of mass, which a change moves to second order alone.
     Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
-    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_torque", "_tip_sensor")),
+    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_torque")),
     Target("multibody", f"{_M}.energy", ("*",)),
     Target("multibody", f"{_M}.moments", ("at", "drives", "moment_on")),
     Target("multibody", f"{_M}.sensor_samples", ("_fields", "_add_energies")),

@@ -9,6 +9,7 @@ import contextlib
 import io
 import os
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.methods.time_limit import message as out_of_time
-from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref
+from rotor_mbs.models.exudyn.blueprint import LISTS, Frame, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration
@@ -56,7 +57,8 @@ class System:
         self._container = _engine.SystemContainer()
         self._mbs = self._container.AddSystem()
         self._numbers: dict[Ref, object] = {}
-        self._of_accelerations = [part.name for part in parts if _reads_accelerations(part)]
+        outputs = {part.name: str(part.parameters["outputVariableType"]) for part in parts if part.kind == "sensor"}
+        self._of_accelerations = [name for name, output in outputs.items() if "Acceleration" in output]
         self._initial_values: dict[str, Array] = {}  # by sensor, where the solver does not know them
         try:
             for part in parts:
@@ -80,11 +82,6 @@ class System:
         if isinstance(value, tuple) and value and isinstance(value[0], Ref):
             return [self._numbers[ref] for ref in value]
         return _TRANSLATIONS[key](value) if key in _TRANSLATIONS else value
-
-    def counts(self) -> dict[str, int]:
-        """How many nodes, objects, markers, loads and sensors the engine holds."""
-        data = self._mbs.systemData
-        return {kind: getattr(data, f"NumberOf{kind.capitalize()}s")() for kind in _KINDS}
 
     def rows(self, sensor: str) -> Array:
         """(n, 1 + k) rows a sensor kept in the last integration: time in s, then its k values."""
@@ -197,10 +194,6 @@ class System:
         return trials
 
 
-def _reads_accelerations(part: Part) -> bool:
-    return part.kind == "sensor" and "Acceleration" in str(part.parameters["outputVariableType"])
-
-
 # Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization costs less than a dense
 # one: its cost grows with their number, that of a dense one with a power of 2.5.
 _SPARSE_FROM = 140
@@ -223,11 +216,8 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     # A step the engine halves by itself leaves the sample times: a fixed step is fixed, or fails.
     integration.adaptiveStep = False
     for path, value in scheme.options.items():
-        *groups, name = path.split(".")
-        target = integration
-        for group in groups:
-            target = getattr(target, group)
-        setattr(target, name, value)
+        group, _, name = path.rpartition(".")
+        setattr(attrgetter(group)(integration) if group else integration, name, value)
     kind = linear_solver(coordinates, constraints)
     settings.linearSolver.solverType = getattr(_engine.LinearSolverType, kind)
     if not constraints and coordinates >= _OLD_JACOBIAN_FROM:
@@ -275,14 +265,8 @@ def _one_line(text: str) -> str:
     return "; ".join(line for line in lines if line)[:300]
 
 
-_KINDS = ("node", "object", "marker", "load", "sensor")
-
 # What the engine wants in its own types, by the name of the argument.
 _TRANSLATIONS: dict[str, Callable[[Any], object]] = {
     "outputVariableType": lambda name: getattr(_engine.OutputVariableType, name),
     "jointTypes": lambda names: [getattr(_engine.JointType, name) for name in names],
-    "jointTransformations": _engine.Matrix3DList,
-    "linkInertiasCOM": _engine.Matrix3DList,
-    "jointOffsets": _engine.Vector3DList,
-    "linkCOMs": _engine.Vector3DList,
-}
+} | {argument: getattr(_engine, name) for argument, name in LISTS.items()}

@@ -10,6 +10,14 @@ from dataclasses import dataclass, field
 
 from rotor_mbs.methods.base import BuiltItem
 
+# Arguments that are lists in the engine's own types, and these types.
+LISTS = {
+    "jointTransformations": "Matrix3DList",
+    "linkInertiasCOM": "Matrix3DList",
+    "jointOffsets": "Vector3DList",
+    "linkCOMs": "Vector3DList",
+}
+
 
 @dataclass(frozen=True)
 class Ref:

@@ -17,9 +17,9 @@ from rotor_mbs.models.exudyn.geometry import (
     ALONG_SHAFT,
     Body,
     blade_body,
-    fixed_blade_rotation,
     hub_body,
     mounting,
+    on_body,
     pitching,
     quaternion,
     quaternion_rate,
@@ -38,12 +38,14 @@ NODES = ("euler_parameters", "rotation_vector")
 
 @dataclass(frozen=True)
 class Placed:
-    """A body at the start: turn about the shaft and pitch in rad, (3,) angular velocity in rad/s, base frame."""
+    """A body at the start: turn about the shaft and pitch in rad; base frame: (3,) axis that it turns about in its
+    bearing, (3,) angular velocity in rad/s."""
 
     name: str
     body: Body
     about_shaft: float
     pitch: float
+    axis: Array
     omega: Array
 
     @property
@@ -55,14 +57,15 @@ class Placed:
 def placed_bodies(scene: Scene) -> list[Placed]:
     """Hub and pitching blades as forward kinematics puts them at the start: positions and velocities fit the joints."""
     rotor, rate = scene.initial_angles[0], scene.initial_rates[0]
-    spin = np.array([0.0, rate, 0.0])
-    out = [Placed("hub", hub_body(scene), rotor, 0.0, spin)]
+    shaft = np.array([0.0, 1.0, 0.0])
+    spin = rate * shaft
+    out = [Placed("hub", hub_body(scene), rotor, 0.0, shaft, spin)]
     for i in pitching(scene):
         pitch, pitch_rate = scene.initial_angles[1 + i], scene.initial_rates[1 + i]
         about_shaft = rotor + scene.phases[i]
         axis = np.array([np.sin(about_shaft), 0.0, np.cos(about_shaft)])
         body = blade_body(scene.blades[i])
-        out.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, spin + pitch_rate * axis))
+        out.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, axis, spin + pitch_rate * axis))
     return out
 
 
@@ -202,17 +205,13 @@ def _sensors(scene: Scene, placed: list[Placed]) -> list[Part]:
         if scene.wants("energy") and each.body.mass:
             out.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=node))
     if scene.wants("tip"):
-        out += [_tip_sensor(scene, blade, placed[0].body) for blade in range(len(scene.blades))]
+        out += [_tip_sensor(scene, blade, placed) for blade in range(len(scene.blades))]
     if scene.wants("loads"):
         out += chain_sensors(scene, placed[0].body)
     return out
 
 
-def _tip_sensor(scene: Scene, blade: int, hub: Body) -> Part:
-    tip = np.array(scene.blades[blade].tip)
-    if blade in pitching(scene):
-        name, point = f"blade {blade + 1}", tip - np.array(scene.blades[blade].centre_of_mass)
-    else:
-        name, point = "hub", fixed_blade_rotation(scene, blade) @ tip - hub.com
-    body = Ref("object", name)
-    return sensor(f"tip {blade + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=list(point))
+def _tip_sensor(scene: Scene, blade: int, placed: list[Placed]) -> Part:
+    number, point = on_body(scene, blade, scene.blades[blade].tip)
+    body, place = Ref("object", placed[number].name), list(point - placed[number].body.com)
+    return sensor(f"tip {blade + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=place)

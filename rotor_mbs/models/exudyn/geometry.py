@@ -7,6 +7,7 @@ pitch about its own z: R_i = Ry(rotor + phase_i) Rz(pitch_i).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,6 +90,14 @@ def pitching(scene: Scene) -> tuple[int, ...]:
 def fixed_blade_rotation(scene: Scene, index: int) -> Array:
     """(3, 3) rotation from hub frame to the frame of a blade fixed at its initial pitch."""
     return mounting(index, len(scene.blades)) @ rotation_z(scene.initial_angles[1 + index])
+
+
+def on_body(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Array]:
+    """Which body a point (3,) m of a blade is on, 0 for the hub, k for the k-th blade that pitches; (3,) m there."""
+    blades = pitching(scene)
+    if index in blades:
+        return 1 + blades.index(index), np.array(point)
+    return 0, fixed_blade_rotation(scene, index) @ np.array(point)
 
 
 def blade_body(blade: Blade) -> Body:

@@ -15,7 +15,7 @@ import numpy as np
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.adapter import Linearized, System
-from rotor_mbs.models.exudyn.geometry import pitching, quaternion
+from rotor_mbs.models.exudyn.geometry import quaternion
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
@@ -95,15 +95,10 @@ def _joint_angles(scene: Scene) -> Array:
 
     A body's coordinates are its position and its Euler parameters p; its angular velocity is 2 (e0 ė - ė0 e + e × ė).
     """
-    bodies = 1 + len(pitching(scene))
-    out = np.zeros((bodies, 7 * bodies))
-    for k in range(bodies):
-        if k == 0:
-            axis, p = np.array([0.0, 1.0, 0.0]), quaternion(scene.initial_angles[0], 0.0)
-        else:
-            blade = pitching(scene)[k - 1]
-            turn = scene.initial_angles[0] + scene.phases[blade]
-            axis, p = np.array([np.sin(turn), 0.0, np.cos(turn)]), quaternion(turn, scene.initial_angles[1 + blade])
+    bodies = chain.placed_bodies(scene)
+    out = np.zeros((len(bodies), 7 * len(bodies)))
+    for k, placed in enumerate(bodies):
+        p = quaternion(placed.about_shaft, placed.pitch)
         spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
-        out[k, 7 * k + 3 : 7 * k + 7] = 2.0 * axis @ spin
+        out[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
     return out

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
-from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, fixed_blade_rotation, mounting, pitching
+from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, fixed_blade_rotation, mounting, on_body, pitching
 from rotor_mbs.models.exudyn.moments import ROTOR, is_driven
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, values_before
@@ -73,11 +73,10 @@ def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
     """What `tree_loads` reads; on_link: (name, output, link, point) -> sensor."""
-    links = pitching(scene)
     found = []
-    for i in range(len(scene.blades)):
-        link, point = 1 + links.index(i) if i in links else 0, _rotation(scene, i) @ scene.blades[i].centre_of_mass
-        found += [on_link(name, output, link, point) for name, output in _motion_outputs(scene, i).items()]
+    for i, blade in enumerate(scene.blades):
+        place = on_body(scene, i, blade.centre_of_mass)
+        found += [on_link(name, output, *place) for name, output in _motion_outputs(scene, i).items()]
     if scene.hub_inertia:
         found.append(on_link("hub spin rate", "AngularAccelerationLocal", 0, np.zeros(3)))
     return found
@@ -90,7 +89,7 @@ def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
         if i in pitching(scene):
             found += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else "")
             continue
-        point = list(_rotation(scene, i) @ scene.blades[i].centre_of_mass - hub.com)
+        point = list(on_body(scene, i, scene.blades[i].centre_of_mass)[1] - hub.com)
         for name, output in _motion_outputs(scene, i).items():
             found.append(sensor(name, "SensorBody", output, bodyNumber=Ref("object", "hub"), localPosition=point))
     return found

@@ -8,14 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
-from rotor_mbs.models.exudyn.geometry import (
-    Body,
-    blade_body,
-    fixed_blade_rotation,
-    hub_body,
-    mounting,
-    pitching,
-)
+from rotor_mbs.models.exudyn.geometry import Body, blade_body, hub_body, mounting, on_body, pitching
 from rotor_mbs.models.exudyn.loads import tree_sensors
 from rotor_mbs.models.exudyn.moments import Loads, Moment, moment_on
 from rotor_mbs.scenario.scene import Scene
@@ -40,7 +33,8 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
         sensor("rates", "SensorNode", "Coordinates_t", "joint rates", nodeNumber=_NODE),
     ]
     if scene.wants("tip"):
-        built += [_tip_sensor(scene, blade) for blade in range(len(scene.blades))]
+        for i, blade in enumerate(scene.blades):
+            built.append(_link_sensor(f"tip {i + 1}", "Position", *on_body(scene, i, blade.tip)))
     if scene.wants("energy"):
         for link, body in enumerate(bodies(scene)):
             built += _energy_sensors(link, body)
@@ -105,15 +99,6 @@ def _torque(name: str, where: str, coordinate: int, moment: Moment, is_fixed: bo
     if not is_fixed:
         load["loadUserFunction"] = moment.scalar
     return [marker, Part("load", name, "LoadCoordinate", load, "constant" if is_fixed else "over time")]
-
-
-def _tip_sensor(scene: Scene, blade: int) -> Part:
-    blades = pitching(scene)
-    if blade in blades:
-        link, point = 1 + blades.index(blade), np.array(scene.blades[blade].tip)
-    else:
-        link, point = 0, fixed_blade_rotation(scene, blade) @ np.array(scene.blades[blade].tip)
-    return _link_sensor(f"tip {blade + 1}", "Position", link, point)
 
 
 def _energy_sensors(link: int, body: Body) -> list[Part]:
