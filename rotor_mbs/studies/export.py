@@ -19,7 +19,7 @@ from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn.script import exudyn_script
 from rotor_mbs.models.lagrange.sympy_text import sympy_text
-from rotor_mbs.models.mujoco.export import mjcf_file
+from rotor_mbs.models.mujoco.mjcf import mjcf_file
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import scene_toml
 from rotor_mbs.solution import quantities

@@ -29,11 +29,12 @@ import numpy as np
 
 from rotor_mbs.methods.base import BuiltItem
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment, Table, constant_value, is_constant, segments
+from rotor_mbs.scenario.time_table import Segment, Table, constant_value, is_constant, segments, steps_and_rows
 
 LEAST = 2e-15  # kg, kg m²
 
 INTEGRATORS = {"rk4": "RK4", "implicitfast": "implicitfast"}
+_FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco/rk4
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: S
 def _possible(moments: list[float]) -> list[float]:
     """Three principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others.
 
-    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.physics`).
+    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.schema`).
     """
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)
@@ -180,3 +181,60 @@ def _possible(moments: list[float]) -> list[float]:
 def numbers(*values: float) -> str:
     """Numbers with all their digits."""
     return " ".join(repr(float(value)) for value in values)
+
+
+def mjcf_file(scene: Scene) -> str:
+    """The MJCF text of a scene, for plain MuJoCo: with its initial state, its loads and something to look at.
+
+    Its time step is a whole part of the sample interval. The keyframe "start" has the initial state and the loads at
+    t = 0. A numeric "segment i" has the time in s from which loads follow it, then each actuator's torque in N m (or
+    rest angle in rad), then each one's slope per s.
+    """
+    spacing = scene.duration / (scene.samples - 1)
+    steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
+    root, has_loads = model(scene, "rk4", spacing / steps), bool(loads_of(scene))
+    root.insert(0, ET.Comment(_header(scene, steps, has_loads)))
+    _add_shapes(root, scene)
+    pieces, moving = load_segments(scene), scene.moving_coordinates
+    if has_loads:
+        custom = ET.SubElement(root, "custom")
+        for number, piece in enumerate(pieces, start=1):
+            data = numbers(piece.start, *piece.values, *piece.slopes)
+            ET.SubElement(custom, "numeric", name=f"segment {number}", data=data)
+    key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="start")
+    key.set("qpos", numbers(*(scene.initial_angles[i] for i in moving)))
+    key.set("qvel", numbers(*(scene.initial_rates[i] for i in moving)))
+    if has_loads:
+        key.set("act", numbers(*pieces[0].values))
+        key.set("ctrl", numbers(*pieces[0].slopes))
+    return text(root)
+
+
+def _header(scene: Scene, steps: int, has_loads: bool) -> str:
+    lines = [
+        scene.title or scene.name,
+        f"SI units, rad. {scene.samples} samples over {scene.duration!r} s, {steps} steps from one to the next.",
+        "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then mj_step(model, data, nstep=...).",
+    ]
+    if has_loads:
+        lines += [
+            "An actuator's activation is its torque in N m, its control the slope of the torque in N m/s. An actuator",
+            '"rest ..." has the rest angle of a spring in rad instead, and the stiffness as its gain.',
+            "At the start of each segment (custom numerics: time, values, slopes) set data.act and data.ctrl to them.",
+            "Where a segment starts between two steps, shorten model.opt.timestep to stop there.",
+        ]
+    lines.append("Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about the centre of mass.")
+    # Two hyphens end a comment.
+    return "\n  " + "\n  ".join(line.replace("--", "- -") for line in lines) + "\n"
+
+
+def _add_shapes(root: ET.Element, scene: Scene) -> None:
+    """A capsule from the hub to each tip, without mass or contact."""
+    reach = max(math.hypot(*blade.tip) for blade in scene.blades)
+    bodies = {body.get("name"): body for body in root.iter("body")}
+    for number, blade in enumerate(scene.blades, start=1):
+        if any(blade.tip):
+            ET.SubElement(
+                bodies[f"blade {number}"], "geom", type="capsule", fromto=numbers(0.0, 0.0, 0.0, *blade.tip),
+                size=numbers(0.01 * reach), mass="0", contype="0", conaffinity="0",
+            )  # fmt: skip
