@@ -75,8 +75,8 @@ EQUIVALENT = {
     r"samples\._put_energies .*2 \* len\(columns\) scaled": "a count beside a count: a millionth more is the same",
     r"tree\._tree .*0\.0 -> ": "the offset of a spring of no stiffness: the rotor's",
     r"judgement\.allowed_of .*and, or in angle is None": "a method has a bound for both or for neither",
-    r"ode_solvers\.right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
-    r"ode_solvers\.right_hand_side .*not any\(\(slope .*: never": "slopes of zero: loads worked out again, the same",
+    r"ode_solvers\._right_hand_side .*isinstance\(state": "plain floats or the array's own: the same numbers",
+    r"ode_solvers\._right_hand_side .*not any\(\(slope .*: never": "slopes of zero: loads worked out again, the same",
     r"ode_solvers\.scipy_integrator .*reached > done: always": "no rows are added to the rows",
     r"ode_solvers\.__init__ .*0\.0 -> |taylor\.build_system .*work_is_integrated\(scene\): always": (
         "the work of constant torques is integrated, too, where it is known from the angles"

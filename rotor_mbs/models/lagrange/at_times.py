@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,23 +11,22 @@ import numpy as np
 
 from rotor_mbs.models.lagrange.closed_form import accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
-from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
+from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import Number, rotor_form
 from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-Equations = Callable[..., list[Number]]  # as `closed_form.accelerations`
 _TAYLOR = 2.0**-52
 _DOP853 = (1e-12, 1e-14)
 
 
-def motion_at(scene: Scene, times: Array, equations: Equations | None = None) -> Trajectory:
+def motion_at(scene: Scene, times: Array, equations: Accelerations = accelerations) -> Trajectory:
     """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early.
 
     equations: in place of the closed form, with its signature; one of `LEFT_OUT`, or of `at_azimuths`
     """
-    if equations is None and is_available():
+    if equations is accelerations and is_available():
         # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
         run = Propagation(scene, build_system(scene), times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)
         run.integrate()
@@ -37,7 +36,7 @@ def motion_at(scene: Scene, times: Array, equations: Equations | None = None) ->
     return solver.observe()
 
 
-def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Equations:
+def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
     """The closed form with each blade at another angle about the shaft than `Scene.phases`: (blades,) rad."""
     form = rotor_form(scene)
     places = [(math.cos(azimuth), math.sin(azimuth)) for azimuth in azimuths]
@@ -54,7 +53,7 @@ def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Equations:
     return lambda angles, rates, _form, *rest: accelerations(angles, rates, turned, *rest)
 
 
-def _sum(*parts: tuple[float, float, float]) -> Equations:
+def _sum(*parts: tuple[float, float, float]) -> Accelerations:
     """The sum of (weight, factor of the rotor's rate, factor of the pitches' rates)."""
 
     def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
@@ -68,7 +67,7 @@ def _sum(*parts: tuple[float, float, float]) -> Equations:
 
 # The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with one kind of rate at a
 # time, and with rates reversed, each kind of product is taken out without another text of the equations.
-LEFT_OUT: Mapping[str, Equations] = {
+LEFT_OUT: Mapping[str, Accelerations] = {
     "Coriolis terms (products of rotor rate and pitch rate)": _sum((1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)),
     "centrifugal terms (square of the rotor rate)": _sum((1.0, 1, 1), (-0.5, 1, 0), (-0.5, -1, 0), (1.0, 0, 0)),
     "terms with products of rates": _sum((0.5, 1, 1), (-0.5, -1, -1), (1.0, 0, 0)),

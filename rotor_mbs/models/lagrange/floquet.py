@@ -170,15 +170,12 @@ class _Variational:
         still = linearize(scene, scene.initial_angles, [0.0] * len(scene.initial_angles), 0.0)
         self._frequency = math.sqrt(np.abs(still.stiffness).max())
 
-    def _most_steps(self, period: float) -> int:
-        return int(_STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi))
-
     def propagate(self, state: Array, torque: float, period: float) -> _End:
         count, integrator = len(state), self._integrator
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0
         integrator.state[:] = np.concatenate([state, np.eye(count, count + 1).ravel(), [0.0]])
-        most = self._most_steps(period)
+        most = int(_STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi))
         message = failure(integrator.propagate_until(period, max_steps=most)[0])
         if "step_limit" in message:
             message = f"no periodic motion found: a turn takes more than {most} steps"

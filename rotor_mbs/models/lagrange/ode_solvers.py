@@ -14,13 +14,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models import ode45 as matlab
 from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
-from rotor_mbs.models.lagrange.parameters import (
-    RotorForm,
-    changing_loads,
-    load_segments,
-    rotor_form,
-    work_is_integrated,
-)
+from rotor_mbs.models.lagrange.parameters import Number, changing_loads, load_segments, rotor_form, work_is_integrated
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
@@ -28,9 +22,7 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 # As closed_form.accelerations
-Accelerations = Callable[..., list[float]]
-
-
+Accelerations = Callable[..., list[Number]]
 # (right-hand side, start, end, state at the start, sample times inside) -> Advance
 Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
@@ -47,10 +39,9 @@ class OdeSolver:
         scene: Scene,
         integrator: Integrator,
         times: Array | None = None,
-        accelerations: Accelerations | None = None,
+        accelerations: Accelerations = closed_form.accelerations,
     ) -> None:
-        self._scene = scene
-        self._accelerations = accelerations
+        self._scene, self._accelerations = scene, accelerations
         self._integrator = integrator
         self._form = rotor_form(scene)
         self._segments = load_segments(scene)
@@ -66,10 +57,29 @@ class OdeSolver:
         return integration
 
     def _advance(self, segment: Segment, state: Array, times: Array) -> Advance:
-        function = right_hand_side(
-            self._scene, self._form, segment, work_unit=self._work_unit, accelerations=self._accelerations
-        )
-        return self._integrator(function, segment.start, segment.end, state, times)
+        return self._integrator(self._right_hand_side(segment), segment.start, segment.end, state, times)
+
+    def _right_hand_side(self, segment: Segment) -> RightHandSide:
+        """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
+        form, work_unit, equations = self._form, self._work_unit, self._accelerations
+        count = 1 + len(form.blades)
+        changing = changing_loads(self._scene)
+        constant = None if any(segment.slopes) else load_values(segment.values)
+
+        def derivative(time: float, state: Sequence[float]) -> list[float]:
+            values = state.tolist() if isinstance(state, np.ndarray) else state
+            angles, rates = values[:count], values[count : 2 * count]
+            loads = constant or load_values(segment.loads_at(time))
+            try:
+                found = equations(angles, rates, form, loads, math.sin, math.cos)
+            except (ZeroDivisionError, ValueError, OverflowError):
+                # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
+                return [math.nan] * len(values)
+            if not work_unit:
+                return [*rates, *found]
+            return [*rates, *found, closed_form.power(rates, form, at_constant_rests(changing, loads)) / work_unit]
+
+        return derivative
 
     def observe(self) -> Trajectory:
         states = self._states.copy()
@@ -91,39 +101,6 @@ def work_unit(scene: Scene) -> float:
     torques = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0)
     size = kinetic + weights + torques
     return 2.0 ** max(math.floor(math.log2(size)), 0) if 0.0 < size < math.inf else 1.0
-
-
-def right_hand_side(
-    scene: Scene,
-    form: RotorForm,
-    segment: Segment,
-    *,
-    work_unit: float = 0.0,
-    accelerations: Accelerations | None = None,
-) -> RightHandSide:
-    """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays.
-
-    work_unit   J, that the work counts in; 0: without the work
-    """
-    equations = accelerations or closed_form.accelerations
-    count = 1 + len(form.blades)
-    changing = changing_loads(scene)
-    constant = None if any(segment.slopes) else load_values(segment.values)
-
-    def derivative(time: float, state: Sequence[float]) -> list[float]:
-        values = state.tolist() if isinstance(state, np.ndarray) else state
-        angles, rates = values[:count], values[count : 2 * count]
-        loads = constant or load_values(segment.loads_at(time))
-        try:
-            found = equations(angles, rates, form, loads, math.sin, math.cos)
-        except (ZeroDivisionError, ValueError, OverflowError):
-            # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
-            return [math.nan] * len(values)
-        if not work_unit:
-            return [*rates, *found]
-        return [*rates, *found, closed_form.power(rates, form, at_constant_rests(changing, loads)) / work_unit]
-
-    return derivative
 
 
 def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: float) -> Integrator:

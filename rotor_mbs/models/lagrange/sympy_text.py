@@ -1,10 +1,12 @@
 """The equations of motion of a scene as the text of a SymPy program, written by the closed form's own energies.
 
-The closed form takes numbers of any kind; here a number is a piece of text. Imports no SymPy.
+The closed form takes numbers of any kind; here a number is a piece of text. The program around them is
+`sympy.py.txt`. Imports no SymPy.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
 from string import Template
 
 from rotor_mbs.models.lagrange import closed_form
@@ -34,7 +36,8 @@ def sympy_text(scene: Scene) -> str:
     dampings = [form.shaft_damping, *(blade.damping for blade in form.blades)]
     moments = [loads.rotor, *loads.pitches]
     forces = [moment - damping * rate for moment, damping, rate in zip(moments, dampings, w, strict=True)]
-    return _PROGRAM.substitute(
+    template = Path(__file__).with_name("sympy.py.txt").read_text(encoding="utf-8")
+    return Template(template).substitute(
         title=(scene.title or scene.name).replace("\n", " "),
         names=", ".join(f"{name}{i}" for name in "qw" for i in moving),
         letters=" ".join(f"{name}{i}" for name in "qw" for i in moving),
@@ -62,39 +65,3 @@ def _over_time(scene: Scene, load: int) -> str:
         return f"sympify({texts[0][0]})"
     parts = [f"({text}, t < {end!r})" for text, end in texts[:-1]] + [f"({texts[-1][0]}, True)"]
     return f"Piecewise({', '.join(parts)})"
-
-
-_PROGRAM = Template("""\
-# $title
-#
-# Equations of motion M(q) a = f(q, w, t) in SI units and rad. Angles, and their rates:
-$legend
-# T, V: kinetic and potential energy, J; Q: moments of torques and dampers, N m; tau: torque on the rotor, N m; tau1,
-# rest1, ...: torque (N m) on pitch 1 and angle (rad) at which its spring is unloaded, where there are such.
-
-from sympy import Matrix, Piecewise, cos, diff, hessian, sin, symbols, sympify
-
-t = symbols("t", real=True)
-$names = symbols("$letters", real=True)
-q, w = [$q], [$w]
-
-$loads
-
-T = $kinetic
-V = $potential
-
-Q = [$forces]
-
-# Lagrange's equations of T - V.
-M = hessian(T, w)
-f = Matrix(
-    [
-        Q[i] + diff(T - V, q[i]) - sum(diff(T, w[i], q[j]) * w[j] for j in range(len(q)))
-        for i in range(len(q))
-    ]
-)
-
-initial_angles = $initial_angles
-initial_rates = $initial_rates
-duration = $duration
-""")
