@@ -72,7 +72,6 @@ class Ode45Result:
     stages: Array
     success: bool
     message: str
-    failed_steps: int
     evaluations: int
 
     @property
@@ -97,13 +96,13 @@ class Ode45Result:
         value[at_end] = self.state[step[at_end] + 1]
         return value
 
-    def refined(self, points: int = 4) -> tuple[Array, Array]:
-        """(time, state) as ode45 returns them by default: `points` per step, of which the last is the step's end."""
-        fractions = np.arange(points) / points
+    def refined(self) -> tuple[Array, Array]:
+        """(time, state) as ode45 returns them by default: four per step, of which the last is the step's end."""
+        fractions = np.arange(4) / 4
         inner = self.time[:-1, None] + np.diff(self.time)[:, None] * fractions
         time = np.append(inner.ravel(), self.time[-1])
         state = self.at(time)
-        state[::points] = self.state
+        state[::4] = self.state
         return time, state
 
 
@@ -125,7 +124,7 @@ def ode45(
     t, y = 0.0, [float(value) for value in initial_state]
     k1 = f(t, y)
     times, states, stages = [t], [y], []
-    evaluations, failed_steps = 1, 0
+    evaluations = 1
     h_max = 0.1 * t_end
     h = first_step(y, k1, h_max, rel_tol, threshold)
     done, message = False, ""
@@ -140,7 +139,6 @@ def ode45(
             evaluations += 6
             if error <= rel_tol:
                 break
-            failed_steps += 1
             if h <= h_min:
                 message = (
                     f"Failure at t={t:e}. Unable to meet integration tolerances without reducing the step size "
@@ -157,15 +155,8 @@ def ode45(
         stages.append(k)
         if not failed_here:
             h = _after_success(h, error, rel_tol)
-    return Ode45Result(
-        np.array(times),
-        np.array(states),
-        np.array(stages).reshape(len(stages), 7, len(y)),
-        not message,
-        message,
-        failed_steps,
-        evaluations,
-    )
+    kept = np.array(stages).reshape(len(stages), 7, len(y))
+    return Ode45Result(np.array(times), np.array(states), kept, not message, message, evaluations)
 
 
 def smallest_step(t: float) -> float:

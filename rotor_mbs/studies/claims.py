@@ -223,7 +223,7 @@ def number_trials(
             raise end.error or RotorError(f"{end.task.scene.name}: {end.message}")
         found |= {(end.task.conditions, one.number): one for one in end.value}
     in_order = (found[conditions, item.id] for conditions in dict.fromkeys(tried) for item in items)
-    texts = (GravityRowText(row, GRAVITY_ROWS[row].formula, GRAVITY_ROWS[row].is_of_56) for row in rows)
+    texts = (GravityRowText(row, GRAVITY_ROWS[row].formula, GRAVITY_ROWS[row].of is not None) for row in rows)
     return NumberTrials(tuple(in_order), usual, tuple(texts))
 
 

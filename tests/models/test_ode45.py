@@ -109,7 +109,7 @@ def test_every_accepted_step_meets_the_tolerance(rel_tol):
 
     result = ode45(van_der_pol, 20.0, [2.0, 0.0], rel_tol, abs_tol)
     assert result.success
-    assert result.failed_steps > 0
+    assert result.evaluations > 1 + 6 * result.steps  # some steps failed
     h = np.diff(result.time)
     raw = np.abs(np.einsum("s,ksn->kn", np.array([float(e) for e in ERROR]), result.stages))
     scale = np.maximum(np.maximum(np.abs(result.state[:-1]), np.abs(result.state[1:])), abs_tol / rel_tol)
@@ -121,7 +121,7 @@ def test_every_accepted_step_meets_the_tolerance(rel_tol):
 def test_steps_without_failures_follow_from_the_errors_before_them():
     """h / (1.25 (error / RelTol)^(1/5)), five times h at most: the rule that decides the digits of a chaotic run."""
     result = ode45(harmonic, 10.0, [1.0, 0.0], 1e-8, 1e-11)
-    assert result.failed_steps == 0
+    assert result.evaluations == 1 + 6 * result.steps
     h = np.diff(result.time)
     raw = np.abs(np.einsum("s,ksn->kn", np.array([float(e) for e in ERROR]), result.stages))
     scale = np.maximum(np.abs(result.state[:-1]), np.abs(result.state[1:]))

@@ -36,11 +36,6 @@ class GravityRow:
         symbols = [Symbol(name) for name in ("m", "c", "g", "s2", "c2", "c3", "c4", "c5", "√3")]
         return str(self.of(*symbols))
 
-    @property
-    def is_of_56(self) -> bool:
-        """Whether it is the printed row, not what that was simplified from."""
-        return self.of is not None
-
     def moment(self, m: float, c: float, d: float, g: float, q2: float, c3: float, c4: float, c5: float) -> float:
         """N m at the rotor angle q2 (rad) and the cosines of the pitches."""
         if self.of is None:

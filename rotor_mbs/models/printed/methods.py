@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 
 import numpy as np
 
@@ -79,11 +78,9 @@ class PrintedSolver:
             trajectory.kinetic_energy = rotor.kinetic_energy(angles, rates)
             trajectory.potential_energy = rotor.potential_energy(angles)
             trajectory.work = np.zeros(len(time))
-            trajectory.work += sum(
-                torque_work(table, partial(_column, result, i), result.time, time)
-                for i, table in enumerate(_torque_tables(scene, self._moving))
-                if table
-            )
+            for i, table in enumerate(_torque_tables(scene, self._moving)):
+                if table:
+                    trajectory.work += torque_work(table, result, i, time)
         if scene.wants("loads"):
             before = np.nextafter(time, 0.0)  # where a torque jumps, the value before it
             torque = np.array([scene.torque_at(t) for t in before.tolist()])
@@ -173,10 +170,6 @@ class PrintedModel:
             return lambda torques, state: literal.one_blade_accelerations(m, c, d, g, torques, state)
         written = None if row == DEFAULT_ROW else GRAVITY_ROWS[row].moment
         return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state, written)
-
-
-def _column(result: Ode45Result, column: int, times: Array) -> Array:
-    return result.at(times)[:, column]
 
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:

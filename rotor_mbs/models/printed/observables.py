@@ -8,11 +8,11 @@ moments about the pitch axes and the shaft, which nothing transmits there, how l
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from rotor_mbs.models.ode45 import Ode45Result
 from rotor_mbs.models.printed import matrices
 from rotor_mbs.models.printed.matrices import CORRECTED
 from rotor_mbs.scenario.time_table import Segment, Table, segments
@@ -110,20 +110,20 @@ class PointMassRotor:
         return [(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)) for q2, q3 in turns]
 
 
-def torque_work(table: Table, angle: Callable[[Array], Array], knots: Array, times: Array) -> Array:
-    """(n,) J done up to each of `times` (s) by a torque over time (N m) on a coordinate.
+def torque_work(table: Table, run: Ode45Result, column: int, times: Array) -> Array:
+    """(n,) J done up to each of `times` (s) by a torque over time (N m) on the coordinate whose angle is this `column`.
 
-    Where τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for an `angle` (rad, from s) that is a
-    quartic between `knots` (s). No column of rates enters: the work is that of the angles that are reported.
+    Where τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the interpolant, a quartic in each
+    step. No column of rates enters: the work is that of the angles that are reported.
     """
     parts = segments([table], float(times[-1])) if len(times) > 1 else ()
-    grids = [np.unique([part.start, *_inside(knots, part), *_inside(times, part), part.end]) for part in parts]
+    grids = [np.unique([part.start, *_inside(run.time, part), *_inside(times, part), part.end]) for part in parts]
     done = [np.zeros(1)]
     for part, grid in zip(parts, grids, strict=True):
         start, width, torque = grid[:-1], np.diff(grid), part.at(0, grid)
         points = start[:, None] + width[:, None] * _GAUSS_POINTS
-        mean = angle(points.ravel()).reshape(points.shape) @ _GAUSS_WEIGHTS
-        at_ends = angle(grid)
+        mean = run.at(points.ravel())[:, column].reshape(points.shape) @ _GAUSS_WEIGHTS
+        at_ends = run.at(grid)[:, column]
         done.append(torque[1:] * (at_ends[1:] - mean) + torque[:-1] * (mean - at_ends[:-1]))
     ends = np.concatenate([times[:1], *(grid[1:] for grid in grids)])
     return np.asarray(np.cumsum(np.concatenate(done))[np.searchsorted(ends, times)])
