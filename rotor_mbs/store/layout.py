@@ -18,9 +18,8 @@ CONVENTIONS = "CF-1.11, ACDD-1.3"
 # What every file is about: the attribute `keywords` of the ACDD conventions.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
 
-# The attribute with the key of a run or a record (`Case.key`); then its names in files of earlier versions.
+# The attribute with the key of a run or a record (`Case.key`).
 KEY_ATTRIBUTE = "run_hash"
-_KEY_NAMES = (KEY_ATTRIBUTE, "bench_hash", "record_hash")
 
 # The attribute with the hash of all that decides a sweep's numbers, which only the dataset of a sweep has.
 SWEEP_IDENTITY = "sweep_identity"
@@ -42,4 +41,4 @@ class Column(NamedTuple):
 
 def key_of(attributes: Mapping[str, Any]) -> str:
     """The key of a stored run or record, the content hash of what decides it; "" where it has none."""
-    return str(next((attributes[name] for name in _KEY_NAMES if name in attributes), ""))
+    return str(attributes.get(KEY_ATTRIBUTE, ""))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -210,37 +211,34 @@ def damages_of(group: Any) -> list[str]:
     if not known:
         return [digests.DIGESTS]
     unfilled = digests.unfilled_in(known)
-    found = {digests.ATTRIBUTES: _proved(digests.attributes_digest, group.attrs)}
+    found = {digests.ATTRIBUTES: _proved(lambda: digests.attributes_digest(group.attrs))}
     for name in group:
-        item = _member(group, name)
-        if item is None:
-            found[name] = ""
-        elif name in unfilled and not hdf5.is_group(item):
-            found[digests.unfilled(name)] = _proved(digests.attributes_digest, item.attrs)
-        elif not hdf5.is_group(item):
-            found[name] = _proved(_digest, item)
+        if _group_in(group, name) is None:
+            part = digests.unfilled(name) if name in unfilled else name
+            found[part] = _proved(partial(_digest, group, name, name in unfilled))
     return [name for name in {**known, **found} if known.get(name) != found.get(name)]
 
 
-def _member(group: Any, name: str) -> Any:
-    """None where it is a link, or cannot be read."""
-    try:
-        return hdf5.member(group, name)
-    except (KeyError, StoreError):
-        return None
+def _group_in(group: Any, name: str) -> Any:
+    """A group's member that is a group; None for what is none, is a link, or cannot be read."""
+    with suppress(StoreError), hdf5.reading(""):
+        member = hdf5.member(group, name)
+        return member if hdf5.is_group(member) else None
+    return None
 
 
-def _digest(dataset: Any) -> str:
+def _digest(group: Any, name: str, is_unfilled: bool) -> str:
+    dataset = hdf5.member(group, name)
+    if is_unfilled:
+        return digests.attributes_digest(dataset.attrs)
     return digests.dataset_digest(hdf5.values_of(dataset), dataset.attrs)
 
 
-def _proved(digest: Callable[[Any], str], content: Any) -> str:
+def _proved(digest: Callable[[], str]) -> str:
     """ "" where the content cannot be read."""
-    try:
-        with hdf5.reading(""):
-            return digest(content)
-    except StoreError:
-        return ""
+    with suppress(StoreError), hdf5.reading(""):
+        return digest()
+    return ""
 
 
 def all_damages(group: Any, seen: set[int] | None = None) -> Iterator[tuple[str, str]]:
@@ -251,6 +249,6 @@ def all_damages(group: Any, seen: set[int] | None = None) -> Iterator[tuple[str,
     seen.add(hdf5.address(group))
     yield from ((str(group.name).strip("/"), part) for part in damages_of(group))
     for name in group:
-        item = _member(group, name)
-        if item is not None and hdf5.is_group(item):
-            yield from all_damages(item, seen)
+        below = _group_in(group, name)
+        if below is not None:
+            yield from all_damages(below, seen)

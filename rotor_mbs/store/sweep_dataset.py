@@ -122,12 +122,7 @@ def _reserve(path: Path, size: int) -> None:
 
 def _put_columns(file: Any, sweep: Sweep, methods: Sequence[str], numbers: range) -> None:
     """What is known of the runs before they are computed, scales, then room for what is computed."""
-    runs, rows, row, table = (
-        np.arange(numbers.start, numbers.stop),
-        sweep.design.count,
-        sweep_columns.row_type(sweep),
-        sweep.table,
-    )
+    runs, rows, table = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.table
     hdf5.put(file, "run", runs, COLUMNS["run"])
     values = sweep.design.rows(numbers.start, numbers.stop)
     for i, (key, unit) in enumerate(zip(sweep.keys, sweep.units, strict=True)):

@@ -71,11 +71,10 @@ def test_runs_and_records_are_kept_side_by_side(tmp_path: Path) -> None:
 
 
 def test_files_of_earlier_versions_are_read_and_merged(tmp_path: Path) -> None:
-    """They have a group for each checked entry, other names for content hashes, and seven statuses."""
+    """They have a group for each checked entry, no digests, and seven statuses."""
     write_records(tmp_path / "a.h5", [ladder("stiff/x", "exudyn_tree/rk44", "k")])
     with h5py.File(tmp_path / "a.h5", "a") as file:
         group = file["stability/steps/stiff/x/exudyn_tree/rk44"]
-        group.attrs["record_hash"] = group.attrs.pop("run_hash")
         del group.attrs["digests"]
         group["status"].attrs["flag_meanings"] = "ok left_out"
         group["status"][:] = [1, 0]
