@@ -66,18 +66,15 @@ class Source:
         return f"{self.channel.name} = {sign}{self.entry.column!r}{shift} [{self.unit}]" + (notes and f" ({notes})")
 
 
-@dataclass(frozen=True)
-class ColumnMapping:
-    """What a mapping file says: an entry by the key of a channel; `group` of an HDF5 file."""
+def read_mapping(
+    columns: str | os.PathLike[str] | Mapping[str, Any] | None, scene: Scene
+) -> tuple[dict[str, Entry], str]:
+    """An entry by the key of a channel, and the group of an HDF5 file: {} and "" where no mapping is given.
 
-    entries: Mapping[str, Entry]
-    group: str = ""
-
-
-def read_mapping(columns: str | os.PathLike[str] | Mapping[str, Any] | None, scene: Scene) -> ColumnMapping | None:
-    """From a TOML file or a mapping of the same keys. Raises InputError with every fault, a line each."""
+    columns: a TOML file, or a mapping of the same keys. Raises InputError with every fault, a line each.
+    """
     if columns is None:
-        return None
+        return {}, ""
     name, tables = ("columns", columns) if isinstance(columns, Mapping) else (str(columns), read_toml(Path(columns))[1])
     described = Field(None, description="a column's name, or a table with `column`")
     keys: dict[str, Any] = {channel.key: (Annotated[Entry | None, _OfName], described) for channel in channels(scene)}
@@ -90,14 +87,13 @@ def read_mapping(columns: str | os.PathLike[str] | Mapping[str, Any] | None, sce
     entries = {key: entry for key, entry in found.items() if entry is not None}
     if entries.keys() <= {TIME}:
         raise InputError(f"{name}: no channel to compare; allowed: {', '.join(found)}")
-    return ColumnMapping(entries, group)
+    return entries, group
 
 
-def sources(table: DataTable, scene: Scene, mapping: ColumnMapping | None) -> list[Source]:
+def sources(table: DataTable, scene: Scene, entries: Mapping[str, Entry]) -> list[Source]:
     """Where each channel comes from, the time first. Raises InputError where there is no time or nothing else."""
     known = channels(scene)
-    guessed = _guesses(table, known, {TIME} if mapping else {one.name for one in known})
-    entries = mapping.entries if mapping else {}
+    guessed = _guesses(table, known, {TIME} if entries else {one.name for one in known})
     found = []
     for channel in known:
         if channel.key in entries or channel.name in guessed:

@@ -59,12 +59,9 @@ def load_data(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
 ) -> ForeignData:
     """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
-    mapping = read_mapping(columns, scene)
-    if isinstance(data, Mapping):
-        table = table_of("data", data)
-    else:
-        table = read_table(data, mapping.group if mapping else "", scene.name)
-    return _data(table, sources(table, scene, mapping))
+    entries, group = read_mapping(columns, scene)
+    table = table_of("data", data) if isinstance(data, Mapping) else read_table(data, group, scene.name)
+    return _data(table, sources(table, scene, entries))
 
 
 def _data(table: DataTable, found: Sequence[Source]) -> ForeignData:

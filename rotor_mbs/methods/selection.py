@@ -6,7 +6,6 @@ The rule is drawn from the stability suite (`rotor-mbs stability`): what holds o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.scenario.scene import Scene
@@ -21,36 +20,28 @@ _LONG = 3e4
 _NEARLY_SINGULAR = 1e-3
 
 
-@dataclass(frozen=True)
-class Choice:
-    """methods: in order, the first is the recommended one; reason: one line."""
+def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
+    """The methods for `scene`, the recommended one first, and why, in one line.
 
-    methods: tuple[str, ...]
-    reason: str
-
-
-def choose(scene: Scene, defaults: tuple[str, ...]) -> Choice:
-    """The methods for `scene`. Raises MethodRefusal, with the reason, where no motion exists to be followed."""
+    Raises MethodRefusal, with the reason, where no motion exists to be followed.
+    """
     reason = singular_reason(scene)
     if reason:
         raise MethodRefusal(f"{scene.name}: refused: {reason}; name a method with -m to see what it makes of it")
     closed_form = next((name for name in defaults if name.partition("/")[0] == "lagrange"), "lagrange/dop853")
     swing, decay = fastest_rates(scene)
     if decay * scene.duration > _DECAYS and decay > 10.0 * swing:
-        return Choice(
-            (closed_form, "lagrange/radau"), f"overdamped, fastest decay {decay:.2g} /s: an implicit method beside it"
-        )
+        reason = f"overdamped, fastest decay {decay:.2g} /s: an implicit method beside it"
+        return (closed_form, "lagrange/radau"), reason
     if _is_nearly_singular(scene):
-        return Choice(
-            (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
-        )
+        return (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
     if swing > _FASTEST_SWING:
         reason = f"stiff or fast, fastest swing {swing:.2g} rad/s: methods that choose their own step"
-        return Choice((closed_form, "exudyn_tree/dopri5"), reason)
+        return (closed_form, "exudyn_tree/dopri5"), reason
     if swing * scene.duration > _LONG:
-        return Choice((closed_form,), f"long, {swing * scene.duration:.2g} rad of the fastest swing: no fixed step")
+        return (closed_form,), f"long, {swing * scene.duration:.2g} rad of the fastest swing: no fixed step"
     others = (name for name in defaults if name != closed_form)
-    return Choice((closed_form, *others), "neither stiff, singular nor long: the default set, best of each model")
+    return (closed_form, *others), "neither stiff, singular nor long: the default set, best of each model"
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import knots
-from rotor_mbs.solution.quantities import Array, Samples
+from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # Samples that one polynomial goes through; a narrower one shows how much is left open between samples.
 _WITH_SLOPES = (6, 4)
@@ -36,7 +36,7 @@ class Balance(NamedTuple):
         return float(self.error.max()) / (self.scale or 1.0)
 
 
-def angular_balance(scene: Scene, run: Samples) -> Balance | None:
+def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
     """About the shaft, relative to the largest momentum, the torque's impulse, and what the weights give in a fall.
 
     Returns None where the samples do not resolve the motion, or are too few to show what they leave open.
@@ -56,7 +56,7 @@ def angular_balance(scene: Scene, run: Samples) -> Balance | None:
     return Balance(_beyond(left, wide - narrow), float(np.abs(momentum).max() + np.abs(torque).max() + fall))
 
 
-def linear_balance(scene: Scene, run: Samples) -> Balance | None:
+def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
     """In space, relative to the largest momentum and what the weights give in a fall.
 
     Returns None where the run has no force of the bearing, where a load has a kink (the force jumps there), or where
@@ -82,7 +82,7 @@ def linear_balance(scene: Scene, run: Samples) -> Balance | None:
     return Balance(_beyond(left, np.linalg.norm(wide - narrow, axis=1)), scale)
 
 
-def _is_resolved(scene: Scene, run: Samples, frequency: float = 0.0) -> bool:
+def _is_resolved(scene: Scene, run: Trajectory, frequency: float = 0.0) -> bool:
     """Whether little happens from sample to sample: at the run's rates, and at a frequency in rad/s."""
     step = scene.duration / (scene.samples - 1)
     return len(run.time) > 1 and bool(max(np.abs(run.rates).max(), frequency) * step < _RESOLVED)

@@ -25,21 +25,6 @@ from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 
-
-@dataclass(frozen=True, slots=True)
-class MethodBounds:
-    """The bounds on a method's runs.
-
-    angle    relative error (of the rotor's way from its start, of the largest pitch, each at least 1 rad) per unit of
-             error growth: the scene's own growth, which is not the method's fault, carries every local error on
-             (samples before the horizon)
-    energy   of the scene's energy scale, over the whole run; see `energy_conditioning`
-    """
-
-    angle: float
-    energy: float
-
-
 # Share of the rotor's inertia that is left once every pitch is free: below this a run that broke off broke off there.
 _SINGULAR_SHARE = 1e-3
 
@@ -76,13 +61,19 @@ class Judgement:
 
 
 @functools.cache
-def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> MethodBounds | None:
-    """The bounds on "model/integrator", `own` first; None for methods that have none (the printed equations)."""
+def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> tuple[float, float] | None:
+    """The bounds on "model/integrator", `own` first; None for methods that have none (the printed equations).
+
+    angle    relative error (of the rotor's way from its start, of the largest pitch, each at least 1 rad) per unit of
+             error growth: the scene's own growth, which is not the method's fault, carries every local error on
+             (samples before the horizon)
+    energy   of the scene's energy scale, over the whole run; see `energy_conditioning`
+    """
     bounds = shipped_bounds().with_entries(own)
     angle, energy = (bounds.find(check, method) for check in ("agreement", "energy"))
     if angle is None or energy is None:
         return None
-    return MethodBounds(angle.value, energy.value)
+    return angle.value, energy.value
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
@@ -126,7 +117,7 @@ def clearly_ok(
     if allowed is None:
         return np.zeros_like(complete)
     shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
-    return complete & (drifts <= allowed.energy) & (np.array(shares) > _CLEAR_SHARE)
+    return complete & (drifts <= allowed[1]) & (np.array(shares) > _CLEAR_SHARE)
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
@@ -183,7 +174,7 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
     allowed = allowed_of(run.method, run.bounds)
     if allowed is None:
         return "ok", ""
-    energy = allowed.energy + energy_slack(scene, run.trajectory)
+    energy = allowed[1] + energy_slack(scene, run.trajectory)
     if "energy_drift_max" in metrics and not metrics["energy_drift_max"] <= energy:
         return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of its scale, allowed {energy:.0e}"
     bounds = shipped_bounds().with_entries(run.bounds)
@@ -192,7 +183,7 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
         if bound is not None and not error <= bound:
             fault = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()
             return "inaccurate", f"{fault.format(value=f'{error:.1e}')}, allowed {bound:.0e}"
-    angle = allowed.angle + start_slack(scene)
+    angle = allowed[0] + start_slack(scene)
     if "angle_error_per_growth" in metrics and not metrics["angle_error_per_growth"] <= angle:
         return "inaccurate", (
             f"angle error {metrics['angle_error_max']:.1e} rad before the horizon, "

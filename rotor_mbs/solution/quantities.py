@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +19,10 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import ENTRY_POINT_GROUP, Scene
 
+if TYPE_CHECKING:
+    from rotor_mbs.solution.trajectory import Trajectory
+
 Array = NDArray[np.float64]
-
-
-class Samples(Protocol):
-    """What a producer may use of a run: time (n,) s, angles and rates (n, 1 + blades) rad and rad/s, and `get`."""
-
-    time: Array
-    angles: Array
-    rates: Array
-
-    def get(self, name: str) -> Array | None:
-        """An array by the quantity's name; None where the run does not have it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +48,7 @@ class QuantityMetric:
     metric: str
     with_reference: bool = True
     relative_to: Callable[[Scene], float] | None = None
-    per_growth_of: Callable[[Scene, Samples, int], float] | None = None
+    per_growth_of: Callable[[Scene, Trajectory, int], float] | None = None
     check: str = ""
     bound: float | None = None
     channel: str = ""
@@ -72,9 +64,6 @@ class Plot:
     title: str
     axis: str
     logarithmic: bool = False
-
-
-Producer = Callable[[Scene, Samples], Array | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +98,7 @@ class Quantity:
     units: str
     long_name: str
     output: str = ""
-    producer: Producer | None = None
+    producer: Callable[[Scene, Trajectory], Array | None] | None = None
     required: bool = True
     judgement: QuantityMetric | None = None
     plot: Plot | None = None
@@ -142,7 +131,7 @@ def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
     return error
 
 
-def energy_error(samples: Samples) -> Array | None:
+def energy_error(samples: Trajectory) -> Array | None:
     """(n,) J: the energy balance of a run; None where energies were not asked for."""
     kinetic, potential, work = (samples.get(name) for name in ("kinetic_energy", "potential_energy", "work"))
     if kinetic is None or potential is None or work is None:
@@ -168,13 +157,13 @@ _JOINT_GAP = QuantityMetric(
 )
 
 
-def _largest_root_force(_scene: Scene, run: Samples, until: int) -> float:
+def _largest_root_force(_scene: Scene, run: Trajectory, until: int) -> float:
     """N, over the blades and the first samples; 1 where there is none."""
     forces = run.get("blade_root_force")
     return 1.0 if forces is None else float(np.linalg.norm(forces[:until], axis=-1).max(initial=0.0)) or 1.0
 
 
-def _largest_root_force_at_arm(scene: Scene, run: Samples, until: int) -> float:
+def _largest_root_force_at_arm(scene: Scene, run: Trajectory, until: int) -> float:
     """N m, that force at the longest arm: a scale for moments, which may all be next to nothing."""
     return _largest_root_force(scene, run, until) * (longest_arm(scene) or 1.0)
 
@@ -327,7 +316,7 @@ def _checked(quantity: Quantity, output: str, where: str) -> Quantity:
     return quantity
 
 
-def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None:
+def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | None:
     """The run's array of a quantity: the model's own, or what the quantity's producer makes of the samples.
 
     Returns None where the run does not have it. Raises InputError where a producer gives an array of another shape.
@@ -345,7 +334,7 @@ def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None
     return found
 
 
-def arrays(scene: Scene, samples: Samples) -> dict[str, Array]:
+def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
     """All arrays of a run that its scene asks for, by name."""
     found = {one.name: array_of(one, scene, samples) for one in quantities(scene.outputs)}
     return {name: values for name, values in found.items() if values is not None}
@@ -369,12 +358,11 @@ def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int
 
 def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
     """The shape of one sample of a quantity: () for a number, (1 + blades,) for angles."""
-    blades = len(scene.blades)
-    lengths = {"coordinate": 1 + blades, "blade": blades, "axis": 3}
-    return tuple(lengths[dimension] for dimension in quantity.dimensions[1:])
+    scales = scale_values(scene)
+    return tuple(len(scales[dimension]) for dimension in quantity.dimensions[1:])
 
 
-def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples | None) -> Array | None:
+def deviation(quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None) -> Array | None:
     """(common samples,) Size of a quantity, or of its difference from the reference, largest over the other axes.
 
     Returns None where the quantity is not judged, or where the run or the needed reference does not have it.

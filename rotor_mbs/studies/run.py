@@ -302,13 +302,13 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
             methods |= asked_methods([scene], check_names(scene.methods))
             continue
         try:
-            choice = choose(scene, default_methods())
+            chosen, reason = choose(scene, default_methods())
         except MethodRefusal as exc:
             methods[scene.name] = []
             reasons.append(str(exc))
             continue
-        methods[scene.name], left_out = able_methods(scene, choice.methods)
-        reasons += [f"{scene.name}: {choice.reason}: {', '.join(methods[scene.name])}", *left_out]
+        methods[scene.name], left_out = able_methods(scene, chosen)
+        reasons += [f"{scene.name}: {reason}: {', '.join(methods[scene.name])}", *left_out]
     return methods, reasons
 
 
