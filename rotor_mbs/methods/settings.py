@@ -74,6 +74,11 @@ def number(
     return field(default=default, metadata={"allowed": allowed})
 
 
+def step(default: float) -> Any:
+    """The setting `step` of a method with fixed steps, s."""
+    return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
+
+
 def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
     """A field of a `Settings` class that is one of `options`."""
     return field(default=default, metadata={"allowed": Allowed(options=tuple(options), doc=doc)})

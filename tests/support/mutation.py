@@ -138,7 +138,7 @@ _TARGETS = (
             "placed_bodies",
             "_body",
             "_gravity",
-            "_on_ground",
+            "_marker",
             "_on_body",
             "_pitch_spring",
             "_spring_torque",

@@ -17,7 +17,7 @@ import numpy as np
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.methods.time_limit import message as out_of_time
-from rotor_mbs.models.exudyn.blueprint import LISTS, Frame, Part, Ref
+from rotor_mbs.models.exudyn.blueprint import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration
@@ -77,8 +77,6 @@ class System:
     def _argument(self, key: str, value: Any) -> object:
         if isinstance(value, Ref):
             return self._numbers[value]
-        if isinstance(value, Frame):
-            return _engine.HT(rotation=value.rotation, translation=value.position)
         if isinstance(value, tuple) and value and isinstance(value[0], Ref):
             return [self._numbers[ref] for ref in value]
         return _TRANSLATIONS[key](value) if key in _TRANSLATIONS else value
@@ -268,5 +266,6 @@ def _one_line(text: str) -> str:
 # What the engine wants in its own types, by the name of the argument.
 _TRANSLATIONS: dict[str, Callable[[Any], object]] = {
     "outputVariableType": lambda name: getattr(_engine.OutputVariableType, name),
+    "localHT": lambda frame: _engine.HT(*frame),
     "jointTypes": lambda names: [getattr(_engine.JointType, name) for name in names],
 } | {argument: getattr(_engine, name) for argument, name in LISTS.items()}

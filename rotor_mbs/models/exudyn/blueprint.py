@@ -28,14 +28,6 @@ class Ref:
 
 
 @dataclass(frozen=True)
-class Frame:
-    """A frame fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's frame."""
-
-    rotation: object
-    position: object
-
-
-@dataclass(frozen=True)
 class Part:
     """One item: `type` is the engine's name of it, `parameters` its arguments, with Ref where they name other parts."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotor_mbs.models.exudyn.blueprint import Frame, Part, Ref, sensor
+from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
 from rotor_mbs.models.exudyn.geometry import (
     ALONG_SHAFT,
     Body,
@@ -77,7 +77,8 @@ def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
         built += _body(placed, node)
         if scene.gravity != 0.0 and placed.body.mass:
             built += _gravity(placed, scene.gravity)
-    built += _bearing("shaft bearing", _on_ground(), _on_body(hub, "at shaft", ALONG_SHAFT))
+    ground = _marker("ground", "at shaft", ALONG_SHAFT, np.zeros(3))
+    built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", ALONG_SHAFT))
     for i, blade in zip(pitching(scene), blades, strict=True):
         seat = _on_body(hub, f"at bearing {i + 1}", mounting(i, len(scene.blades)))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
@@ -123,16 +124,15 @@ def _gravity(placed: Placed, gravity: float) -> list[Part]:
     return [marker, Part("load", f"gravity on {placed.name}", "LoadMassProportional", load)]
 
 
-def _on_ground() -> Part:
-    parameters = {"bodyNumber": Ref("object", "ground"), "localHT": Frame(ALONG_SHAFT, np.zeros(3))}
-    return Part("marker", "ground at shaft", "MarkerBodyRigid", parameters)
-
-
 def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
     """A marker at the hub centre, fixed on the body."""
-    frame = Frame(rotation, -placed.body.com)
-    parameters = {"bodyNumber": Ref("object", placed.name), "localHT": frame}
-    return Part("marker", f"{placed.name} {where}", "MarkerBodyRigid", parameters)
+    return _marker(placed.name, where, rotation, -placed.body.com)
+
+
+def _marker(body: str, where: str, rotation: Array, position: Array) -> Part:
+    """A marker fixed on a body: (3, 3) rotation and (3,) position in m, both in the body's frame."""
+    parameters = {"bodyNumber": Ref("object", body), "localHT": (rotation, position)}
+    return Part("marker", f"{body} {where}", "MarkerBodyRigid", parameters)
 
 
 def _bearing(name: str, first: Part, second: Part) -> list[Part]:

@@ -16,7 +16,7 @@ import numpy as np
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
-from rotor_mbs.methods.settings import choice
+from rotor_mbs.methods.settings import choice, step
 from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
 from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, ExtrapolatedSolver
 from rotor_mbs.models.exudyn.moments import Loads
@@ -38,7 +38,7 @@ _EXTRAPOLATION = choice(NONE, (NONE, RICHARDSON), doc="richardson: three runs, w
 
 @dataclass(frozen=True)
 class ChainAlphaSettings(schemes.AlphaSettings):
-    step: float = schemes.step(5e-4)
+    step: float = step(5e-4)
     node: str = _NODE
     extrapolation: str = _EXTRAPOLATION
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
-from rotor_mbs.methods.settings import Settings, number
+from rotor_mbs.methods.settings import Settings, number, step
 
 _END_ACCELERATIONS = "explicit.computeEndOfStepAccelerations"
 
@@ -40,24 +39,12 @@ class Scheme:
         return bool(self.options.get(_END_ACCELERATIONS))
 
 
-def step(default: float) -> Any:
-    """The setting `step`, s."""
-    return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
-
-
-class SchemeSettings(Settings):
-    """Settings of a method of this package, which make its scheme."""
-
-    def scheme(self) -> Scheme:
-        raise NotImplementedError
-
-
 # Stage evaluations are all that a state needs: one more at the end of a step would only serve to know accelerations.
 _EXPLICIT = {_END_ACCELERATIONS: False, "explicit.useLieGroupIntegration": False}
 
 
 @dataclass(frozen=True)
-class Rk44Settings(SchemeSettings):
+class Rk44Settings(Settings):
     """Classical Runge-Kutta, order 4."""
 
     step: float = step(2.5e-4)
@@ -67,7 +54,7 @@ class Rk44Settings(SchemeSettings):
 
 
 @dataclass(frozen=True)
-class Rk67Settings(SchemeSettings):
+class Rk67Settings(Settings):
     """Butcher's seven stages, order 6."""
 
     step: float = step(6.7e-4)
@@ -77,7 +64,7 @@ class Rk67Settings(SchemeSettings):
 
 
 @dataclass(frozen=True)
-class Dopri5Settings(SchemeSettings):
+class Dopri5Settings(Settings):
     """Dormand-Prince 5(4) with the engine's step control.
 
     The engine scales the error by absolute + relative · max(x, x_new) and takes no magnitude of x: the scale vanishes
@@ -102,7 +89,7 @@ class Dopri5Settings(SchemeSettings):
 
 
 @dataclass(frozen=True)
-class NewtonSettings(SchemeSettings):
+class NewtonSettings(Settings):
     """The trapezoidal rule (Newmark), constraints at velocity level (index 2), order 2."""
 
     step: float = step(2.5e-4)
@@ -130,3 +117,6 @@ class AlphaSettings(NewtonSettings):
 
     def scheme(self) -> Scheme:
         return self._implicit({"generalizedAlpha.spectralRadius": self.spectral_radius})
+
+
+SchemeSettings = Rk44Settings | Rk67Settings | Dopri5Settings | NewtonSettings

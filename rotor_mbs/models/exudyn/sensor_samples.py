@@ -95,8 +95,7 @@ def _largest_gap(read: _Reader, bodies: Sequence[tuple[str, Body]]) -> Array:
         centres.append(read.sampled(f"{name} position") - rotation @ body.com)
     hub, *blades = centres
     gaps = [hub, *(blade - hub for blade in blades)]
-    largest: Array = np.max([np.linalg.norm(gap, axis=1) for gap in gaps], axis=0)
-    return largest
+    return np.asarray(np.max([np.linalg.norm(gap, axis=1) for gap in gaps], axis=0))
 
 
 def _fields(
@@ -163,5 +162,4 @@ def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
     predicted = 0.5 * np.diff(time) * (rates[1:] + rates[:-1])
     gained = np.round((predicted - np.diff(wrapped)) / turn)
     turns = np.round((start - wrapped[0]) / turn) + np.concatenate([[0.0], np.cumsum(gained)])
-    unwrapped: Array = wrapped + turn * turns
-    return unwrapped
+    return np.asarray(wrapped + turn * turns)

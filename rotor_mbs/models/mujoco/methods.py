@@ -10,7 +10,7 @@ from typing import Any
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import STEP, Ladder, step_ladder
-from rotor_mbs.methods.settings import Settings, number
+from rotor_mbs.methods.settings import Settings, step
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.scenario.scene import Scene
 
@@ -19,18 +19,14 @@ _MOST_STEPS = 1e10
 _PURPLE = "#cc79a7"
 
 
-def _step(default: float) -> Any:
-    return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
-
-
 @dataclass(frozen=True)
 class Rk4Settings(Settings):
-    step: float = _step(2.5e-4)
+    step: float = step(2.5e-4)
 
 
 @dataclass(frozen=True)
 class ImplicitFastSettings(Settings):
-    step: float = _step(5e-5)
+    step: float = step(5e-5)
 
 
 def _items(scene: Scene) -> list[BuiltItem]:

@@ -4,7 +4,7 @@ model linearized, by quotients of the engine's accelerations. Loads the engine."
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,27 +31,14 @@ _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)
 _STAGES = {"rk4": 4, "implicitfast": 1}
 
 
-@dataclass
-class _Rows:
-    """States in order of time. Where a load jumps there are two rows, one with the segment before, one after.
+class _Row(NamedTuple):
+    """A state, (coordinates,) rad and rad/s. Where a load jumps there are two, with the segment before and after."""
 
-    angles, rates   (coordinates,) rad and rad/s each
-    samples         indices of the rows that are samples
-    """
-
-    times: list[float] = field(default_factory=list)
-    angles: list[Array] = field(default_factory=list)
-    rates: list[Array] = field(default_factory=list)
-    segments: list[Segment] = field(default_factory=list)
-    samples: list[int] = field(default_factory=list)
-
-    def add(self, time: float, state: tuple[Array, Array], segment: Segment, is_sample: bool) -> None:
-        if is_sample:
-            self.samples.append(len(self.times))
-        self.times.append(time)
-        self.angles.append(state[0].copy())
-        self.rates.append(state[1].copy())
-        self.segments.append(segment)
+    time: float
+    angles: Array
+    rates: Array
+    segment: Segment
+    is_sample: bool
 
 
 class MujocoSolver:
@@ -65,28 +52,27 @@ class MujocoSolver:
         self._moving = scene.moving_coordinates
         self._intervals = intervals(mjcf.load_segments(scene), scene.samples, every_sample=True)
         self._rows_between = scene.wants("energy") and scene.work_needs_path
-        self._rows = _Rows()
+        self._rows: list[_Row] = []
         self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
 
     def integrate(self) -> Integration:
         """From the initial state, every time; bit for bit the same."""
-        scene, rows = self._scene, _Rows()
-        self._rows = rows
+        scene, self._rows = self._scene, []
         self.engine.start(
             *([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates))
         )
-        rows.add(0.0, self.engine.state, self._intervals[0].segment, is_sample=True)
+        self._keep(0.0, self._intervals[0].segment, is_sample=True)
         steps, message = 0, ""
         with time_limit.polled():
             for interval in self._intervals:
-                if interval.segment is not rows.segments[-1]:
-                    rows.add(interval.start, self.engine.state, interval.segment, is_sample=False)
+                if interval.segment is not self._rows[-1].segment:
+                    self._keep(interval.start, interval.segment, is_sample=False)
                 taken, message = self._advance(interval)
                 steps += taken
                 if message:
                     break
         out_of_time = message == time_limit.message()
-        return Integration(not message, message, rows.times[-1], steps, steps * self._stages, out_of_time)
+        return Integration(not message, message, self._rows[-1].time, steps, steps * self._stages, out_of_time)
 
     def _advance(self, interval: Interval) -> tuple[int, str]:
         """Over one interval: steps taken, and why it ended early."""
@@ -100,17 +86,22 @@ class MujocoSolver:
             if message:
                 return total, message
             time = interval.end if row == count else interval.start + span * row / count
-            self._rows.add(time, self.engine.state, segment, interval.ends_at_sample and row == count)
+            self._keep(time, segment, interval.ends_at_sample and row == count)
         return total, ""
+
+    def _keep(self, time: float, segment: Segment, is_sample: bool) -> None:
+        angles, rates = self.engine.state
+        self._rows.append(_Row(time, angles.copy(), rates.copy(), segment, is_sample))
 
     def observe(self) -> Trajectory:
         """Samples of the last integration, cut before the first that is not finite."""
         scene, rows = self._scene, self._rows
-        angles, rates, at = np.array(rows.angles), np.array(rows.rates), rows.samples
+        angles, rates = (np.array([getattr(row, name) for row in rows]) for name in ("angles", "rates"))
+        at = [i for i, row in enumerate(rows) if row.is_sample]
         fields = dict(zip(("angles", "rates"), all_coordinates(scene, angles[at], rates[at]), strict=True))
         with np.errstate(over="ignore", invalid="ignore"):
             if {"tip", "energy", "loads"} & set(scene.outputs):
-                values = np.array([segment.loads_at(t) for segment, t in zip(rows.segments, rows.times, strict=True)])
+                values = np.array([row.segment.loads_at(row.time) for row in rows])
                 poses = self.engine.poses(angles, rates, values)
             if scene.wants("tip"):
                 fields["tip"] = poses.site[at]
@@ -157,11 +148,11 @@ class MujocoSolver:
             turned = angles[:, columns] - angles[:1, columns]
             return np.asarray((torques * turned).sum(axis=1))
         dampings = np.array(self._scene.dampings)[self._moving]
-        slopes = gains * np.array([segment.slopes for segment in self._rows.segments]).reshape(values.shape)
+        slopes = gains * np.array([row.segment.slopes for row in self._rows]).reshape(values.shape)
         power = (torques * rates[:, columns]).sum(axis=1) - (dampings * rates**2).sum(axis=1)
         change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
         change -= 2.0 * (dampings * rates * accelerations).sum(axis=1)
-        h = np.diff(self._rows.times)
+        h = np.diff([row.time for row in self._rows])
         parts = 0.5 * h * (power[1:] + power[:-1]) + h * h / 12.0 * (change[:-1] - change[1:])
         return np.concatenate([[0.0], np.cumsum(parts)])
 
