@@ -8,17 +8,27 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.output_lock import RESULTS, writing
 from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
+from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.digests import DIGESTS
-from rotor_mbs.store.layout import KEYWORDS, LIMIT, SWEEP_IDENTITY, TOGETHER, key_of
+from rotor_mbs.store.layout import KEYWORDS, LIMIT, SWEEP_IDENTITY, TOGETHER, Column, key_of
 from rotor_mbs.store.read import OpenResults, StoredRun, all_damages, is_sweep, open_results
-from rotor_mbs.store.records import records_in
-from rotor_mbs.store.summary import put_summary
+from rotor_mbs.store.records import COLUMNS, records_in
+
+# Attributes of a run, as columns of the summary; NaN where a run has none.
+_NUMBERS = (
+    "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "horizon_s", "time_reached",
+    "setup_time_s", "run_time_s", "output_time_s", "steps",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -98,7 +108,7 @@ def merge(
                         hdf5.copy_group(root[name], file, name)
                     attributes = dict(root[owner].attrs)
             hdf5.new_group(file, owner).attrs.update(attributes)
-        put_summary(file, [(owner, name.removeprefix(f"{owner}/")) for owner, name in _runs_in(plan)])
+        _put_summary(file, [(owner, name.removeprefix(f"{owner}/")) for owner, name in _runs_in(plan)])
 
 
 def refuse_other_kinds(path: Path) -> None:
@@ -160,3 +170,30 @@ def _by_source(groups: Mapping[str, Path]) -> dict[Path, list[str]]:
     for name, source in sorted(groups.items()):
         found.setdefault(source, []).append(name)
     return found
+
+
+def _put_summary(file: Any, runs: Sequence[tuple[str, str]]) -> None:
+    """The table `summary`, a row for each run (scene, method) of an open, new file; none where it holds no run.
+
+    So that a reader need not walk through the groups.
+    """
+    if not runs:
+        return
+    group = hdf5.new_group(file, "summary")
+    hdf5.put_attributes(group, {"title": "all runs of this file"})
+    hdf5.put(group, "row", np.arange(len(runs)), Column(("row",), "1", "number of the row"))
+    for column, what, names in zip(("scene", "solver"), ("scene", "method"), zip(*runs, strict=True), strict=True):
+        labels = list(dict.fromkeys(names))
+        codes = np.array([labels.index(name) for name in names], np.int32)
+        described = Column(("row",), "1", f"{what}, as a number of its attribute labels")
+        hdf5.put_attributes(hdf5.put(group, column, codes, described), {"labels": labels})
+    facts = [file[f"{scene}/{method}"].attrs for scene, method in runs]
+    statuses = (str(one.get("status")) for one in facts)
+    codes = np.array([code_of(status) if status in STATUSES else -1 for status in statuses], np.int8)
+    hdf5.put_flags(hdf5.put(group, "status", codes, Column(("row",), *COLUMNS["status"])), STATUSES)
+    for name in _NUMBERS:
+        hdf5.put(group, name, _numbers([one.get(name) for one in facts]), Column(("row",), *COLUMNS[name]))
+
+
+def _numbers(values: Sequence[object]) -> NDArray[np.float64]:
+    return np.array([float(value) if isinstance(value, (int, float, np.number)) else np.nan for value in values])
