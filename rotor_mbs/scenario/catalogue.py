@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from rotor_mbs.errors import InputError, RotorError, nearest
 from rotor_mbs.scenario.scene import Scene
@@ -59,14 +58,6 @@ def natural_order(names: Iterable[str]) -> list[str]:
     return sorted(names, key=natural_key)
 
 
-class _File(NamedTuple):
-    """A scene file: the path that was given, where that leads to, and the name its scene gets."""
-
-    path: Path
-    real: Path
-    name: str
-
-
 def list_scenes() -> list[tuple[str, str]]:
     """(name, title) of every shipped scene; the title of a broken file says that it is broken."""
     return [(name, _title(path)) for name, path in _shipped().items()]
@@ -86,18 +77,19 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
     Raises InputError with all errors of all arguments and files.
     """
     problems: list[str] = []
-    files: dict[Path, _File] = {}
+    files: dict[Path, tuple[Path, str]] = {}  # by where it leads to: the path that was given, the scene's name
     for argument in arguments:
         try:
-            for file in _files(argument):
-                files.setdefault(file.real, file)
+            for path in _files(argument):
+                real = _real(path)
+                files.setdefault(real, (path, _scene_name(path, real)))
         except InputError as error:
             problems.extend(error.problems)
     problems.extend(_name_clashes(files.values()))
     scenes = []
-    for file in files.values():
+    for path, name in files.values():
         try:
-            scenes.append(load_scene(file.path, file.name))
+            scenes.append(load_scene(path, name))
         except InputError as error:
             problems.extend(error.problems)
     if problems:
@@ -128,12 +120,12 @@ def _title(path: Path) -> str:
     return title if isinstance(title, str) else "(broken file: no title)"
 
 
-def _files(argument: str) -> list[_File]:
+def _files(argument: str) -> list[Path]:
     """The files that one argument means."""
     shipped = _shipped()
     if argument in shipped:
-        return [_file(shipped[argument])]
-    inside = [_file(path) for name, path in shipped.items() if name.startswith(argument.rstrip("/") + "/")]
+        return [shipped[argument]]
+    inside = [path for name, path in shipped.items() if name.startswith(argument.rstrip("/") + "/")]
     if inside:
         return inside
     path = Path(argument)
@@ -145,9 +137,9 @@ def _files(argument: str) -> list[_File]:
         paths = sorted(path.glob("*.toml"), key=lambda path: natural_key(path.name))
         if not paths:
             raise InputError(f"{shown_path(path)}: no TOML file in this folder; allowed: a folder of scene files")
-        return [_file(path) for path in paths]
+        return paths
     if path.suffix == ".toml":
-        return [_file(path)]
+        return [path]
     raise InputError(f"{_quoted(argument)}: {_unknown_argument(argument, is_there, shipped)}")
 
 
@@ -162,12 +154,11 @@ def _unknown_argument(argument: str, is_there: bool, shipped: Iterable[str]) -> 
     return f"no such scene{nearest(argument, natural_order(names))}; allowed: what `rotor-mbs list` names, or FILE.toml"
 
 
-def _file(path: Path) -> _File:
+def _real(path: Path) -> Path:
     try:
-        real = path.resolve()
+        return path.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a NUL in the name
         raise InputError(f"{shown_path(path)}: leads to no file; allowed: a readable TOML file") from error
-    return _File(path, real, _scene_name(path, real))
 
 
 def _scene_name(path: Path, real: Path) -> str:
@@ -183,10 +174,10 @@ def _scene_name(path: Path, real: Path) -> str:
     return stem
 
 
-def _name_clashes(files: Iterable[_File]) -> list[str]:
+def _name_clashes(files: Iterable[tuple[Path, str]]) -> list[str]:
     first: dict[str, Path] = {}
     clashes = []
-    for path, _, name in files:
+    for path, name in files:
         other = first.setdefault(name, path)
         if other is not path:
             clashes.append(

@@ -202,8 +202,7 @@ class Scene:
     @property
     def rotor_key(self) -> tuple[object, ...]:
         """The rotor's parameters and loads: equal for scenes that differ in start, run or label alone."""
-        key: tuple[object, ...] = _rotor_values(self)
-        return key
+        return tuple(_rotor_values(self))
 
     def replace(self, **changes: Any) -> Scene:
         """A scene with other values at some keys of the scene file, validated like a file.

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
-from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_value
+from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_lines
 
 
 def load_scene(path: Path | str, name: str | None = None) -> Scene:
@@ -92,12 +92,12 @@ def scene_toml(scene: Scene) -> str:
     Comments and expressions of the file that the scene was read from are not kept.
     """
     tables = scene_tables(scene)
-    parts = ["".join(f"{key} = {toml_value(tables[key])}\n" for key in tables if not _is_table(tables[key]))]
+    parts = [toml_lines({key: value for key, value in tables.items() if not _is_table(value)})]
     for key, value in tables.items():
-        if _is_table(value):
-            head = f"[{key}]" if isinstance(value, dict) else f"[[{key}]]"
-            for table in [value] if isinstance(value, dict) else value:
-                parts.append(f"{head}\n" + "".join(f"{name} = {toml_value(table[name])}\n" for name in table))
+        if isinstance(value, dict):
+            parts.append(f"[{key}]\n{toml_lines(value)}")
+        elif _is_table(value):
+            parts += [f"[[{key}]]\n{toml_lines(table)}" for table in value]
     return "\n".join(parts)
 
 

@@ -189,10 +189,6 @@ def _as_tables(value: object) -> object:
     return [_as_rows(entry) for entry in value]
 
 
-def _in_list_for_blades(value: object, info: ValidationInfo) -> object:
-    return _one_per_blade(value, info, 0, "in a list for")
-
-
 def _on_pitches_with_inertia(values: list[Any], info: ValidationInfo) -> list[Any]:
     """Raises where a number or a table that is not zero is for a blade without pitch inertia; one may be for all."""
     acts = [_not_zero(value) if isinstance(value, list) else value != 0.0 for value in values]
@@ -209,7 +205,10 @@ def _not_zero(rows: list[list[float]]) -> bool:
 _Row = Annotated[list[Size], Field(min_length=2, max_length=2)]
 Rows = Annotated[list[_Row], Field(min_length=1), BeforeValidator(_as_rows), AfterValidator(_goes_forward)]
 # Of validators that come before the type's own, the last one is the first.
-_PITCHES = (BeforeValidator(_in_list_for_blades), AfterValidator(_on_pitches_with_inertia))
+_PITCHES = (
+    BeforeValidator(lambda value, info: _one_per_blade(value, info, 0, "in a list for")),
+    AfterValidator(_on_pitches_with_inertia),
+)
 Tables = Annotated[list[Rows], BeforeValidator(_as_tables), *_PITCHES]
 PerBlade = Annotated[list[NotNegativeSize], BeforeValidator(_as_list), *_PITCHES]
 _ROWS = "rows [t, {}] with t from 0 s upwards, at most two rows with one t"

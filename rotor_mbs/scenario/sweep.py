@@ -15,12 +15,12 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, scenarios_folder, sweeps_folder
+from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import scene_tables
 from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
 from rotor_mbs.scenario.sweep_design import DRAWN, Axis, Design
-from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path, toml_value
+from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path, toml_lines
 from rotor_mbs.scenario.validation import Line, Number, Table, invalid, validate_file
 from rotor_mbs.scenario.variants import KEY_FORM, Variants, is_key, parse_key, unit_of
 
@@ -112,7 +112,6 @@ class SweepTable(Table):
     seed: int = Field(0, ge=0, le=2**63 - 1, description="a whole number from 0 up")
     validation: Number = Field(0.0, gt=0, lt=1, description="a share between 0 and 1")
     test: Number = Field(0.0, gt=0, lt=1, description="a share between 0 and 1, less than 1 with validation")
-    file_bytes: Number | None = Field(None, ge=1e5, description="a number of at least 1e5, without effect")
     picture: Literal["spread", "map"] | None = Field(None, description='"spread" or "map"')
     axis: list[AxisTable] = Field(min_length=1, description="one or more [[axis]] tables")
 
@@ -229,13 +228,9 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     for key, values in axes.items():
         plain = values.tolist() if isinstance(values, np.ndarray) else values
         listed.append({"key": key, **(plain if isinstance(plain, Mapping) else {"values": plain})})
-    parts = [_toml(tables), *("\n[[axis]]\n" + _toml(axis) for axis in listed)]
+    parts = [toml_lines(tables), *("\n[[axis]]\n" + toml_lines(axis) for axis in listed)]
     text, tables["axis"] = "".join(parts), listed
     return _sweep(Path("sweep"), text, validate_file(SweepTable, tables, text, "sweep"), scene)
-
-
-def _toml(table: Mapping[str, object]) -> str:
-    return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
 Problem = Callable[[KeyPath, str], str]
@@ -257,13 +252,9 @@ def _sweep(path: Path, text: str, table: SweepTable, base: Scene | None = None) 
 def _base(path: Path, asked: str, problem: Problem) -> Scene:
     is_shipped = (scenarios_folder() / f"{asked}.toml").is_file()
     try:
-        found = find_scenes([str(path.parent / asked) if asked.endswith(".toml") and not is_shipped else asked])
+        return only_scene(str(path.parent / asked) if asked.endswith(".toml") and not is_shipped else asked)
     except InputError as error:
         raise InputError(problem(("scene",), f"scene: {error}")) from error
-    if len(found) != 1:
-        wrong = f"scene: {asked} is {len(found)} scenes; allowed: one scene's name or file"
-        raise InputError(problem(("scene",), wrong))
-    return found[0]
 
 
 def _changed(base: Scene, table: SweepTable, problem: Problem) -> Scene:

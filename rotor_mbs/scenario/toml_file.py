@@ -114,6 +114,11 @@ def toml_value(value: object) -> str:
     return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
+def toml_lines(table: Mapping[str, object]) -> str:
+    """A line `key = value` for each entry."""
+    return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
+
+
 def _read_text(path: Path) -> str:
     shown = shown_path(path)
     try:
