@@ -265,8 +265,7 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
         free, fixed = _shaft_inertia_forms(blade)
         remaining += free[0] * s * s + free[1] * c * c + free[2] * s * c
         whole += fixed[0] * s * s + fixed[1] * c * c + fixed[2] * s * c
-    shares: Array = remaining / whole
-    return shares
+    return np.asarray(remaining / whole)
 
 
 @functools.lru_cache(maxsize=512)

@@ -50,8 +50,7 @@ def horizon(reference: Trajectory) -> float:
 def angle_error(run: Trajectory, reference: Trajectory) -> Array:
     """(common samples,) rad: largest over the coordinates. Angles are unwrapped: a lost turn is an error of 2π."""
     n = min(len(run.time), len(reference.time))
-    error: Array = np.abs(run.angles[:n] - reference.angles[:n]).max(axis=1)
-    return error
+    return np.asarray(np.abs(run.angles[:n] - reference.angles[:n]).max(axis=1))
 
 
 def energy_scale(scene: Scene, run: Trajectory) -> float:
@@ -197,5 +196,4 @@ def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: 
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])
     scales = at_rest + kinetic[:, 0] + largest(work)
-    drifts: Array = largest(errors) / np.where(scales == 0.0, 1.0, scales)
-    return drifts
+    return np.asarray(largest(errors) / np.where(scales == 0.0, 1.0, scales))

@@ -378,8 +378,7 @@ def deviation(quantity: Quantity, scene: Scene, run: Trajectory, reference: Traj
         n = min(len(values), len(exact))
         values = values[:n] - exact[:n]
     found = sizes(quantity, values)
-    largest: Array = found.max(axis=tuple(range(1, found.ndim)))
-    return largest
+    return np.asarray(found.max(axis=tuple(range(1, found.ndim))))
 
 
 def sizes(quantity: Quantity, values: Array) -> Array:

@@ -73,8 +73,7 @@ def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
     epsilon     of the runs' arithmetic
     """
     largest = np.maximum(np.abs(angles).max(axis=1), 1.0)
-    bound: Array = SAFETY * np.maximum.accumulate(difference + epsilon * largest)
-    return bound
+    return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
 
 
 def build(scene: Scene, settings: Any) -> ReferenceSolver | FallbackReference:
@@ -98,8 +97,7 @@ def _transition_matrices(scene: Scene, times: Array | None = None) -> Array:
     count = 2 * len(scene.moving_coordinates)
     propagation = Propagation(scene, build_system(scene), variational=True, compact_mode=True, times=times)
     propagation.integrate()
-    matrices: Array = propagation.states[:, count:].reshape(-1, count, count)
-    return matrices
+    return np.asarray(propagation.states[:, count:].reshape(-1, count, count))
 
 
 def _largest_growth(scene: Scene, matrices: Array) -> Array:
@@ -113,8 +111,7 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
 def _in_units(scene: Scene, matrices: Array) -> Array:
     """State transition matrices for angles in rad and rates in `rate_units`."""
     units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
-    scaled: Array = matrices * units / units[:, None]
-    return scaled
+    return np.asarray(matrices * units / units[:, None])
 
 
 _QUAD = 1e-30  # tolerance: its error, grown 1e10-fold, is still below what a double can hold

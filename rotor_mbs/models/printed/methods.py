@@ -42,19 +42,15 @@ class PrintedSolver:
         scene: Scene,
         rotor: PointMassRotor,
         accelerations: Accelerations,
-        rel_tol: float,
-        abs_tol: float,
+        settings: Ode45Settings,
         *,
         keeps_refined: bool,
     ) -> None:
-        self._scene = scene
-        self._rotor = rotor
-        moving = len(scene.initial_angles) if rotor.pitches_move else 1
-        self._moving = moving
+        self._scene, self._rotor, self._keeps_refined = scene, rotor, keeps_refined
+        self._moving = moving = len(scene.initial_angles) if rotor.pitches_move else 1
         self._initial = [*scene.initial_angles[:moving], *scene.initial_rates[:moving]]
         self._right_hand_side = right_hand_side(scene, accelerations, moving)
-        self._tolerances = rel_tol, abs_tol
-        self._keeps_refined = keeps_refined
+        self._tolerances = settings.relative_tolerance, settings.absolute_tolerance
         self._result: Ode45Result | None = None
 
     def integrate(self) -> Integration:
@@ -131,9 +127,8 @@ class PrintedModel:
     def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
         rotor = self._rotor(scene)
-        tolerances = settings.relative_tolerance, settings.absolute_tolerance
         row = settings.gravity_row if isinstance(settings, PrintedSettings) else DEFAULT_ROW
-        return PrintedSolver(scene, rotor, self._accelerations(rotor, row), *tolerances, keeps_refined=not self._errata)
+        return PrintedSolver(scene, rotor, self._accelerations(rotor, row), settings, keeps_refined=not self._errata)
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
         """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
