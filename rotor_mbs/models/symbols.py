@@ -31,9 +31,6 @@ class Symbol:
     def __str__(self) -> str:
         return self.text
 
-    def __repr__(self) -> str:
-        return f"Symbol({self.text!r})"
-
     def __add__(self, other: Operand) -> Operand:
         if _is(other, 0):
             return self

@@ -7,6 +7,7 @@ variants        scenes with other numbers at some keys (Scene.replace, sweeps)
 sweep           a sweep file; sweep_design: its rows
 accuracy_bounds the bounds that results are judged by
 validation      pydantic types and error lines for all input files; schema: the keys of a scene and of a bounds file
+plausibility    numbers that look like a slip
 time_table      loads over time: values, linear segments, where an engine stops
 toml_file, expression    what these are built on
 """

@@ -10,7 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
+from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_lines
 
 
@@ -52,7 +52,7 @@ def validated_scene(tables: Mapping[str, Any], name: str) -> Scene:
 def scene_tables(scene: Scene) -> dict[str, Any]:
     """The scene as the tables of a scene file: numbers as they are, keys at their defaults left out."""
     tables: dict[str, Any] = {}
-    for one in scene_fields("label", "run", "start", "rotor"):
+    for one in fields(Scene):
         value = getattr(scene, one.name)
         if not one.metadata["key"] or value == one.default:
             continue

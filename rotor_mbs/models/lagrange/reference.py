@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -196,8 +197,11 @@ class FallbackReference:
         moving = self._scene.moving_coordinates
         state = _state(self._runs[0].observe(), moving)
         columns = []
-        for neighbour in _neighbours(self._scene, moving):
-            solver = OdeSolver(neighbour, scipy_integrator("DOP853", *_TIGHTEST), self._times)
+        for name, i in itertools.product(("initial_angles", "initial_rates"), moving):
+            start = list(getattr(self._scene, name))
+            start[i] += _PERTURBATION
+            beside: dict[str, Any] = {name: tuple(start)}
+            solver = OdeSolver(replace(self._scene, **beside), scipy_integrator("DOP853", *_TIGHTEST), self._times)
             solver.integrate()
             near = _state(solver.observe(), moving)
             column = np.full_like(state, np.inf)
@@ -209,13 +213,3 @@ class FallbackReference:
 
 def _state(run: Trajectory, moving: Sequence[int]) -> Array:
     return np.hstack([run.angles[:, moving], run.rates[:, moving]])
-
-
-def _neighbours(scene: Scene, moving: Sequence[int]) -> list[Scene]:
-    """The scene started a little off in one angle, then in one rate each."""
-
-    def beside(values: Sequence[float], i: int) -> tuple[float, ...]:
-        return (*values[:i], values[i] + _PERTURBATION, *values[i + 1 :])
-
-    angles = [replace(scene, initial_angles=beside(scene.initial_angles, i)) for i in moving]
-    return angles + [replace(scene, initial_rates=beside(scene.initial_rates, i)) for i in moving]

@@ -13,7 +13,7 @@ from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.loads import sampled_loads
 from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, load_tables, rotor_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment, value_at, values_at
+from rotor_mbs.scenario.time_table import Segment, is_constant, value_at, values_at
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_rows
 
 
@@ -99,10 +99,8 @@ def _put_energies(scene: Scene, result: Trajectory, states: Array) -> None:
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:
     """Loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
-    values: list[Any] = [value_at(table, 0.0) for table in load_tables(scene)]
-    for i in changing_loads(scene):
-        values[i] = values_at(load_tables(scene)[i], time)
-    return load_values(values)
+    tables = load_tables(scene)
+    return load_values([value_at(one, 0.0) if is_constant(one) else values_at(one, time) for one in tables])
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
