@@ -72,12 +72,9 @@ class NumberTrials:
         """The trials under these conditions, by number."""
         return {one.number: one for one in self.trials if one.conditions == conditions}
 
-    def reproduced(self, conditions: Conditions) -> int:
-        """How many numbers come out."""
-        return sum(one.reproduced for one in self.under(conditions).values())
-
     def reproduces_all(self, conditions: Conditions) -> bool:
-        return self.reproduced(conditions) == len(self.numbers)
+        """Whether every number comes out."""
+        return sum(one.reproduced for one in self.under(conditions).values()) == len(self.numbers)
 
     def durations_of_all(self, row: str) -> list[float]:
         """s, for which all numbers come out with this way of writing the row and the usual tolerances."""

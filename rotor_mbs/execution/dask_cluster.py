@@ -18,7 +18,7 @@ from contextlib import ExitStack, suppress
 from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.pool import R, SerialPool, T, TaskPool, WorkerPool, one_line
+from rotor_mbs.execution.pool import R, T, TaskPool, local_pool, one_line
 from rotor_mbs.execution.provenance import fingerprint, versions
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
@@ -37,12 +37,10 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
 
     Raises InputError where there is no such engine, or it does not answer.
     """
-    if name == "local" and not workers:
-        return SerialPool()
     if name == "local":
-        for variable, value in _KEEP_MEMORY.items():
+        for variable, value in _KEEP_MEMORY.items() if workers else ():
             os.environ.setdefault(variable, value)
-        return WorkerPool(workers, _load)
+        return local_pool(workers, _load)
     if re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
         return _open_cluster(name.removeprefix("dask:"))
     raise InputError(f"engine {name}: no such engine; allowed: {ENGINE_FORMS}")

@@ -175,22 +175,9 @@ class SerialPool(TaskPool):
         return future
 
 
-def run_tasks(
-    work: Callable[[T], R],
-    tasks: Sequence[T],
-    workers: int,
-    timeout_s: float,
-) -> Iterator[Finished[T, R]]:
-    """`work(task)` for all tasks in parallel processes; results as they come, retried as `run_in` does.
-
-    Parameters
-    ----------
-    workers : parallel processes; 0: all tasks in this process, without a time limit.
-    timeout_s : time limit of a task in s.
-    """
-    if tasks:
-        with WorkerPool(min(workers, len(tasks))) if workers else SerialPool() as pool:
-            yield from run_in(pool, work, tasks, timeout_s)
+def local_pool(workers: int, initializer: Callable[[], None] | None = None) -> TaskPool:
+    """So many worker processes of this machine; 0: none, tasks run in this process, without a time limit."""
+    return WorkerPool(workers, initializer) if workers else SerialPool()
 
 
 def run_in(
@@ -211,7 +198,13 @@ def run_in(
     again: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
 
     def completed(tasks: Iterable[T], at_once: int) -> Iterator[Finished[T, R]]:
-        return _completed(pool, work, iter(tasks), timeout_s, at_once)
+        waiting: dict[Future[R], T] = {}
+        for task in tasks:
+            waiting[pool.submit(work, task, timeout_s(task) if callable(timeout_s) else timeout_s)] = task
+            if len(waiting) >= at_once:
+                yield from _ended(pool, waiting)
+        while waiting:
+            yield from _ended(pool, waiting)
 
     for source in (tasks, again["timed_out"]):
         for end in completed(source, _PER_WORKER * pool.workers):
@@ -225,22 +218,6 @@ def run_in(
             yield replace(end, message=f"{end.message}, and again when it was tried alone")
         else:
             yield end
-
-
-def _completed(
-    pool: TaskPool,
-    work: Callable[[T], R],
-    tasks: Iterator[T],
-    timeout_s: float | Callable[[T], float],
-    at_once: int,
-) -> Iterator[Finished[T, R]]:
-    waiting: dict[Future[R], T] = {}
-    for task in tasks:
-        waiting[pool.submit(work, task, timeout_s(task) if callable(timeout_s) else timeout_s)] = task
-        if len(waiting) >= at_once:
-            yield from _ended(pool, waiting)
-    while waiting:
-        yield from _ended(pool, waiting)
 
 
 def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, R]]:

@@ -14,7 +14,7 @@ from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
-from rotor_mbs.execution.pool import run_tasks
+from rotor_mbs.execution.pool import local_pool, run_in
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core import files
 from rotor_mbs.report.core.files import Site, page_names, render
@@ -137,11 +137,12 @@ def _parts(context: Context, parts: Sequence[Part], jobs: int, on_page: OnPage) 
     count = _GROUPS * workers if workers > 1 else 1
     groups, found = [parts[start::count] for start in range(count)], dict[Part, Any]()
     on_page(0, len(parts))
-    for finished in run_tasks(partial(make_parts, context), groups, workers if count > 1 else 0, _TIMEOUT_S):
-        if finished.value is None:
-            raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")
-        found |= finished.value
-        on_page(len(found), len(parts))
+    with local_pool(workers if count > 1 else 0) as pool:
+        for finished in run_in(pool, partial(make_parts, context), groups, _TIMEOUT_S):
+            if finished.value is None:
+                raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")
+            found |= finished.value
+            on_page(len(found), len(parts))
     return found
 
 

@@ -23,7 +23,7 @@ from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.errors import RotorError, StoreError
 from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.output_lock import RESULTS, writing
-from rotor_mbs.execution.pool import run_tasks
+from rotor_mbs.execution.pool import local_pool, run_in
 from rotor_mbs.execution.provenance import versions
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
@@ -218,10 +218,11 @@ def number_trials(
         for name, scene in scenes.items()
     ]
     found: dict[tuple[Conditions, str], NumberTrial] = {}
-    for end in run_tasks(perform, tasks, workers, _TIMEOUT_S):
-        if end.value is None:
-            raise end.error or RotorError(f"{end.task.scene.name}: {end.message}")
-        found |= {(end.task.conditions, one.number): one for one in end.value}
+    with local_pool(workers) as pool:
+        for end in run_in(pool, perform, tasks, _TIMEOUT_S):
+            if end.value is None:
+                raise end.error or RotorError(f"{end.task.scene.name}: {end.message}")
+            found |= {(end.task.conditions, one.number): one for one in end.value}
     in_order = (found[conditions, item.id] for conditions in dict.fromkeys(tried) for item in items)
     texts = (GravityRowText(row, GRAVITY_ROWS[row].formula, GRAVITY_ROWS[row].of is not None) for row in rows)
     return NumberTrials(tuple(in_order), usual, tuple(texts))

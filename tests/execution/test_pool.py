@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
 from functools import partial
 from importlib import import_module
@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from rotor_mbs.execution.pool import TaskLostError, WorkerPool, run_in, run_tasks
+from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, run_in
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
@@ -212,6 +212,11 @@ def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time() -> N
         assert pool.submit(_pid, None, _LONG_S).result() != pid
 
 
+def _ends(work: Callable[[Any], Any], tasks: Sequence[Any], workers: int = 1) -> list[Finished[Any, Any]]:
+    with WorkerPool(workers) as pool:
+        return list(run_in(pool, work, tasks, _LONG_S))
+
+
 def _die_once(folder: str) -> str:
     marks = list(Path(folder).iterdir())
     (Path(folder) / f"{len(marks)}").touch()
@@ -221,9 +226,9 @@ def _die_once(folder: str) -> str:
 
 
 def test_a_task_whose_worker_died_is_tried_once_more(tmp_path: Path) -> None:
-    ends = list(run_tasks(_die_once, [str(tmp_path)], 1, _LONG_S))
+    ends = _ends(_die_once, [str(tmp_path)])
     assert [(end.value, end.failure) for end in ends] == [("done", "")]
-    ends = list(run_tasks(_end, [None], 1, _LONG_S))
+    ends = _ends(_end, [None])
     assert [(end.failure, end.message) for end in ends] == [
         ("worker_died", "its process died (exit code 3), and again when it was tried alone")
     ]
@@ -254,11 +259,11 @@ def test_a_lost_task_of_many_runs_is_split_and_only_one_run_is_lost() -> None:
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
 def test_dead_processes_leave_no_open_files() -> None:
-    list(run_tasks(_pid, [0], 1, _LONG_S))  # opens what stays open
+    _ends(_pid, [0])  # opens what stays open
     before = len(list(Path("/proc/self/fd").iterdir()))
     gc.disable()
     try:
-        ended = list(run_tasks(_end, list(range(4)), 2, _LONG_S))
+        ended = _ends(_end, list(range(4)), 2)
         assert len(list(Path("/proc/self/fd").iterdir())) <= before
     finally:
         gc.enable()

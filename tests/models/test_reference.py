@@ -13,7 +13,7 @@ from support.references import reference as frozen_reference
 from support.references import scene as shipped_scene
 from support.scenes import PAPER, general, paper
 
-from rotor_mbs.execution.pool import run_tasks
+from rotor_mbs.execution.pool import WorkerPool, run_in
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
 from rotor_mbs.models.lagrange.reference import ReferenceSolver, reference_at, uncertainty
@@ -111,7 +111,8 @@ def _limited(duration: float) -> tuple[bool, list[float]]:
 
 def test_a_reference_that_its_time_limit_ends_is_ended() -> None:
     """Springs keep the errors from growing to where that breaks off: over the rest it would take hours."""
-    (end,) = run_tasks(_limited, [1e6], 1, 60.0)
+    with WorkerPool(1) as pool:
+        (end,) = run_in(pool, _limited, [1e6], 60.0)
     assert end.value == (True, [1.0])
 
 
