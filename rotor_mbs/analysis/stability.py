@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rotor_mbs.solution.text_table import listed
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 from rotor_mbs.store.records import Record, read_records
 
@@ -203,13 +204,9 @@ def _advice(own: Sequence[SuiteRun], heading: Callable[[str], str]) -> list[str]
     partly = "with a smaller step or not everywhere" if smaller else "not everywhere"
     for action, families in (("use", use), (partly, in_part), ("do not use", avoid)):
         if families:
-            parts.append(f"{action} for {_listed([*map(heading, families)])}")
+            parts.append(f"{action} for {listed([*map(heading, families)])}")
     claimed = sum(run.false_success for run in own)
     if claimed:
         times = "once" if claimed == 1 else f"{claimed} times"
         parts.append(f"its engine claimed success {times} where the state says otherwise")
     return parts
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]

@@ -294,19 +294,19 @@ _COMMANDS = (
         _argument("--seed", type=COUNT, default=2020, metavar="N", help="of the moved starts (default: %(default)s)"),
         _JOBS,
     )),
-    Command("report", "HTML pages from any file of this program", "reports:report", ("my.h5 --open",), (
+    Command("report", "HTML pages from any file of this program", "studies:report", ("my.h5 --open",), (
         *_RESULTS,
         _output(folder, "DIR", help=_PAGES),
         _flag("--open", help="show the index in the browser"),
     )),
-    Command("figures", "the paper's figures as files for a manuscript, from a results file", "reports:figures",
+    Command("figures", "the paper's figures as files for a manuscript, from a results file", "studies:figures",
             ("--format svg --figure 11",), (
         *_RESULTS,
         _output(folder, "DIR", Path("figures")),
         _argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)"),
         _argument("--figure", action="append", metavar="N", help="this one alone; may be repeated"),
     )),
-    Command("animate", "a scene moving, from a results file", "reports:animate",
+    Command("animate", "a scene moving, from a results file", "studies:animate",
             ("paper/fig11", "mine my.h5 -o mine.gif"), (
         _argument("scene", metavar="SCENE", help="its name in the results file"),
         *_RESULTS,

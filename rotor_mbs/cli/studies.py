@@ -1,4 +1,7 @@
-"""Commands that make one study each and print its outcome. Each loads what it computes with, and not the others'."""
+"""Commands that make one study each and print its outcome, and those that draw what is stored.
+
+Each loads what it computes with, and not the others'; no model is loaded for pages and pictures.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import argparse
 import json
 import sys
 import time
+import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -137,6 +141,35 @@ def export(arguments: argparse.Namespace) -> int:
     scene = only_scene(arguments.scene)
     output = arguments.output or Path(scene.name.rpartition("/")[2] + FORMATS[arguments.to][0])
     print(*export_scene(scene, arguments.to, output), sep="\n")
+    return 0
+
+
+def report(arguments: argparse.Namespace) -> int:
+    """Pages from `arguments.file` into `arguments.output`, or beside the file."""
+    from rotor_mbs.report.build import write_report
+
+    output = arguments.output or pages_beside(arguments.file)
+    index = write_report(arguments.file, output, jobs=cores(), checked=True)
+    print(index)
+    if arguments.open:
+        webbrowser.open(index.resolve().as_uri())
+    return 0
+
+
+def figures(arguments: argparse.Namespace) -> int:
+    """The paper's figures as files for a manuscript into `arguments.output`."""
+    from rotor_mbs.report.pages.figures import write_figures
+
+    print(*write_figures(arguments.file, arguments.output, arguments.format, arguments.figure or ()), sep="\n")
+    return 0
+
+
+def animate(arguments: argparse.Namespace) -> int:
+    """`arguments.scene` of `arguments.file`, moving, into `arguments.output`."""
+    from rotor_mbs.report.animation import write_animation
+
+    output = arguments.output or Path(arguments.scene.rpartition("/")[2] + ".webp")
+    print(write_animation(arguments.file, arguments.scene, output, arguments.offset))
     return 0
 
 

@@ -23,13 +23,12 @@ from rotor_mbs.report.pages.bench import bench_pages
 from rotor_mbs.report.pages.check import check_page
 from rotor_mbs.report.pages.data_comparison import comparison_page
 from rotor_mbs.report.pages.errata import errata_page
-from rotor_mbs.report.pages.figures import walk_figure
+from rotor_mbs.report.pages.figures import PaperFigure, available, walk_figure
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.report.pages.sweep import sweep_page
-from rotor_mbs.report.paper_figures import PaperFigure, available
 from rotor_mbs.store.read import OpenResults, in_memory, is_sweep, open_results
 from rotor_mbs.store.records import read_records
 from rotor_mbs.store.sweep_dataset import StoredSweep

@@ -1,9 +1,15 @@
-"""A small table for terminals and notebooks."""
+"""A small table for terminals and notebooks, and texts in a sentence."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+
+
+def listed(texts: Sequence[str]) -> str:
+    """ "a, b and c"."""
+    return " and ".join([", ".join(texts[:-1]), texts[-1]]) if len(texts) > 1 else texts[0]
 
 
 @dataclass(frozen=True)

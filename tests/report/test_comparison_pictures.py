@@ -14,10 +14,9 @@ from rotor_mbs.analysis.finding import Agreement, Finding, Tally
 from rotor_mbs.methods.catalogue import look_of
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.looks import COLOURS, COORDINATES, GREY, coordinate_look
-from rotor_mbs.report.pages.comparison_pictures import parting
+from rotor_mbs.report.pages import comparison_pictures as comparisons
+from rotor_mbs.report.pages.comparison_pictures import Mark, parting
 from rotor_mbs.report.pages.index import heat_map, short_sentences
-from rotor_mbs.report.plots import comparisons
-from rotor_mbs.report.plots.comparisons import Mark
 from rotor_mbs.report.plots.time_histories import Series, errors
 from rotor_mbs.store.read import open_results
 

@@ -12,8 +12,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
-from rotor_mbs.report.pages.figures import in_pi, same_and_different
-from rotor_mbs.report.paper_figures import FIGURES
+from rotor_mbs.report.pages.figures import FIGURES, in_pi, same_and_different
 from rotor_mbs.report.plots.paths import projected
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.read import open_results

@@ -11,6 +11,7 @@ from rotor_mbs.analysis.number_trials import Conditions, NumberTrials, count_of_
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import fixed, number, power, with_unit
+from rotor_mbs.solution.text_table import listed
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
 _STATISTICS = {
@@ -136,9 +137,9 @@ def _verdict_cell(shares: Sequence[ClaimShare]) -> TableCell:
 
 def _shares_text(shares: Sequence[ClaimShare]) -> str:
     """ "100 %, 97 % and 12 % of 100, 100 and 87 deciding runs over 8, 10 and 12 s"."""
-    percents = _listed(["–" if not one.deciding else f"{100.0 * one.share:.0f}\N{NO-BREAK SPACE}%" for one in shares])
+    percents = listed(["–" if not one.deciding else f"{100.0 * one.share:.0f}\N{NO-BREAK SPACE}%" for one in shares])
     deciding = [str(one.deciding) for one in shares]
-    runs = deciding[0] if len(set(deciding)) == 1 else _listed(deciding)
+    runs = deciding[0] if len(set(deciding)) == 1 else listed(deciding)
     return f"{percents} of {runs} deciding runs over {_durations([one.duration for one in shares])}"
 
 
@@ -157,7 +158,7 @@ def headline(shares: ClaimShares) -> str:
     for method, name in zip(shares.methods, ("printed", "corrected"), strict=True):
         count = shares.count(method)
         said = [f"{count[verdict]} {verb}" for verdict, verb in _VERBS.items() if count[verdict]]
-        parts.append(f"in the {name} model {_listed(said)}")
+        parts.append(f"in the {name} model {listed(said)}")
     return (
         f"Of the paper's {len(shares.claims)} claims in words, {parts[0]}; {parts[1]} ({shares.runs} runs each from "
         f"starts moved by up to {number(shares.spread)} rad, over {_durations(shares.durations)})."
@@ -243,8 +244,4 @@ def _power(value: float) -> TableCell:
 
 
 def _durations(values: Sequence[float]) -> str:
-    return f"{_listed([f'{value:g}' for value in values])} s"
-
-
-def _listed(texts: Sequence[str]) -> str:
-    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
+    return f"{listed([f'{value:g}' for value in values])} s"

@@ -15,11 +15,11 @@ from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables
-from rotor_mbs.report.pages.comparison_pictures import key_picture
+from rotor_mbs.report.pages.comparison_pictures import energy_of_scenes, key_picture
 from rotor_mbs.report.pages.cost import cost_legend, cost_picture
 from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
 from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.report.plots import comparisons, paths
+from rotor_mbs.report.plots import paths
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 
 Scenes = Mapping[str, StoredScene]
@@ -149,7 +149,7 @@ def _energy(scenes: Scenes) -> Picture | None:
         return None
     caption = f"Energy made from nothing: the printed equations, more than a thousandth in {made} of {len(rows)} scenes"
     legend = [LegendEntry(label_of(name), Look(look.colour, "", look.marker)) for name, look in drawn.items()]
-    return picture(comparisons.energy_of_scenes(rows), "energy-scenes", caption, f"{caption}.", legend=legend)
+    return picture(energy_of_scenes(rows), "energy-scenes", caption, f"{caption}.", legend=legend)
 
 
 def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:

@@ -92,22 +92,17 @@ def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:
     """Frequencies at the i-th speed."""
     each = first.sets[i]
     backward, forward = (values[i] for values in first.whirl)
-    rows = []
-    for k, name in enumerate(first.names):
-        undamped = float(each.undamped_frequencies[k])
-        numbers = [
-            undamped / (2.0 * math.pi),
-            undamped,
-            float(each.damped_frequencies[k]),
-            float(each.damping_ratios[k]),
-        ]
-        numbers += [float(each.growth_rates[k]), float(backward[k]), float(forward[k])]
-        rows.append([name, *(_shown(value, 7) for value in numbers)])
-    head = (
-        "Mode", "undamped (Hz)", "undamped (rad/s)", "damped (rad/s)", "damping ratio", "growth rate (1/s)",
-        "backward whirl (rad/s)", "forward whirl (rad/s)",
-    )  # fmt: skip
-    return PageTable(caption, head, rows, tuple(range(1, len(head)))).without_empty_columns()
+    columns = {
+        "undamped (Hz)": each.undamped_frequencies / (2.0 * math.pi),
+        "undamped (rad/s)": each.undamped_frequencies,
+        "damped (rad/s)": each.damped_frequencies,
+        "damping ratio": each.damping_ratios,
+        "growth rate (1/s)": each.growth_rates,
+        "backward whirl (rad/s)": backward,
+        "forward whirl (rad/s)": forward,
+    }
+    rows = [[name, *(_shown(float(x[k]), 7) for x in columns.values())] for k, name in enumerate(first.names)]
+    return PageTable(caption, ("Mode", *columns), rows, range(1, 1 + len(columns))).without_empty_columns()
 
 
 def _shape_table(caption: str, one: LinearModes, i: int) -> PageTable:

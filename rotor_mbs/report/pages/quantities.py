@@ -96,11 +96,12 @@ def _section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: flo
 
 def sizes(quantity: Quantity, runs: Runs) -> Curves:
     """The largest magnitude of the quantity over its components, of each run that has it."""
-    own = {method: run for method, run in runs.items() if quantity.name in run}
-    columns = {
-        method: np.abs(run.array(quantity.name)).reshape(len(run.array("time")), -1) for method, run in own.items()
-    }
-    return {m: Series(run.array("time"), columns[m].max(axis=1), look_of(m)) for m, run in own.items()}
+    found = {}
+    for method, run in runs.items():
+        if quantity.name in run:
+            columns = np.abs(run.array(quantity.name)).reshape(len(run.array("time")), -1)
+            found[method] = Series(run.array("time"), columns.max(axis=1), look_of(method))
+    return found
 
 
 def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[Component]:

@@ -19,11 +19,10 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables, comparison_pictures, quantities, scene_tables
 from rotor_mbs.report.pages.cost import cost_section
 from rotor_mbs.report.pages.drive import drive_section
+from rotor_mbs.report.pages.figures import HEADINGS
 from rotor_mbs.report.pages.scene_tables import metric
 from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.report.paper_figures import HEADINGS
 from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.comparisons import VISIBLE
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
@@ -127,7 +126,7 @@ def _lead(drawn: DrawnRuns) -> list[str]:
         parted = _parted(drawn)
         most = f"by up to {with_unit(departure, 'rad')}{energy}."
         if parted is not None:
-            most = f"{comparison_pictures.at_time(parted)} by {VISIBLE:g} rad, in the end {most}"
+            most = f"{comparison_pictures.at_time(parted)} by {comparison_pictures.VISIBLE:g} rad, in the end {most}"
         found.append(f"The printed model departs from the reference {most}")
     runs = [run for run in run_selection.corrected_runs(drawn.scene).values() if run.status == "ok"]
     errors = {label_of(run.method): error for run in runs if (error := metric(run, "angle_error_max")) is not None}

@@ -18,6 +18,7 @@ from rotor_mbs.report.pages import quantities
 from rotor_mbs.report.pages.scene import motion_of, opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell
 from rotor_mbs.report.plots import time_histories as histories
+from rotor_mbs.solution.text_table import listed
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.store.records import Record, read_records
 
@@ -188,8 +189,8 @@ def _motion(run: StoredRun | None) -> Section:
         return Section()
     caption, unresolved = f"Angles and rates of {label_of(run.method)}", _unresolved(run)
     if unresolved:
-        names = " and ".join(filter(None, [", ".join(unresolved[:-1]), unresolved[-1]]))
-        caption += f". The samples are too far apart to resolve the swings of {names}: only their range is meaningful"
+        caption += f". The samples are too far apart to resolve the swings of {listed(unresolved)}: "
+        caption += "only their range is meaningful"
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(run.labels)]
     return Section([picture(histories.motion(*motion_of(run)), "motion", caption, caption)], legend)
 
