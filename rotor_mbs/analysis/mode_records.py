@@ -9,8 +9,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,49 +31,10 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.store.layout import Column
 from rotor_mbs.store.records import Record, read_records
 
+# By name: values, and what they are.
+Datasets: TypeAlias = Mapping[str, tuple[NDArray[Any], Column]]
 _SPEED = Column(("speed",), "rad/s", "rotor speed")
-_LINEAR = {
-    "speed": _SPEED,
-    "mode": Column(("mode",), "1", "number of the mode, names in the attribute labels"),
-    "coordinate": Column(("coordinate",), "1", "coordinate that moves, names in the attribute labels"),
-    "component": Column(("component",), "1", "rotor and multiblade coordinate, names in the attribute labels"),
-    "equation": Column(("equation",), "1", "equation of motion, of the coordinate with the same number"),
-    "root": Column(("root",), "1", "both eigenvalues of a mode"),
-    "steady_angle": Column(("speed", "coordinate"), "rad", "angle at the steady state"),
-    "undamped_frequency": Column(("speed", "mode"), "rad/s", "undamped frequency, in the rotor's frame"),
-    "damped_frequency": Column(("speed", "mode"), "rad/s", "damped frequency, in the rotor's frame"),
-    "damping_ratio": Column(("speed", "mode"), "1", "share of critical damping"),
-    "growth_rate": Column(("speed", "mode"), "1/s", "largest real part of the mode's eigenvalues"),
-    "backward_whirl_frequency": Column(("speed", "mode"), "rad/s", "damped frequency less speed, in the base frame"),
-    "forward_whirl_frequency": Column(("speed", "mode"), "rad/s", "damped frequency plus speed, in the base frame"),
-    "eigenvalue_real": Column(("speed", "mode", "root"), "1/s", "eigenvalue, real part"),
-    "eigenvalue_imag": Column(("speed", "mode", "root"), "1/s", "eigenvalue, imaginary part"),
-    "shape_real": Column(("speed", "mode", "coordinate"), "1", "mode shape, real part, largest entry 1"),
-    "shape_imag": Column(("speed", "mode", "coordinate"), "1", "mode shape, imaginary part"),
-    "multiblade_shape_real": Column(("speed", "mode", "component"), "1", "multiblade mode shape, real part"),
-    "multiblade_shape_imag": Column(("speed", "mode", "component"), "1", "multiblade mode shape, imaginary part"),
-    "stiffness": Column(("speed", "equation", "coordinate"), "1/s^2", "stiffness, mass matrix divided out"),
-    "damping": Column(("speed", "equation", "coordinate"), "1/s", "damping and gyroscopic terms, mass divided out"),
-}
-_FLOQUET = {
-    "speed": _SPEED,
-    "multiplier": Column(("multiplier",), "1", "number of the multiplier, the largest first"),
-    "multiplier_real": Column(("speed", "multiplier"), "1", "Floquet multiplier, real part"),
-    "multiplier_imag": Column(("speed", "multiplier"), "1", "Floquet multiplier, imaginary part"),
-    "largest_multiplier": Column(("speed",), "1", "largest modulus, multipliers that are always 1 left out"),
-    "growth_rate": Column(("speed",), "1/s", "its logarithm over the time of a turn"),
-    "stable": Column(("speed",), "1", "1 where no multiplier is above 1, 0 where one is, -1 where not known"),
-    "product_error": Column(("speed",), "1", "logarithm of the product of the multipliers less the integrated trace"),
-    "torque": Column(("speed",), "N m", "torque on the rotor that keeps its mean speed"),
-    "mismatch": Column(("speed",), "rad", "what the periodic motion misses after a turn"),
-}
-_CHART = {
-    "bearing_stiffness": Column(("bearing_stiffness",), "N m/rad", "stiffness of every pitch bearing"),
-    "speed": _SPEED,
-    "largest_multiplier": Column(
-        ("bearing_stiffness", "speed"), "1", "largest modulus of a multiplier, those that are always 1 left out"
-    ),
-}
+_LARGEST = "largest modulus of a multiplier, those that are always 1 left out"
 
 
 def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
@@ -82,11 +44,13 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
     sets = []
     for one in sources.values():
         record = _linear_record("", one, {})
-        labels = {name: record.attributes.get(f"{name}_labels") for name in _LINEAR}
         variables = {
-            name: (column.dimensions, labels[name] or values, {"units": column.units, "long_name": column.long_name})
-            for name, column in _LINEAR.items()
-            for values in (record.arrays[name],)
+            name: (
+                column.dimensions,
+                record.attributes.get(f"{name}_labels", record.arrays[name]),
+                {"units": column.units, "long_name": column.long_name},
+            )
+            for name, column in record.columns.items()
         }
         coordinates = {name: value for name, value in variables.items() if value[0] == (name,)}
         data = {name: value for name, value in variables.items() if name not in coordinates}
@@ -107,71 +71,90 @@ def to_records(modes: SceneModes, attributes: Mapping[str, Any]) -> list[Record]
         _linear_record(modes.scene, one, common) for kind in (modes.rest, modes.rotation) for one in kind.values()
     ]
     if modes.floquet is not None:
-        records.append(_floquet_record(modes.scene, modes.floquet, common))
+        facts = {**common, "messages": list(modes.floquet.messages)}
+        records.append(_record(modes.scene, f"lagrange/{FLOQUET}", facts, _floquet_datasets(modes.floquet)))
     if modes.chart is not None:
-        chart = modes.chart
-        arrays = {
-            "bearing_stiffness": chart.stiffnesses,
-            "speed": chart.speeds,
-            "largest_multiplier": chart.largest,
-        }
-        records.append(Record("modes", modes.scene, f"lagrange/{CHART}", common, arrays, _CHART))
+        records.append(_record(modes.scene, f"lagrange/{CHART}", common, _chart_datasets(modes.chart)))
     return records
 
 
+def _record(scene: str, name: str, attributes: Mapping[str, Any], datasets: Datasets) -> Record:
+    arrays = {dataset: values for dataset, (values, _) in datasets.items()}
+    return Record("modes", scene, name, attributes, arrays, {dataset: what for dataset, (_, what) in datasets.items()})
+
+
 def _linear_record(scene: str, one: LinearModes, common: Mapping[str, Any]) -> Record:
-    components = ("rotor", *multiblade(one.blades)[0])
-    backward, forward = one.whirl
-    n = np.arange(len(one.coordinates))
-    arrays: dict[str, NDArray[Any]] = {
-        "speed": one.speeds,
-        "mode": n,
-        "coordinate": n,
-        "component": np.arange(len(components)),
-        "equation": n,
-        "root": np.arange(2),
-        "steady_angle": one.angles,
-        "undamped_frequency": one.over_speed("undamped_frequencies"),
-        "damped_frequency": one.over_speed("damped_frequencies"),
-        "damping_ratio": one.over_speed("damping_ratios"),
-        "growth_rate": one.over_speed("growth_rates"),
-        "backward_whirl_frequency": backward,
-        "forward_whirl_frequency": forward,
-        "stiffness": one.stiffness,
-        "damping": one.damping,
-    }
-    for name, values in (
-        ("eigenvalue", one.eigenvalues),
-        ("shape", one.shapes),
-        ("multiblade_shape", one.multiblade_shapes),
-    ):
-        arrays[f"{name}_real"], arrays[f"{name}_imag"] = values.real, values.imag
     attributes = {
         **common,
         "label": one.label,
         "mode_labels": list(one.names),
         "symmetric": bool(one.sets[0].names),
         "coordinate_labels": list(one.coordinates),
-        "component_labels": list(components),
+        "component_labels": ["rotor", *multiblade(one.blades)[0]],
         "messages": list(one.messages),
     }
-    return Record("modes", scene, f"{one.source}/{one.kind}", attributes, arrays, _LINEAR)
+    return _record(scene, f"{one.source}/{one.kind}", attributes, _linear_datasets(one))
 
 
-def _floquet_record(scene: str, table: FloquetTable, common: Mapping[str, Any]) -> Record:
-    arrays: dict[str, NDArray[Any]] = {
-        "speed": table.speeds,
-        "multiplier": np.arange(table.multipliers.shape[1]),
-        "multiplier_real": table.multipliers.real,
-        "multiplier_imag": table.multipliers.imag,
-        "largest_multiplier": table.largest,
-        "growth_rate": table.growth_rates,
-        "stable": table.stable,
-        "product_error": table.product_error,
-        "torque": table.torque,
-        "mismatch": table.mismatch,
+def _linear_datasets(one: LinearModes) -> Datasets:
+    mode, shape = partial(Column, ("speed", "mode")), one.multiblade_shapes
+    over, n, (backward, forward) = one.over_speed, np.arange(len(one.coordinates)), one.whirl
+    entry, part = partial(Column, ("speed", "equation", "coordinate")), partial(Column, ("speed", "mode", "component"))
+    root, place = partial(Column, ("speed", "mode", "root")), partial(Column, ("speed", "mode", "coordinate"))
+    return {
+        "speed": (one.speeds, _SPEED),
+        "mode": (n, Column(("mode",), "1", "number of the mode, names in the attribute labels")),
+        "coordinate": (n, Column(("coordinate",), "1", "coordinate that moves, names in the attribute labels")),
+        "component": (
+            np.arange(shape.shape[2]),
+            Column(("component",), "1", "rotor and multiblade coordinate, names in the attribute labels"),
+        ),
+        "equation": (n, Column(("equation",), "1", "equation of motion, of the coordinate with the same number")),
+        "root": (np.arange(2), Column(("root",), "1", "both eigenvalues of a mode")),
+        "steady_angle": (one.angles, Column(("speed", "coordinate"), "rad", "angle at the steady state")),
+        "undamped_frequency": (over("undamped_frequencies"), mode("rad/s", "undamped frequency, in the rotor's frame")),
+        "damped_frequency": (over("damped_frequencies"), mode("rad/s", "damped frequency, in the rotor's frame")),
+        "damping_ratio": (over("damping_ratios"), mode("1", "share of critical damping")),
+        "growth_rate": (over("growth_rates"), mode("1/s", "largest real part of the mode's eigenvalues")),
+        "backward_whirl_frequency": (backward, mode("rad/s", "damped frequency less speed, in the base frame")),
+        "forward_whirl_frequency": (forward, mode("rad/s", "damped frequency plus speed, in the base frame")),
+        "eigenvalue_real": (one.eigenvalues.real, root("1/s", "eigenvalue, real part")),
+        "eigenvalue_imag": (one.eigenvalues.imag, root("1/s", "eigenvalue, imaginary part")),
+        "shape_real": (one.shapes.real, place("1", "mode shape, real part, largest entry 1")),
+        "shape_imag": (one.shapes.imag, place("1", "mode shape, imaginary part")),
+        "multiblade_shape_real": (shape.real, part("1", "multiblade mode shape, real part")),
+        "multiblade_shape_imag": (shape.imag, part("1", "multiblade mode shape, imaginary part")),
+        "stiffness": (one.stiffness, entry("1/s^2", "stiffness, mass matrix divided out")),
+        "damping": (one.damping, entry("1/s", "damping and gyroscopic terms, mass divided out")),
     }
-    return Record("modes", scene, f"lagrange/{FLOQUET}", {**common, "messages": list(table.messages)}, arrays, _FLOQUET)
+
+
+def _floquet_datasets(table: FloquetTable) -> Datasets:
+    at, each = partial(Column, ("speed",)), partial(Column, ("speed", "multiplier"))
+    count = Column(("multiplier",), "1", "number of the multiplier, the largest first")
+    return {
+        "speed": (table.speeds, _SPEED),
+        "multiplier": (np.arange(table.multipliers.shape[1]), count),
+        "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
+        "multiplier_imag": (table.multipliers.imag, each("1", "Floquet multiplier, imaginary part")),
+        "largest_multiplier": (table.largest, at("1", "largest modulus, multipliers that are always 1 left out")),
+        "growth_rate": (table.growth_rates, at("1/s", "its logarithm over the time of a turn")),
+        "stable": (table.stable, at("1", "1 where no multiplier is above 1, 0 where one is, -1 where not known")),
+        "product_error": (
+            table.product_error, at("1", "logarithm of the product of the multipliers less the integrated trace")
+        ),
+        "torque": (table.torque, at("N m", "torque on the rotor that keeps its mean speed")),
+        "mismatch": (table.mismatch, at("rad", "what the periodic motion misses after a turn")),
+    }  # fmt: skip
+
+
+def _chart_datasets(chart: StabilityChart) -> Datasets:
+    stiffness = Column(("bearing_stiffness",), "N m/rad", "stiffness of every pitch bearing")
+    return {
+        "bearing_stiffness": (chart.stiffnesses, stiffness),
+        "speed": (chart.speeds, _SPEED),
+        "largest_multiplier": (chart.largest, Column(("bearing_stiffness", "speed"), "1", _LARGEST)),
+    }
 
 
 def read_modes(path: Path) -> dict[str, SceneModes]:

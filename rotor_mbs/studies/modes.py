@@ -14,14 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from rotor_mbs.analysis.campbell import (
-    REST,
-    ROTATION,
-    FloquetTable,
-    LinearModes,
-    SceneModes,
-    StabilityChart,
-)
+from rotor_mbs.analysis.campbell import REST, ROTATION, FloquetTable, LinearModes, SceneModes, StabilityChart
 from rotor_mbs.analysis.mode_records import to_records
 from rotor_mbs.analysis.modes import Array, Floquet, ModeSet, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal
