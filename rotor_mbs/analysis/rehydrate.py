@@ -61,7 +61,7 @@ def rehydrate(stored: StoredScene, run: StoredRun, reference: Trajectory | None 
     if faults and _faults(scene, run, complete=False):  # more is wrong than that the run stops early
         return Rehydrated(scene, None, reference, faults)
     facts = run.attributes
-    success = bool(facts.get("engine_success", not faults))  # which a frozen reference does not have
+    success = bool(facts.get("engine_success", _is_frozen(run)))
     out_of_time = run.status == "timed_out" and not success
     engine = Integration(success, str(facts.get("engine_message", "")), out_of_time=out_of_time)
     found = Solution(scene, run.method, _trajectory(scene, run), engine, run.settings)
@@ -70,13 +70,17 @@ def rehydrate(stored: StoredScene, run: StoredRun, reference: Trajectory | None 
     return Rehydrated(scene, found, reference, faults)
 
 
+def _is_frozen(run: StoredRun) -> bool:
+    """A frozen reference has no report of its engine, and need not have what follows from its angles and rates."""
+    return run.method == REFERENCE and "frozen_with" in run.attributes
+
+
 def _faults(scene: Scene, run: StoredRun, complete: bool = True) -> list[str]:
-    """complete: every sample must be there; else as many as there are times. A frozen reference need not have what
-    follows from its angles and rates."""
+    """complete: every sample must be there; else as many as there are times."""
     rows = scene.samples if complete or "time" not in run else len(run.array("time"))
     expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
     for quantity in quantities(scene.outputs):
-        if "frozen_with" in run.attributes and quantity.name not in (*KEPT, *run.names):
+        if _is_frozen(run) and quantity.name not in (*KEPT, *run.names):
             continue
         if quantity.required or (quantity.name == "angle_uncertainty" and run.method == REFERENCE):
             expected[quantity.name] = (rows, *row_shape(quantity, scene))

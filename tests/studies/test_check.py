@@ -96,6 +96,15 @@ def test_a_file_of_references_passes(good: Path, tmp_path: Path) -> None:
     assert {one.scene for one in found if one.check == "complete"} == set(SCENES)
 
 
+def test_a_run_marked_as_a_frozen_reference_is_not_excused(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with h5py.File(copy, "r+") as file:
+        run = file[f"check/general/{METHOD}"]
+        del run["energy_error"]
+        run.attrs["frozen_with"] = "1.0"
+        seal(run)
+    named(told(capsys, copy, status=1), f"FAIL complete: check/general {METHOD}", "energy_error")
+
+
 def test_margins_are_a_table_of_seen_bound_and_ratio(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = told(capsys, good, "--margins", status=0)
     assert lines[0].split() == ["check", "method", "seen", "bound", "ratio", "where"]
