@@ -101,6 +101,12 @@ def test_the_rate_of_a_pitch_without_inertia_is_no_start() -> None:
     assert of_samples(solve(METHOD, scene, {}))["start", "angles, rates"] == 0.0
 
 
+def test_rates_that_are_not_asked_for_have_no_start() -> None:
+    run = run_of(outputs=("angles",))
+    run.trajectory.rates += 1.0
+    assert of_samples(run)["start", "angles, rates"] == 0.0
+
+
 def test_a_start_within_a_radian_is_off_by_what_was_added() -> None:
     run = run_of()
     run.trajectory.angles[0, 1] += 1e-3
@@ -111,7 +117,9 @@ def test_settings_are_judged_always_and_steps_where_they_are_known() -> None:
     scene, rk44 = paper("fig11", duration=1.0, samples=11), "exudyn_tree/rk44"
     for steps, expected in ((None, set()), (50, {("steps", "steps")})):
         one = stored(rk44, attributes={"steps": steps}, settings={"step": 0.03}, time=np.zeros(11))
-        found = values(verdicts._of_settings(one, BOUNDS, scene))
+        given = list(verdicts._of_settings(one, BOUNDS, scene))
+        assert given[0].look_at == "the method's, each within its range"
+        found = values(given)
         assert found.keys() - {("settings", "settings")} == expected
         assert found.get(("steps", "steps"), 0.25) == pytest.approx(0.25)
 
@@ -217,6 +225,25 @@ def test_a_status_and_a_claim_are_a_fault_each(status: str, claimed: int, faults
     assert ("the engine's claim of success is not false" in judged.look_at) == bool(claimed)
 
 
+def test_a_run_that_says_nothing_of_its_engines_claim_has_made_none_that_is_false(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run = run_of(outputs=("angles",))
+    found = Rehydrated(run.scene, run, None, [])
+    assert verdicts._status(stored(status="unchecked"), BOUNDS, found, run).passed
+    false = SimpleNamespace(status="unchecked", message="", false_success=True)
+    monkeypatch.setattr(verdicts, "judge", lambda *_: false)
+    given = verdicts._status(stored(status="unchecked"), BOUNDS, found, run)
+    assert given.value == 1.0
+    assert given.look_at.endswith("the engine's claim of success is false")
+
+
+def test_a_balance_without_its_energies_fails() -> None:
+    run = run_of()
+    run.trajectory.energy_error, run.trajectory.kinetic_energy = np.zeros(5), None
+    assert np.isnan(of_samples(run)["energies", "energy error"])
+
+
 def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
     scene: Any = SimpleNamespace(name="scene", reference=own)
     return values(verdicts._of_reference(scene, shipped, BOUNDS))
@@ -319,6 +346,39 @@ def test_damage_outside_the_runs_is_told_too(tmp_path: Path, monkeypatch: pytest
     with open_results(made) as results:
         found = [one for one in verdicts.verdicts(results, [], BOUNDS) if one.check == "integrity"]
     assert [(one.scene, one.method, one.value) for one in found] == [("paper/fig11", REFERENCE, 1), ("file", "*", 1)]
+
+
+def test_damage_is_told_of_the_group_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdicts, "all_damages", lambda _: [("", "a"), ("paper/fig11/reference", "b"), ("", "c")])
+    found = verdicts._damages(SimpleNamespace(path="r.h5", root=None))  # type: ignore[arg-type]
+    assert found == {"file": ["a", "c"], "paper/fig11/reference": ["b"]}
+
+
+def test_what_cannot_be_read_is_a_verdict_where_damage_is_known_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of an array that is as written, the same error is a fault of the program."""
+
+    def fail(*_: object) -> None:
+        raise KeyError("angles")
+
+    monkeypatch.setattr(verdicts, "rehydrate", fail)
+    scene: Any = SimpleNamespace(name="scene")
+    found = verdicts._of_stored_run(scene, stored(), None, BOUNDS, ["angles"])
+    assert [one.check for one in found if not one.passed] == ["integrity", "complete"]
+    with pytest.raises(KeyError):
+        verdicts._of_stored_run(scene, stored(), None, BOUNDS, [])
+
+
+def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: Path) -> None:
+    fig11 = paper("fig11", samples=501)
+    curve = rotor(lambda t: 2.7313 * np.sin(np.pi * t / 10.0))
+    made = [
+        Made(fig11, REFERENCE, rotor(np.zeros_like)),
+        *(Made(fig11, name, curve) for name in ("printed/ode45", METHOD)),
+    ]
+    with open_results(store(tmp_path / "r.h5", made)) as results:
+        found = values(verdicts.verdicts(results, [], BOUNDS))
+    assert [value for (check, _), value in found.items() if check == "copied"] == [1.0]
+    assert [value for (check, _), value in found.items() if check == "published"] == pytest.approx([2.0])
 
 
 def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:

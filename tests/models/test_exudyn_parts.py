@@ -146,6 +146,7 @@ def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None
     run = solve(name, SINGULAR, {})
     assert time.perf_counter() - start < 5.0
     assert not run.integration.success
+    assert not run.integration.out_of_time
     assert run.integration.message
     assert "\n" not in run.integration.message
     assert 0.0 < run.integration.time_reached < 0.1

@@ -16,7 +16,8 @@ from support.scenes import PAPER, general, paper
 from rotor_mbs.execution.pool import WorkerPool, run_in
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
-from rotor_mbs.models.lagrange.reference import ReferenceSolver, reference_at, uncertainty
+from rotor_mbs.models.lagrange.loads import quad_loads, sampled_loads
+from rotor_mbs.models.lagrange.reference import FallbackReference, ReferenceSolver, build, reference_at, uncertainty
 from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
@@ -138,10 +139,42 @@ def test_a_reference_that_fails_says_why_and_how_far_the_better_run_came(failing
 
 
 def test_a_reference_has_loads_where_they_are_asked_for() -> None:
+    """Those of its quad states, of which those of the stored doubles lack the last bits."""
     pytest.importorskip("heyoka")
-    for outputs in (("angles", "rates"), ("angles", "rates", "loads")):
-        found = solve("reference", paper("fig03", duration=0.1, samples=3, outputs=outputs), {}).trajectory
-        assert ("blade_root_force" in found.quantities) == ("loads" in outputs)
+    scene = paper("fig03", duration=0.1, samples=3)
+    assert "blade_root_force" not in solve("reference", scene, {}).trajectory.quantities
+    scene = replace(scene, outputs=("angles", "rates", "loads"))
+    solver = ReferenceSolver(scene, 1e-30, 1e-33)
+    solver.integrate()
+    found = solver.observe()
+    name, at_doubles = "blade_root_force", sampled_loads(scene, found.time, found.angles, found.rates)
+    in_quad = quad_loads(scene, found.time, solver._runs[0].states)
+    assert found.quantities[name].tobytes() == in_quad[name].tobytes() != at_doubles[name].tobytes()
+
+
+@pytest.mark.parametrize("kind", [ReferenceSolver, FallbackReference])
+@pytest.mark.parametrize("shorter", [0, 1])
+def test_a_reference_of_which_one_run_ends_early(kind: Any, shorter: int) -> None:
+    """In quad precision it ends there, too; the fallback's uncertainty is infinite past the end of the looser run."""
+    pytest.importorskip("heyoka")
+    scene = paper("fig03", duration=0.1, samples=4, outputs=("angles", "rates"))
+    solver = kind(scene, 1e-30, 1e-33) if kind is ReferenceSolver else kind(scene)
+    solver.integrate()
+    name, run = "states" if kind is ReferenceSolver else "_states", solver._runs[shorter]
+    setattr(run, name, getattr(run, name)[:1])
+    found = solver.observe()
+    rows = 4 if kind is FallbackReference and shorter else 1
+    assert len(found.time) == len(found.error_growth) == rows
+    assert np.isfinite(found.angle_uncertainty).tolist() == [True] + [False] * (rows - 1)
+    assert found.error_growth[0] == pytest.approx(1.0, rel=1e-6)  # the fallback's are quotients of differences of 1e-9
+
+
+def test_where_heyoka_is_not_installed_the_fallback_takes_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reference_module, "is_available", lambda: False)
+    monkeypatch.setattr(reference_module, "Propagation", None)
+    scene = paper("fig03", duration=0.1, samples=3)
+    assert isinstance(build(scene, None), FallbackReference)
+    assert len(reference_at(scene, np.linspace(0.0, 0.1, 3)).trajectory.time) == 3
 
 
 @pytest.mark.parametrize(("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,11 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods import time_limit
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.models.lagrange import taylor
+from rotor_mbs.models.lagrange.closed_form import load_values
+from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
-from rotor_mbs.models.lagrange.samples import Advance, over_segments
+from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
+from rotor_mbs.models.lagrange.taylor import Propagation, build_system
 from rotor_mbs.scenario.time_table import Segment
 
 TIMES = np.linspace(0.0, 3.0, 7)
@@ -89,15 +94,38 @@ def test_a_time_limit_ends_a_run_between_two_evaluations(monkeypatch: pytest.Mon
     assert found.message == time_limit.message()
 
 
-def test_a_solver_at_chosen_times_has_those() -> None:
+@pytest.mark.parametrize("engine", ["scipy", "heyoka"])
+def test_a_solver_at_chosen_times_has_those(engine: str) -> None:
     """A rotor that turns uniformly."""
+    pytest.importorskip(engine)
     times = np.array([0.0, 0.3, 1.7])
     scene = paper("fig06", gravity=0.0, initial_rates=(0.5, 0.0, 0.0, 0.0))
-    solver = OdeSolver(scene, INTEGRATORS["DOP853"], times)
+    solver: Any = OdeSolver(scene, INTEGRATORS["DOP853"], times)
+    if engine == "heyoka":
+        solver = Propagation(scene, build_system(scene), times=times, tol=1e-15, compact_mode=True)
     assert solver.integrate().success
     found = solver.observe()
     assert found.time.tolist() == times.tolist()
     assert found.angles[:, 0] == pytest.approx(scene.initial_angles[0] + 0.5 * times, abs=1e-9)
+
+
+def test_a_load_over_time_is_in_quad_precision_in_a_quad_run() -> None:
+    """A torque that grows by a third of 1000 N m a second, which no double is, on a balanced rotor: s t³ / 6 I."""
+    pytest.importorskip("heyoka")
+    scene = paper("fig06", gravity=0.0, initial_angles=(0.0,) * 4, initial_rates=(0.0,) * 4, duration=3.0, samples=2)
+    scene = replace(scene, rotor_torque=((0.0, 0.0), (3.0, 1000.0)))
+    run = Propagation(scene, build_system(scene), quad=True, tol=1e-32, compact_mode=True)
+    assert run.integrate().success
+    x, _, z = map(Fraction, scene.blades[0].centre_of_mass)
+    inertia = 3 * Fraction(scene.blades[0].mass) * (x * x + z * z) + Fraction(scene.hub_inertia)
+    (exact,) = array_of([Fraction(1000, 3) * 27 / (6 * inertia)], quad=True)
+    assert abs(float((run.states[-1, 0] - exact) / exact)) < 1e-30
+
+
+def test_constant_rest_angles_do_no_work() -> None:
+    """Of three pitches, loads 1 to 3 are their torques, 4 to 6 their rest angles."""
+    loads = load_values([0.0, 1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
+    assert at_constant_rests((0, 1, 5), loads).rests == [0.0, 0.2, 0.0]
 
 
 @pytest.mark.parametrize("tolerance", [None, 1e-13, 1e-9])

@@ -300,8 +300,8 @@ _TESTS = {
     f"{_L}.ode_solvers": ("models/test_segments.py",),
     f"{_L}.methods": ("methods/test_settings.py",),
     f"{_L}.taylor": (
-        "models/test_segments.py::test_the_order_of_taylors_series_is_that_of_its_tolerance",
-        "models/test_segments.py::test_what_taylor_builds_is_listed_without_loading_heyoka",
+        "models/test_sweep_ensemble.py::test_runs_side_by_side_are_the_runs_one_by_one[fixed pitch]",
+        "models/test_segments.py",
         "models/test_lagrange.py::test_error_growth_is_that_of_neighbouring_runs",
     ),
     f"{_L}.samples": (
@@ -313,6 +313,8 @@ _TESTS = {
         f"{_REFERENCE}the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls",
         f"{_REFERENCE}a_reference_that_fails_says_why_and_how_far_the_better_run_came",
         f"{_REFERENCE}a_reference_has_loads_where_they_are_asked_for",
+        f"{_REFERENCE}a_reference_of_which_one_run_ends_early",
+        f"{_REFERENCE}where_heyoka_is_not_installed_the_fallback_takes_its_place",
         f"{_REFERENCE}growth_over_one_interval_is_that_over_its_halves",
         f"{_REFERENCE}a_pitch_that_is_fixed_has_no_growth_and_no_unit",
         f"{_REFERENCE}amplification_of_a_stiff_oscillation_is_one",

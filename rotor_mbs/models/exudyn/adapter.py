@@ -136,7 +136,7 @@ class System:
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         settings = _settings(scheme, data.ODE2Size(), data.AEsize())
         trials = self._limit_trials(scheme) if scheme.trial_steps else []
-        total = Integration(True, "", 0.0, 0, 0)
+        total = Integration(True)
         for interval in intervals:
             before_interval(interval)
             if interval is intervals[0] and scheme.lacks_initial_accelerations:
