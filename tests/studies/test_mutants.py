@@ -89,7 +89,7 @@ EQUIVALENT = {
         "decides how long a run takes, not what comes out"
     ),
     r"claims\._relation .*value \* against scaled": "its sign alone counts",
-    r"verdicts\._start_off .*1 -> 2": "one zero or two: the largest is zero",
+    r"verdicts\._(start|energies)_off .*1 -> 2": "one zero or two: the largest is zero",
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"kinematics\._frames .*:25: s -> c": "zeros of its shape",
     r"exact\._pendulum .*sign in ellipk": "sn is the same on both sides of its quarter period",
