@@ -121,8 +121,11 @@ class WorkerPool(TaskPool):
         self._free: LifoQueue[_Process] = LifoQueue()
         for process in reversed(self._processes):
             self._free.put(process)
-        for process in self._processes[: cores()]:
-            self._threads.submit(process.start)
+        try:
+            for process in self._processes[: cores()]:
+                self._threads.submit(process.start)
+        except RuntimeError as exc:
+            raise ResourceError(f"not enough processes or threads: {exc}") from exc
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
         """The future of `work(task)`: its result, what it raised, or a TaskLostError.
@@ -330,6 +333,7 @@ class _Process:
                 with _blocked_interrupts():
                     _ = self._pool.active  # starts the process
             except (OSError, RuntimeError):
+                self.close()  # half of its threads would wait without end
                 time.sleep(_RETRY_START_S)  # the system had no room; there may be some then
                 raise
         return self._pool
@@ -368,7 +372,10 @@ def _initialize(initializer: Callable[[], None] | None, core: int | None) -> Non
     global _initial_error
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's handler would wait for the engine to return
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        threading.Thread(target=_end_with_parent, daemon=True).start()
+    except RuntimeError:  # the system has no room for it; pebble tries another process
+        os._exit(1)
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
     try:

@@ -74,6 +74,7 @@ def off(method: str, steps: int | None, name: str = "", rows: int = 11, **settin
 def test_steps_are_those_that_fit_between_samples() -> None:
     assert off("exudyn_tree/rk44", 40, step=0.03) == 0.0  # four of at most 0.03 s in 0.1 s
     assert off("exudyn_tree/rk44", 100, step=0.01) == 0.0  # 0.1 s is ten of 0.01 s, whatever its rounding
+    assert off("exudyn_tree/rk44", 30, step=0.0333333333333333) == 0.0  # nor a third's, in 15 digits
     assert off("exudyn_tree/rk44", 20, step=0.0999) == 0.0  # two of at most 0.0999 s
     assert off("exudyn_tree/rk44", 50, step=0.03) == pytest.approx(0.25)
     assert off("exudyn_tree/rk44", 20, step=0.03) == pytest.approx(0.5)

@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 
+from rotor_mbs.errors import ResourceError
 from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, run_in
 
 # Beyond any start of a process on a busy machine.
@@ -210,6 +211,32 @@ def test_a_system_without_room_for_a_process_costs_the_tasks_of_that_time() -> N
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, limits)
         assert pool.submit(_pid, None, _LONG_S).result() != pid
+
+
+def test_a_process_that_lacks_a_thread_beside_it_is_started_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    from pebble.pool import process
+
+    launch, refused = process.launch_thread, []
+
+    def launch_but_once(name: str | None, loop: Callable[..., None], *more: object) -> object:
+        if loop is process.pool_manager_loop and not refused:
+            refused.append(loop)
+            raise RuntimeError("can't start new thread")
+        return launch(name, loop, *more)
+
+    monkeypatch.setattr(process, "launch_thread", launch_but_once)
+    with WorkerPool(1) as pool:
+        assert pool.submit(_pid, None, _LONG_S).result(_LONG_S) != os.getpid()
+    assert refused
+
+
+def test_a_system_without_room_for_a_thread_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr("concurrent.futures.thread.ThreadPoolExecutor.submit", refuse)
+    with pytest.raises(ResourceError, match="not enough processes or threads: can't start new thread"):
+        WorkerPool(1)
 
 
 def _ends(work: Callable[[Any], Any], tasks: Sequence[Any], workers: int = 1) -> list[Finished[Any, Any]]:

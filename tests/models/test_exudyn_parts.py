@@ -142,9 +142,9 @@ def test_success_with_a_state_that_is_not_finite_is_cut_and_not_hidden() -> None
 
 @pytest.mark.parametrize("name", ["exudyn_tree/dopri5", *(n for n in METHODS if "chain" in n)])
 def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     run = solve(name, SINGULAR, {})
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0
     assert not run.integration.success
     assert not run.integration.out_of_time
     assert run.integration.message

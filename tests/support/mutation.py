@@ -801,6 +801,15 @@ def warm_up(modules: Sequence[str]) -> None:
     gc.freeze()  # else every child's collections go through all of it
 
 
+def _fail_without_a_mutant(tests: set[str]) -> bool:
+    first = _FirstFailure()
+    with contextlib.redirect_stdout(io.StringIO()):
+        failed = bool(pytest.main([*_PYTEST, *tests], [first]))
+    if failed:
+        print(first.name or "interrupted", file=sys.stderr)
+    return failed
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="Mutants of the models and rules, and which verdict notices each.")
     parser.add_argument("groups", nargs="*", metavar="GROUP", help="such as lagrange, rules, ode45")
@@ -819,9 +828,8 @@ def main() -> None:
         print(json.dumps({"mutant": mutant.name, "group": mutant.group, "noticed": noticed}), flush=True)
         ways[noticed.split(":")[0].split()[0]] += 1
         tests |= {str(ROOT / noticed[6:])} if noticed.startswith("test: tests/") else set()
-    with contextlib.redirect_stdout(io.StringIO()):
-        if tests and not _in_order(lambda: pytest.main([*_PYTEST, *tests])):
-            raise SystemExit("a test that noticed a mutant fails without one")
+    if tests and not _in_order(lambda: _fail_without_a_mutant(tests)):
+        raise SystemExit("a test that noticed a mutant fails without one")
     by_verdict = len(chosen) - sum(ways[way] for way in ("test", "survived", "raised", "did"))
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     print(
