@@ -93,12 +93,9 @@ def _data(text: str) -> str:
 def as_json(verdicts: Sequence[Verdict]) -> str:
     """A list of objects; numbers that JSON cannot hold (NaN, infinity) become null."""
     names = ("check", "scene", "method", "channel", "value", "bound", "unit", "margin", "passed", "look_at")
-    rows = [{name: _finite(getattr(verdict, name)) for name in names} for verdict in verdicts]
-    return json.dumps(rows, indent=1)
-
-
-def _finite(value: object) -> object:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    rows = [{name: getattr(verdict, name) for name in names} for verdict in verdicts]
+    numbers = ("value", "bound", "margin")
+    return json.dumps([row | {n: row[n] if math.isfinite(row[n]) else None for n in numbers} for row in rows], indent=1)
 
 
 def junit(verdicts: Sequence[Verdict]) -> bytes:

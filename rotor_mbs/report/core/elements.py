@@ -59,15 +59,11 @@ class PageTable:
 
     def without_empty_columns(self) -> PageTable:
         """The columns that have a value in any row, and the first one."""
-        columns = range(len(self.head))
         empty = ("", "–", TableCell(""), TableCell("–"))
-        kept = [i for i in columns if i == 0 or any(row[i] not in empty for row in self.rows)]
-        return PageTable(
-            self.caption,
-            [self.head[i] for i in kept],
-            [[row[i] for i in kept] for row in self.rows],
-            [place for place, i in enumerate(kept) if i in self.numeric],
-        )
+        kept = [i for i in range(len(self.head)) if not i or any(row[i] not in empty for row in self.rows)]
+        rows = [[row[i] for i in kept] for row in self.rows]
+        numeric = [place for place, i in enumerate(kept) if i in self.numeric]
+        return PageTable(self.caption, [self.head[i] for i in kept], rows, numeric)
 
 
 @dataclass(frozen=True)

@@ -99,7 +99,9 @@ def _environment() -> jinja2.Environment:
     )
     style, picture = ((_TEMPLATES / f"{name}.css").read_text(encoding="utf-8") for name in ("style", "picture"))
     scripts = {path.stem: _script(path) for path in sorted(_TEMPLATES.glob("*.js"))}
-    hashes = {name: _hash(text) for name, text in scripts.items()}
+    # For the content security policy of a page, which allows its script alone.
+    digests = {name: hashlib.sha256(text.encode()).digest() for name, text in scripts.items()}
+    hashes = {name: base64.b64encode(digest).decode("ascii") for name, digest in digests.items()}
     alone = with_light_palette(picture.replace("figure>svg", ":root"))  # of a picture that is saved as a file
     environment.globals.update(
         picture_style=alone,
@@ -125,8 +127,3 @@ def _script(path: Path) -> Markup:
     """The script without indentation and without lines that are comments."""
     lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
     return Markup("\n".join(line for line in lines if line and not line.startswith("//")))
-
-
-def _hash(script: str) -> str:
-    """For the content security policy of the page, which allows this script alone."""
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")

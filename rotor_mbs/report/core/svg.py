@@ -71,7 +71,8 @@ class _Page:
         yield '<svg x="{0}" y="{1}" width="{2}" height="{3}" viewBox="{0} {1} {2} {3}">'.format(*seen)
         drawn = [*axes.patches, *axes.collections, *axes.lines]
         for artist in sorted((one for one in drawn if one.get_visible()), key=lambda one: one.get_zorder()):
-            yield from self._artist(artist)
+            draw = self._map if is_map(artist) else self._line if hasattr(artist, "get_xydata") else self._areas
+            yield from draw(artist)
         yield "</svg>"
         for text in axes.texts:
             x, y = self._placed(text.get_transform().transform(np.atleast_2d(text.get_position())))[0]
@@ -96,14 +97,6 @@ class _Page:
         """Display coordinates, in pixels from below, as points from above."""
         found: Array = np.asarray(pixels) * (self._points, -self._points) + (0.0, self.height)
         return found
-
-    def _artist(self, artist: Any) -> Iterator[str]:
-        if is_map(artist):
-            yield from self._map(artist)
-        elif hasattr(artist, "get_xydata"):
-            yield from self._line(artist)
-        else:
-            yield from self._areas(artist)
 
     def _frame(self, axes: Any, box: Box) -> Iterator[str]:
         """Grid, spines, tick labels and axis labels; of a colour scale the labels alone, on its right."""

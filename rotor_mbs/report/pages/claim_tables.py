@@ -130,17 +130,16 @@ def _measured(value: float | None, asked: TrajectoryNumber) -> str:
 
 
 def _verdict_cell(shares: Sequence[ClaimShare]) -> TableCell:
-    """The verdict of one model whatever the rounding and the duration; the shares below it."""
-    verdict = joint_verdict(shares)
-    return TableCell(verdict, tone=_TONES[verdict], note=_shares_text(shares))
+    """The verdict of one model whatever the rounding and the duration; the shares below it.
 
-
-def _shares_text(shares: Sequence[ClaimShare]) -> str:
-    """ "100 %, 97 % and 12 % of 100, 100 and 87 deciding runs over 8, 10 and 12 s"."""
+    Such as "100 %, 97 % and 12 % of 100, 100 and 87 deciding runs over 8, 10 and 12 s".
+    """
     percents = listed(["–" if not one.deciding else f"{100.0 * one.share:.0f}\N{NO-BREAK SPACE}%" for one in shares])
     deciding = [str(one.deciding) for one in shares]
     runs = deciding[0] if len(set(deciding)) == 1 else listed(deciding)
-    return f"{percents} of {runs} deciding runs over {_durations([one.duration for one in shares])}"
+    note = f"{percents} of {runs} deciding runs over {_durations([one.duration for one in shares])}"
+    verdict = joint_verdict(shares)
+    return TableCell(verdict, tone=_TONES[verdict], note=note)
 
 
 def study_note(shares: ClaimShares) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
@@ -30,16 +30,6 @@ _SHADES = (-12, -10, -8, -6, -4, -2, 0)
 _MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
 _FAILED = "✗"
 _NAMED = 4  # methods at most in the sentence on agreement; of more, the best and the worst
-
-
-@dataclass(frozen=True)
-class HeatCell:
-    """A run in the heat map: the shade's number, the error as text, the mark of its status, a text that is read out."""
-
-    shade: int
-    error: str
-    mark: str
-    spoken: str
 
 
 def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
@@ -165,22 +155,22 @@ def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | No
         (name, files[name], [_heat_cell(scene.methods.get(method)) for method in methods])
         for name, scene in scenes.items()
     ]
-    if not any(cell and cell.error for _, _, cells in rows for cell in cells):
+    known = [cell for _, _, cells in rows for cell in cells if cell]
+    if not any(error for _, error, _, _ in known):
         return None
-    used = {cell.mark: cell.spoken.rpartition(", ")[2] for _, _, cells in rows for cell in cells if cell and cell.mark}
+    used = {mark: spoken.rpartition(", ")[2] for _, _, mark, spoken in known if mark}
     return {"methods": [(label_of(name), name) for name in methods], "rows": rows, "key": sorted(used.items())}
 
 
-def _heat_cell(run: StoredRun | None) -> HeatCell | None:
+def _heat_cell(run: StoredRun | None) -> tuple[int, str, str, str] | None:
+    """The number of its shade, the error as text, the mark of the status, and a text that is read out."""
     if run is None:
         return None
     error = metric(run, "angle_error_max")
-    mark = _MARKS.get(run.status, _FAILED)
     text = "" if error is None else number(error)
     spoken = f"{label_of(run.method)}: {text or 'no error known'}, {status_text(run.status)}"
-    if error is None or not math.isfinite(error):
-        return HeatCell(len(_SHADES), text, mark, spoken)
-    return HeatCell(sum(error > 10.0**e for e in _SHADES), text, mark, spoken)
+    shade = len(_SHADES) if error is None or not math.isfinite(error) else sum(error > 10.0**e for e in _SHADES)
+    return shade, text, _MARKS.get(run.status, _FAILED), spoken
 
 
 def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
