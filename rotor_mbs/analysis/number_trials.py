@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from rotor_mbs.analysis.claims import rounds_to
-from rotor_mbs.analysis.published import Published
-
 
 @dataclass(frozen=True, order=True)
 class Conditions:
@@ -89,12 +86,6 @@ class NumberTrials:
         """Those of the usual row and duration, by tolerance."""
         same = (self.usual.gravity_row, self.usual.duration)
         return sorted(one for one in self.conditions if (one.gravity_row, one.duration) == same)
-
-
-def trial(item: Published, conditions: Conditions, value: float | None, remainder: float) -> NumberTrial:
-    """The result of a run; value: None where the number is undefined."""
-    reproduced = value is not None and rounds_to(value, item.value, item.decimals)
-    return NumberTrial(item.id, conditions, float("nan") if value is None else value, reproduced, remainder)
 
 
 def count_of_rows(trials: NumberTrials, duration: float) -> tuple[int, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple, TypeVar
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
@@ -17,21 +17,12 @@ class TrajectoryNumber(NamedTuple):
     """A number read off a trajectory: scene, "angle" or "rate", coordinate (0 rotor, i pitch of blade i), statistic."""
 
     scene: str
-    quantity: str
+    quantity: Literal["angle", "rate"]
     coordinate: int
     statistic: str
 
 
-def _trajectory_number(value: object) -> object:
-    match value:
-        case [str() as scene, "angle" | "rate" as quantity, int() as coordinate, str() as statistic]:
-            return TrajectoryNumber(scene, str(quantity), coordinate, statistic)
-        case TrajectoryNumber() | None:
-            return value
-    raise invalid("{shown} is not a number of a trajectory", '[scene, "angle" or "rate", coordinate, statistic]')
-
-
-ReadOff = Annotated[TrajectoryNumber, BeforeValidator(_trajectory_number)]
+ReadOff = Annotated[TrajectoryNumber, Field(description='[scene, "angle" or "rate", coordinate, statistic]')]
 Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 
 

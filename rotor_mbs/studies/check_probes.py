@@ -61,11 +61,6 @@ def probes() -> list[Case]:
     ]
 
 
-def speed_probes() -> list[Case]:
-    """Run times; meaningful on an idle machine alone."""
-    return [probe("speed", "paper/fig11", method) for method in SPEED_RATIOS]
-
-
 # |ln| of the error growth: how far the difference quotients of the fallback may be off.
 _QUOTIENTS = 0.02
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,9 +18,8 @@ from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
-# The engine's report, as arguments of `Integration`: success, message, time reached, steps, evaluations, out of time.
-_DONE, _FAILED = (True,), (False, "gave up")
-_OUT_OF_TIME = (False, "ended", 0.5, None, None, True)
+_DONE, _FAILED = Integration(True), Integration(False, "gave up")
+_OUT_OF_TIME = Integration(False, "ended", 0.5, out_of_time=True)
 _GRAVITY, _STIFFNESS, _SPRUNG = 0.5, 2e4, 0.5
 _LONG = Blade(1000.0, (0.1, 0.0, 10.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 _SHORT = Blade(1000.0, (0.1, 0.0, 5.0), (0.0,) * 6, (0.1, 0.0, 20.0))
@@ -49,15 +47,13 @@ class KnownRun:
     method: str
     status: str
     trajectory: Trajectory
-    engine: tuple[Any, ...] = _DONE
+    engine: Integration = field(default_factory=lambda: _DONE)
     reference: Trajectory | None = None
     is_false_success: bool | None = False  # None: not asked
 
     def faults(self) -> str:
         """What the judgement says against what is known; "" where it is right."""
-        run = Solution(
-            SCENE, self.method, self.trajectory, Integration(*self.engine), is_corrected=is_corrected(self.method)
-        )
+        run = Solution(SCENE, self.method, self.trajectory, self.engine, is_corrected=is_corrected(self.method))
         with np.errstate(all="ignore"):
             found = judge(SCENE, run, self.reference)
         if found.status != self.status:

@@ -16,7 +16,8 @@ import numpy as np
 
 from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
-from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials, trial
+from rotor_mbs.analysis.claims import rounds_to
+from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.trajectory_numbers import measure
@@ -232,11 +233,12 @@ def perform(task: Trial) -> list[NumberTrial]:
     """The numbers of one run."""
     settings = asdict(task.conditions)
     run = solve(PRINTED, replace(task.scene, duration=settings.pop("duration")), settings).trajectory
-    return [
-        trial(item, task.conditions, measure(run, item.of), task.remainder)
-        for item in task.items
-        if item.of is not None
-    ]
+    found = []
+    for item in task.items:
+        value = math.nan if item.of is None or (read := measure(run, item.of)) is None else read
+        is_reproduced = rounds_to(value, item.value, item.decimals)  # NaN has no printed digits
+        found.append(NumberTrial(item.id, task.conditions, value, is_reproduced, task.remainder))
+    return found
 
 
 def _remainder(scene: Scene, row: str) -> float:

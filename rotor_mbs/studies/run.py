@@ -118,16 +118,16 @@ def run_scenes(
 def _stored_failures(output: Path, cases: Sequence[Case], made: Sequence[Outcome]) -> list[str]:
     """Runs that this call found in the file, and that are no success."""
     new = {one.case.key for one in made}
-    kept = {(case.scene.name, case.method): case for case in cases if case.key not in new}
-    found: list[str] = []
+    kept = {f"{case.scene.name}/{case.method}": case for case in cases if case.key not in new}
     if not kept:
-        return found
+        return []
     with open_results(output, verify=False) as results:  # verified when the keys of what is kept were read
-        for (scene, method), case in kept.items():
-            run = results.scenes[scene].runs.get(method) if scene in results.scenes else None
-            if run is not None and run.status != "ok" and is_corrected(method):
-                found.append(f"{case.label} {run.status}: {run.attributes.get('message', '')}")
-    return found
+        runs = {f"{scene.name}/{run.method}": run for scene in results.scenes.values() for run in scene.runs.values()}
+        return [
+            f"{case.label} {runs[name].status}: {runs[name].attributes.get('message', '')}"
+            for name, case in kept.items()
+            if name in runs and runs[name].status != "ok" and is_corrected(case.method)
+        ]
 
 
 def solve_judged(
