@@ -39,9 +39,9 @@ class OdeSolver:
         scene: Scene,
         integrator: Integrator,
         times: Array | None = None,
-        accelerations: Accelerations = closed_form.accelerations,
+        accelerations: Accelerations | None = None,
     ) -> None:
-        self._scene, self._accelerations = scene, accelerations
+        self._scene, self._accelerations = scene, accelerations or closed_form.accelerations
         self._integrator = integrator
         self._form = rotor_form(scene)
         self._segments = load_segments(scene)
