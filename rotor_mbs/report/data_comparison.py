@@ -58,7 +58,8 @@ def compare_data(
     ('rotor: degrees taken as rad',)
     """
     study = compare_with_reference(load_data(data, scene, columns), scene, tolerance)
-    return DataComparison(study)
+    verdict = study.verdict
+    return DataComparison(study, verdict, verdict.status, verdict.message, verdict.agrees, verdict.likely)
 
 
 @dataclass(frozen=True)
@@ -74,26 +75,11 @@ class DataComparison:
     """
 
     study: DataStudy
-
-    @property
-    def verdict(self) -> DataVerdict:
-        return self.study.verdict
-
-    @property
-    def status(self) -> str:
-        return self.verdict.status
-
-    @property
-    def message(self) -> str:
-        return self.verdict.message
-
-    @property
-    def agrees(self) -> bool:
-        return self.verdict.agrees
-
-    @property
-    def likely(self) -> tuple[str, ...]:
-        return self.verdict.likely
+    verdict: DataVerdict
+    status: str
+    message: str
+    agrees: bool
+    likely: tuple[str, ...]
 
     def table(self) -> TextTable:
         """A row for each channel: errors (rad, rad/s), until when it agrees (s), lag (s), scale, offset."""

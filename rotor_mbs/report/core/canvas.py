@@ -30,6 +30,7 @@ from rotor_mbs.store.hdf5 import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS = "time (s)"
+hex_colour = to_hex  # of any colour of matplotlib's: "#0072b2"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 KINDS = ("pdf", "svg", "png")
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
@@ -170,8 +171,3 @@ def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, labe
 def is_map(artist: Any) -> bool:
     """Whether an artist is the map of `growth_map`, or a part of its colour scale."""
     return isinstance(artist, QuadMesh)
-
-
-def hex_colour(colour: Any) -> str:
-    """Any colour of matplotlib's as "#0072b2"."""
-    return to_hex(colour)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -82,11 +82,17 @@ def key_picture(
         for r in runs for i in shown
     ]  # fmt: skip
     legend = [LegendEntry(label_of(r.method), side_look(r), 2.4 if side_look(r).line == "-" else 1.3) for r in runs]
-    if horizon is not None and horizon < float(runs[-1].array("time")[-1]):
-        legend.append(line_entry(f"horizon {with_unit(horizon, 's', 3)}", line="--"))
+    legend += horizon_entry(horizon, runs)
     if published:
         legend.append(line_entry("published", line=":"))
     return picture(panels, name, caption, f"{caption} {'; '.join(ranges)}.", legend=legend)
+
+
+def horizon_entry(horizon: float | None, runs: Iterable[StoredRun]) -> list[LegendEntry]:
+    """For the legend, where the line is drawn: before the end of a run."""
+    if horizon is None or not any(horizon < float(run.array("time")[-1]) for run in runs):
+        return []
+    return [line_entry(f"horizon {with_unit(horizon, 's', 3)}", line="--")]
 
 
 def _blade_to_show(runs: Sequence[StoredRun]) -> int:
@@ -125,11 +131,12 @@ def _published(claims: Sequence[Claim], shown: Sequence[int]) -> list[tuple[Mark
     return found[:_PUBLISHED]
 
 
-def tips_section(stored: StoredScene, runs: Mapping[str, StoredRun], horizon: float | None) -> Section:
+def tips_section(stored: StoredScene, sides: Mapping[str, StoredRun], horizon: float | None) -> Section:
     """Paths in space as the paper draws them; offset over azimuth; distance of printed from corrected tips.
 
-    runs: printed and corrected, by heading, those that have tips.
+    sides: printed and corrected, by heading.
     """
+    runs = {heading: run for heading, run in sides.items() if "tip" in run}
     if not runs:
         return Section()
     blades = next(iter(runs.values())).array("tip").shape[1]

@@ -17,6 +17,7 @@ from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, l
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables, comparison_pictures, quantities, scene_tables
+from rotor_mbs.report.pages.comparison_pictures import horizon_entry
 from rotor_mbs.report.pages.cost import cost_section
 from rotor_mbs.report.pages.drive import drive_section
 from rotor_mbs.report.pages.figures import HEADINGS
@@ -63,10 +64,6 @@ class DrawnRuns:
         """Every run that is drawn, by method."""
         return {run.method: run for run in self.sides.values()} | self.others
 
-    def sides_with(self, *names: str) -> dict[str, StoredRun]:
-        """Those of `sides` that have all of these datasets."""
-        return {heading: run for heading, run in self.sides.items() if all(name in run for name in names)}
-
 
 def scene_page(scene: StoredScene, context: Context) -> dict[str, object]:
     """The content of the page of a scene."""
@@ -88,7 +85,7 @@ def scene_page(scene: StoredScene, context: Context) -> dict[str, object]:
         "claims": _claims_section(claims, context.study, [own] if own else []),
         "viewer": viewer(scene, sides),
         "key": Section([key] if key is not None else []),
-        "paths": comparison_pictures.tips_section(scene, drawn.sides_with("tip"), drawn.horizon),
+        "paths": comparison_pictures.tips_section(scene, drawn.sides, drawn.horizon),
         "motion": motion_section(drawn),
         "difference": difference_section(drawn),
         "energy": energy_section(drawn),
@@ -139,7 +136,7 @@ def _lead(drawn: DrawnRuns) -> list[str]:
 
 def _parted(drawn: DrawnRuns) -> float | None:
     """s, when printed and corrected angles first differ visibly; None: never, or one of them is not there."""
-    runs = list(drawn.sides_with("angles").values())
+    runs = [run for run in drawn.sides.values() if "angles" in run]
     return comparison_pictures.parting(*runs)[0] if len(runs) == 2 else None
 
 
@@ -150,11 +147,13 @@ def motion_section(drawn: DrawnRuns) -> Section:
         return Section()
     pictures = [_motion_picture(f"motion-{i}", run, drawn.horizon) for i, run in enumerate(runs.values())]
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(next(iter(runs.values())).labels)]
-    return Section(pictures, [*legend, *_horizon_entry(drawn)], [scene_tables.range_table(runs)])
+    return Section(
+        pictures, [*legend, *horizon_entry(drawn.horizon, drawn.sides.values())], [scene_tables.range_table(runs)]
+    )
 
 
 def _motion_picture(name: str, run: StoredRun, horizon: float | None) -> Picture:
-    time, angles, rates = motion_of(run)
+    time, angles, rates = run.array("time"), run.get("angles"), run.get("rates")
     notes = []
     for values, what, unit in ((angles, "Angles", "rad"), (rates, "Rates", "rad/s")):
         if values is not None and histories.is_cut(values):
@@ -165,11 +164,6 @@ def _motion_picture(name: str, run: StoredRun, horizon: float | None) -> Picture
     ranges = [f"{n} from {number(float(x.min()), 3)} to {number(float(x.max()), 3)} rad" for n, x in named]
     panels = histories.motion(time, angles, rates, horizon)
     return picture(panels, name, with_capital(label), f"{label} over time: {'; '.join(ranges)}.", notes)
-
-
-def motion_of(run: StoredRun) -> tuple[Array, Array | None, Array | None]:
-    """The run's time, angles and rates."""
-    return run.array("time"), run.get("angles"), run.get("rates")
 
 
 def difference_section(drawn: DrawnRuns) -> Section:
@@ -209,7 +203,8 @@ def difference_section(drawn: DrawnRuns) -> Section:
         curves, "largest angle difference (rad)", "difference",
         "Largest difference from the reference, over all angles", drawn.horizon, others,
     )  # fmt: skip
-    return Section([shown] if shown else [], [*legend, *_horizon_entry(drawn)], notes=notes)
+    legend += horizon_entry(drawn.horizon, drawn.sides.values())
+    return Section([shown] if shown else [], legend, notes=notes)
 
 
 def energy_section(drawn: DrawnRuns) -> Section:
@@ -218,16 +213,8 @@ def energy_section(drawn: DrawnRuns) -> Section:
     shown, methods = quantities.energy_picture(runs, drawn.horizon)
     if shown is None:
         return Section()
-    legend = [*quantities.run_legend(methods), *_horizon_entry(drawn)]
+    legend = [*quantities.run_legend(methods), *horizon_entry(drawn.horizon, drawn.sides.values())]
     return Section([shown], legend, [scene_tables.energy_table(runs)])
-
-
-def _horizon_entry(drawn: DrawnRuns) -> list[LegendEntry]:
-    """For the legend, where the line is drawn: before the end."""
-    ends = [float(run.array("time")[-1]) for run in drawn.sides.values()]
-    if drawn.horizon is None or not any(drawn.horizon < end for end in ends):
-        return []
-    return [line_entry(f"horizon {with_unit(drawn.horizon, 's', 3)}", line="--")]
 
 
 def opening_comment(scene: StoredScene) -> str:

@@ -15,7 +15,7 @@ from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
 from rotor_mbs.report.core.numbers import number
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import quantities
-from rotor_mbs.report.pages.scene import motion_of, opening_comment
+from rotor_mbs.report.pages.scene import opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.solution.text_table import listed
@@ -192,7 +192,8 @@ def _motion(run: StoredRun | None) -> Section:
         caption += f". The samples are too far apart to resolve the swings of {listed(unresolved)}: "
         caption += "only their range is meaningful"
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(run.labels)]
-    return Section([picture(histories.motion(*motion_of(run)), "motion", caption, caption)], legend)
+    panels = histories.motion(run.array("time"), run.get("angles"), run.get("rates"))
+    return Section([picture(panels, "motion", caption, caption)], legend)
 
 
 def _unresolved(run: StoredRun) -> list[str]:
