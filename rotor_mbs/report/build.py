@@ -30,7 +30,7 @@ from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.store.read import OpenResults, in_memory, is_sweep, open_results
-from rotor_mbs.store.records import read_records
+from rotor_mbs.store.records import Record, read_records
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
 Part = str | Path | PaperFigure  # a scene by its name, a page by its file, or a figure of the paper
@@ -82,7 +82,7 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
     if is_suite:
         pages |= stability_pages(opened, files.INDEX, site)
     elif has_runs:
-        pages |= _run_pages(opened, site, figures, jobs, on_page)
+        pages |= _run_pages(opened, site, figures, bench, jobs, on_page)
     if bench and names[files.BENCH] not in pages:
         pages |= bench_pages(opened, names[files.BENCH], site)
     if modes:
@@ -102,7 +102,7 @@ def _has_errata(opened: OpenResults) -> bool:
 
 
 def _run_pages(
-    opened: OpenResults, site: Site, figures: Sequence[PaperFigure], jobs: int, on_page: OnPage
+    opened: OpenResults, site: Site, figures: Sequence[PaperFigure], bench: Sequence[Record], jobs: int, on_page: OnPage
 ) -> dict[str, str]:
     """The index, errata, error against run time, figures one by one, and a page per scene."""
     if not opened.scenes:
@@ -114,7 +114,7 @@ def _run_pages(
         decided,
         published.conditions() if decided else {},
         stored_claims(opened) if decided else None,
-        by_scene(read_records(opened.path, "bench")),
+        by_scene(bench),
         published.errata() if files.ERRATA in dict(site) else (),
         site,
     )

@@ -24,7 +24,7 @@ from rotor_mbs.solution.status import STATUSES, recode
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.digests import DIGESTS
 from rotor_mbs.store.layout import Column, key_of
-from rotor_mbs.store.read import damages_of, open_results
+from rotor_mbs.store.read import damages_of
 
 # The scene's place in a record of how cost scales with blades or duration.
 COST_SCALING = "growth"
@@ -160,8 +160,8 @@ def _put_record(file: Any, record: Record) -> None:
 
 def read_records(path: Path, *kinds: str) -> list[Record]:
     """The records of a results file, of these kinds or of all, in the order of the file. Raises StoreError."""
-    with open_results(path) as results:
-        return [read_record(name, group) for name, group in records_in(results.root, *kinds)]
+    with hdf5.open_file(path) as file, hdf5.reading(path):
+        return [read_record(name, group) for name, group in records_in(file, *kinds)]
 
 
 def records_in(file: Any, *kinds: str) -> Iterator[tuple[str, Any]]:

@@ -74,7 +74,9 @@ def _ode_solver(make: Callable[[float, float], Integrator]) -> Callable[[Scene, 
     return build
 
 
-def _scipy_method(solver: str, look: Look, settings: type[Settings], ladder: Ladder, medium: float) -> Method:
+def _scipy_method(
+    solver: str, look: Look, settings: type[Settings], ladder: Ladder, medium: float, relative_cost: float
+) -> Method:
     """SciPy's solver of that name; medium: relative tolerance of the cost scaling study."""
     return Method(
         name=f"lagrange/{solver.lower()}",
@@ -87,6 +89,7 @@ def _scipy_method(solver: str, look: Look, settings: type[Settings], ladder: Lad
         ladders=(ladder,),
         cost_scaling={"relative_tolerance": medium, "absolute_tolerance": 0.01 * medium},
         load=lambda: import_module("scipy.integrate"),
+        relative_cost=relative_cost,
     )
 
 
@@ -120,15 +123,16 @@ METHODS = (
         items=equation_items,
         ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
         cost_scaling={"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
+        relative_cost=10.0,
         linearize=_linearize,
     ),
     _scipy_method(
         "DOP853", Look(_BLUE, "--", "D"), Dop853Settings,
-        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14), 1e-9,
+        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14), 1e-9, 20.0,
     ),
     _scipy_method(
         "Radau", Look(_LIGHT_BLUE, "--", "*"), RadauSettings,
-        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13), 1e-5,
+        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13), 1e-5, 80.0,
     ),
     Method(
         name="reference",
