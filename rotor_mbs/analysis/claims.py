@@ -44,11 +44,6 @@ class Claim:
     printed: ClaimResult
     corrected: ClaimResult
 
-    @property
-    def is_decided(self) -> bool:
-        """Whether the file decides it for one of the models."""
-        return self.printed.holds is not None or self.corrected.holds is not None
-
 
 def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Claim]:
     """The numbers and claims that `scenes` can decide for at least one model; of `items`, by default of all."""
@@ -56,7 +51,7 @@ def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None 
     for item in published() if items is None else items:
         printed = _outcome(item, scenes, run_selection.printed_run)
         found.append(Claim(item, printed, _outcome(item, scenes, run_selection.reference_or_corrected_run)))
-    return [claim for claim in found if claim.is_decided]
+    return [one for one in found if one.printed.holds is not None or one.corrected.holds is not None]
 
 
 def readings_of(item: Published, values: NumberValues) -> tuple[Reading, ...]:

@@ -9,11 +9,12 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
 T = TypeVar("T", bound=Hashable)
+WarmUp: TypeAlias = Callable[[T], tuple[float, bool]]
 
 LONG_RUN_S = 0.5  # runs longer than this are repeated LONG_REPEATS times at most
 LONG_REPEATS = 5
@@ -22,20 +23,13 @@ LONG_REPEATS = 5
 _WARM_UP_SHARE, _BUILD_SHARE = 0.3, 0.6
 
 
-@dataclass(frozen=True, slots=True)
-class Warm:
-    """A warm-up: seconds it took; whether it came back at all, so that it can be repeated."""
-
-    seconds: float
-    returned: bool
-
-
 @dataclass
 class Timings(Generic[T]):
-    """What `conduct` found: run times in s by point, warm-ups by point, points that the budget left out."""
+    """What `conduct` found: by point, run times in s of those that can be repeated, seconds of the warm-up of all that
+    were tried, and why the budget left out the others."""
 
     times: dict[T, list[float]] = field(default_factory=dict)
-    warm: dict[T, Warm] = field(default_factory=dict)
+    warm: dict[T, float] = field(default_factory=dict)
     left_out: dict[T, str] = field(default_factory=dict)
 
 
@@ -53,7 +47,7 @@ def statistics(times: Sequence[float]) -> dict[str, float]:
 
 def conduct(
     ladders: Sequence[Sequence[T]],
-    warm_up: Callable[[T], Warm],
+    warm_up: WarmUp[T],
     repeat: Callable[[T], float],
     budget_s: float,
     repeats: int,
@@ -62,7 +56,7 @@ def conduct(
     """Warms up every point, the cheapest next rung of any ladder first, then times them in rounds.
 
     ladders     each coarse to fine
-    warm_up     builds the point and runs it once
+    warm_up     builds the point and runs it once: seconds, and whether it came back, so that it can be repeated
     repeat      runs it once more: seconds
     budget_s    for all of it, on `clock` (s)
     """
@@ -70,15 +64,13 @@ def conduct(
     start = clock()
 
     def left() -> float:
-        running = sum(warm.seconds for warm in found.warm.values())
-        return min(_WARM_UP_SHARE * budget_s - running, _BUILD_SHARE * budget_s - (clock() - start))
+        return min(_WARM_UP_SHARE * budget_s - sum(found.warm.values()), _BUILD_SHARE * budget_s - (clock() - start))
 
     _warm_all(found, ladders, warm_up, left)
-    alive = {point: max(warm.seconds, 1e-9) for point, warm in found.warm.items() if warm.returned}
+    alive = {point: max(found.warm[point], 1e-9) for point in found.times}
     few = min(repeats, LONG_REPEATS)
     wanted = {point: repeats if seconds <= LONG_RUN_S else few for point, seconds in alive.items()}
     allowed = allot(alive, wanted, budget_s - (clock() - start))
-    found.times = {point: [] for point in alive}
     for round_ in range(max(allowed.values(), default=0)):
         for point, count in allowed.items():
             if round_ and clock() - start > budget_s:  # the machine has become slower
@@ -89,7 +81,10 @@ def conduct(
 
 
 def _warm_all(
-    found: Timings[T], ladders: Sequence[Sequence[T]], warm_up: Callable[[T], Warm], left_s: Callable[[], float]
+    found: Timings[T],
+    ladders: Sequence[Sequence[T]],
+    warm_up: WarmUp[T],
+    left_s: Callable[[], float],
 ) -> None:
     """The rung expected to be cheapest comes next. What is left over when even that one does not fit is left out."""
     waiting = [(0.0, 0, number) for number, ladder in enumerate(ladders) if ladder]
@@ -100,16 +95,18 @@ def _warm_all(
             reason = f"not run: about {expected:.2g} s more were not in the budget"
             found.left_out.update(dict.fromkeys(ladder[rung:], reason))
             continue
-        found.warm[ladder[rung]] = warm_up(ladder[rung])
+        found.warm[ladder[rung]], returned = warm_up(ladder[rung])
+        if returned:
+            found.times[ladder[rung]] = []
         if rung + 1 < len(ladder):
             following = _expected([found.warm[point] for point in ladder[: rung + 1]])
             heapq.heappush(waiting, (following, rung + 1, number))
 
 
-def _expected(earlier: Sequence[Warm]) -> float:
+def _expected(earlier: Sequence[float]) -> float:
     """Expected time of the next rung in s: the last one's time, grown as from the one before it, at least doubled."""
-    growth = earlier[-1].seconds / earlier[-2].seconds if len(earlier) > 1 and earlier[-2].seconds > 0.0 else 2.0
-    return earlier[-1].seconds * min(max(growth, 2.0), 10.0)
+    growth = earlier[-1] / earlier[-2] if len(earlier) > 1 and earlier[-2] > 0.0 else 2.0
+    return earlier[-1] * min(max(growth, 2.0), 10.0)
 
 
 def allot(seconds: Mapping[T, float], wanted: Mapping[T, int], budget_s: float) -> dict[T, int]:

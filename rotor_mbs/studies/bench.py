@@ -23,7 +23,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.execution.pool import WorkerPool, last_core, run_in
-from rotor_mbs.execution.timing import Timings, Warm, conduct, statistics
+from rotor_mbs.execution.timing import Timings, conduct, statistics
 from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder
 from rotor_mbs.scenario.scene import Scene
@@ -222,7 +222,7 @@ class Measured:
     def fail(self, point: Point, message: str) -> None:
         """Takes note of a point that raised an error."""
         self.unanswered[point] = ("solver_failed", message)
-        self.timings.warm[point] = Warm(float("nan"), returned=False)
+        self.timings.warm[point] = math.nan
 
     def rows(self, points: Sequence[Point]) -> list[dict[str, Any]]:
         """Every dataset's value at each point; NaN and 0 where there is none."""
@@ -237,7 +237,7 @@ class Measured:
             row["message"] = self.timings.left_out[point]
         elif point in self.unanswered:
             row["status"], row["message"] = self.unanswered[point]
-            row["run_time_s"] = self.timings.warm[point].seconds
+            row["run_time_s"] = self.timings.warm[point]
         else:
             row |= self.answers[point] | statistics(self.timings.times[point])
             del row["same"]
@@ -264,13 +264,13 @@ def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], optio
                 found.unanswered[point] = "solver_failed" if end.failure == "error" else end.failure, end.message
             return end.value
 
-        def warm_up(point: Point) -> Warm:
+        def warm_up(point: Point) -> tuple[float, bool]:
             start = time.perf_counter()
             prepared = answer("prepare", point)
             if prepared is None:
-                return Warm(time.perf_counter() - start, returned=False)
+                return time.perf_counter() - start, False
             found.answers[point] = prepared
-            return Warm(prepared["run_time_s"], returned=True)
+            return prepared["run_time_s"], True
 
         def repeat(point: Point) -> float:
             seconds = answer("repeat", point)

@@ -30,23 +30,7 @@ _PIECE = 1 << 24  # bytes of a variable that are read at once
 _CRATE = "ro-crate-metadata.json"
 _CRATE_PROFILE = "https://w3id.org/ro/crate/1.1"
 _CROISSANT_PROFILE = "http://mlcommons.org/croissant/1.0"
-_CONTEXT = {
-    "@language": "en",
-    "@vocab": "https://schema.org/",
-    "sc": "https://schema.org/",
-    "cr": "http://mlcommons.org/croissant/",
-    "rai": "http://mlcommons.org/croissant/RAI/",
-    "dct": "http://purl.org/dc/terms/",
-    "conformsTo": "dct:conformsTo",
-    "data": {"@id": "cr:data", "@type": "@json"},
-    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
-    "extract": "cr:extract",
-    "column": "cr:column",
-    "field": "cr:field",
-    "fileObject": "cr:fileObject",
-    "recordSet": "cr:recordSet",
-    "source": "cr:source",
-}
+_CONTEXT = Path(__file__).parent / "templates" / "croissant-context.json"
 
 
 def describe(path: Path) -> list[Path]:
@@ -190,7 +174,7 @@ def _croissant(path: Path, stored: StoredSweep, content: str) -> dict[str, Any]:
         if one.dimensions[0] == "run"
     ]
     return {
-        "@context": _CONTEXT,
+        "@context": json.loads(_CONTEXT.read_text(encoding="utf-8")),
         "@type": "sc:Dataset",
         "conformsTo": _CROISSANT_PROFILE,
         "name": path.stem,

@@ -19,7 +19,7 @@ from support.scenes import paper
 
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, fitted_order, time_to_reach
 from rotor_mbs.cli import main
-from rotor_mbs.execution.timing import Warm, conduct, statistics
+from rotor_mbs.execution.timing import conduct, statistics
 from rotor_mbs.methods.catalogue import find_method, ladders, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
@@ -304,7 +304,7 @@ def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
 
     timings = conduct(
         [[(who, x) for x in settings] for who, (_, settings) in contestants.items()],
-        lambda point: Warm(timed(point), returned=True),
+        lambda point: (timed(point), True),
         timed, 120.0, 15, time.perf_counter,
     )  # fmt: skip
     found: dict[str, float] = {}

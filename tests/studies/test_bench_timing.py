@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.scenes import paper
 
-from rotor_mbs.execution.timing import Timings, Warm, allot, conduct, statistics
+from rotor_mbs.execution.timing import Timings, allot, conduct, statistics
 from rotor_mbs.methods.base import BuiltItem, Settings
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
@@ -112,9 +112,9 @@ def run_conduct(
     """Conducts points that take what `seconds` says; also the order in which they were repeated."""
     clock, order = Clock(), []
 
-    def warm_up(one: Point) -> Warm:
+    def warm_up(one: Point) -> tuple[float, bool]:
         clock.now += seconds[one]
-        return Warm(seconds[one], returned=not hanging(one))
+        return seconds[one], not hanging(one)
 
     def repeat(one: Point) -> float:
         order.append(one)

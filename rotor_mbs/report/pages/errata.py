@@ -11,7 +11,6 @@ from html import escape
 
 from markupsafe import Markup
 
-from rotor_mbs.analysis.errata import Effect, effects
 from rotor_mbs.analysis.errata import entries as checked_entries
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.models.printed.errata import CheckedEntry
@@ -19,7 +18,7 @@ from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.scene_tables import status_text
-from rotor_mbs.store.read import OpenResults, StoredScene
+from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 
 _TOKEN = re.compile(
     r"(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)(?P<square>[²³]?)"
@@ -67,20 +66,22 @@ def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) 
         ]
     rows = []
     for name, scene in scenes.items():
-        found = effects(scene)
-        if found:
-            cells = [cell for erratum in errata_methods() for cell in _effect_cells(found.get(erratum))]
+        runs = [scene.methods.get(method) for method in errata_methods().values()]
+        if any(run is not None for run in runs):
+            cells = [cell for run in runs for cell in _effect_cells(run)]
             rows.append([TableCell(name, href=files[name], note=scene.title), *cells])
     return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
 
 
-def _effect_cells(effect: Effect | None) -> Row:
-    if effect is None:
+def _effect_cells(run: StoredRun | None) -> Row:
+    """What one erratum does: the largest angle change up to the horizon and over the whole run, the energy gain."""
+    if run is None:
         return ["", "", ""]
+    facts = run.attributes
     return [
-        TableCell(number(effect.angle_horizon), note="" if effect.status == "ok" else status_text(effect.status)),
-        number(effect.angle_whole),
-        prefixed(effect.energy_gain, "J"),
+        TableCell(number(facts.get("angle_error_max")), note="" if run.status == "ok" else status_text(run.status)),
+        number(facts.get("angle_error_whole")),
+        prefixed(facts.get("energy_gain_J"), "J"),
     ]
 
 
