@@ -157,12 +157,9 @@ _TARGETS = (
         f"{_J}.solver",
         (
             "_advance",
-            "_kinetic_energy",
-            "_potential_energy",
+            "observe",
             "_work",
-            "_spring_energy",
             "_springs",
-            "_work_of_rests",
         ),
         1e-3,
     ),

@@ -19,24 +19,28 @@ from rotor_mbs.solution.trajectory import Array, sample_times
 _POINTS = 8
 
 
-def spring_energy(scene: Scene, angles: Array) -> Array:
-    """(n,) J of the bearing springs at the first n samples, from (n, 1 + blades) rad."""
-    total = np.zeros(len(angles))
-    if scene.bearing_stiffness:
-        for i in pitching(scene):
-            total += 0.5 * scene.bearing_stiffness[i] * (angles[:, 1 + i] - _rest(scene, i, angles)) ** 2
-    return total
+def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
+    """J at the first n samples, from (n, 1 + blades) rad: (n,) energy of the springs; (n,) what `work` leaves out.
 
-
-def _rest(scene: Scene, blade: int, angles: Array) -> Array:
-    """(n,) rad at the first n samples."""
-    return values_at(scene.pitch_load(blade)[1], sample_times(scene)[: len(angles)])
+    With the spring's energy ½ k (θ - r)², a rest angle r that moves does the work -∫ k (θ - r) dr, jumps included.
+    That is ∫ k r dθ, which `work` has, and the change of ½ k r (r - 2θ).
+    """
+    energy, of_rests = np.zeros((2, len(angles)))
+    for i in pitching(scene):
+        stiffness, table = scene.bearing(i)[0], scene.pitch_load(i)[1]
+        if stiffness:
+            rest = values_at(table, sample_times(scene)[: len(angles)])
+            energy += 0.5 * stiffness * (angles[:, 1 + i] - rest) ** 2
+            if not is_constant(table):
+                moved = 0.5 * stiffness * rest * (rest - 2.0 * angles[:, 1 + i])
+                of_rests += moved - moved[:1]
+    return energy, of_rests
 
 
 def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
     """(n,) J of the torques less what the dampers took, from rows of time s, angles rad, rates rad/s.
 
-    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `work_of_rests`.
+    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`.
     """
     if not scene.work_needs_path:
         turned, torques = angles - angles[:1], segments[0].values
@@ -58,21 +62,6 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
         out[inside] = done + cumulative_integral(time[inside], power)
         done = out[last - 1]
     return out
-
-
-def work_of_rests(scene: Scene, angles: Array) -> Array:
-    """(n,) J: what `work` leaves out at the first n samples, from (n, 1 + blades) rad.
-
-    With the spring's energy ½ k (θ - r)², a rest angle r that moves does the work -∫ k (θ - r) dr, jumps included.
-    That is ∫ k r dθ, which `work` has, and the change of ½ k r (r - 2θ).
-    """
-    total = np.zeros(len(angles))
-    for i in pitching(scene):
-        if not is_constant(scene.pitch_load(i)[1]):
-            rest = _rest(scene, i, angles)
-            energy = 0.5 * scene.bearing_stiffness[i] * rest * (rest - 2.0 * angles[:, 1 + i])
-            total += energy - energy[:1]
-    return total
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:

@@ -113,9 +113,9 @@ def _fields(
         fields["tip"] = np.stack(tips, axis=1)
     if scene.wants("energy"):
         fields["work"] = energy.work(scene, segments, read.time, angles, rates)[read.samples]
+        fields["potential_energy"], of_rests = energy.springs(scene, fields["angles"])
         if any(scene.bearing_rest):
-            fields["work"] += energy.work_of_rests(scene, fields["angles"])
-        fields["potential_energy"] = energy.spring_energy(scene, fields["angles"])
+            fields["work"] += of_rests
         fields["kinetic_energy"] = np.zeros(len(read.samples))
         for name, body in bodies:
             _add_energies(scene, fields, read, name, body)

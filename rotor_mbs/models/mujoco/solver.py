@@ -3,7 +3,7 @@ model linearized, by quotients of the engine's accelerations. Loads the engine."
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -106,23 +106,16 @@ class MujocoSolver:
             if scene.wants("tip"):
                 fields["tip"] = poses.site[at]
             if scene.wants("energy"):
-                fields["kinetic_energy"] = self._kinetic_energy(poses)[at]
-                fields["potential_energy"] = self._potential_energy(poses)[at] + _spring_energy(scene, fields["angles"])
-                done = self._work(angles, rates, poses.acceleration, values)[at]
-                fields["work"] = done + _work_of_rests(scene, fields["angles"])
+                masses, moments = self.engine.masses, self.engine.moments
+                twice = masses[:, None] * poses.velocity**2 + moments * poses.spin**2
+                weights = scene.gravity * (poses.centre[:, :, 2] @ masses)  # zero at the height of the shaft
+                springs, of_rests = _springs(scene, fields["angles"])
+                fields["kinetic_energy"] = 0.5 * twice.sum(axis=(1, 2))[at]
+                fields["potential_energy"] = weights[at] + springs
+                fields["work"] = self._work(angles, rates, poses.acceleration, values)[at] + of_rests
             if scene.wants("loads"):
                 fields |= {name: table[at] for name, table in self._loads(poses, values).items()}
         return finite_samples(scene, fields)
-
-    def _kinetic_energy(self, poses: Poses) -> Array:
-        """(n,) J of the bodies, by the engine's masses and principal moments."""
-        masses, moments = self.engine.masses, self.engine.moments
-        moving = masses[:, None] * poses.velocity**2 + moments * poses.spin**2
-        return np.asarray(0.5 * moving.sum(axis=(1, 2)))
-
-    def _potential_energy(self, poses: Poses) -> Array:
-        """(n,) J of the weights; zero at the height of the shaft."""
-        return np.asarray(self._scene.gravity * (poses.centre[:, :, 2] @ self.engine.masses))
 
     def _loads(self, poses: Poses, values: Array) -> dict[str, Array]:
         """What each body's parent does to it; the moment of an actuator is the part about the pitch axis."""
@@ -157,30 +150,19 @@ class MujocoSolver:
         return np.concatenate([[0.0], np.cumsum(parts)])
 
 
-def _springs(scene: Scene, samples: int) -> Iterator[tuple[int, float, Array, bool]]:
-    """For each spring: coordinate, stiffness (N m/rad), (samples,) rest angle in rad, whether that changes."""
+def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
+    """J at the first n samples, from (n, 1 + blades) rad: (n,) energy of the bearing springs, and (n,) the work
+    -∫ k (θ - r) dr of rest angles that change, less the ∫ k r dθ that actuators did."""
+    energy, work = np.zeros((2, len(angles)))
     for number in scene.moving_coordinates[1:]:
-        stiffness, rest = scene.bearing(number - 1)[0], scene.pitch_load(number - 1)[1]
+        stiffness, table = scene.bearing(number - 1)[0], scene.pitch_load(number - 1)[1]
         if stiffness:
-            yield number, stiffness, values_at(rest, sample_times(scene)[:samples]), not is_constant(rest)
-
-
-def _spring_energy(scene: Scene, angles: Array) -> Array:
-    """(n,) J of the bearing springs at the first n samples, from (n, 1 + blades) rad."""
-    total = np.zeros(len(angles))
-    for number, stiffness, rest, _ in _springs(scene, len(angles)):
-        total += 0.5 * (stiffness * (angles[:, number] - rest) ** 2)
-    return total
-
-
-def _work_of_rests(scene: Scene, angles: Array) -> Array:
-    """(n,) J: the work -∫ k (θ - r) dr of rest angles that change, less the ∫ k r dθ that actuators did."""
-    total = np.zeros(len(angles))
-    for number, stiffness, rest, is_moving in _springs(scene, len(angles)):
-        if is_moving:
-            energy = 0.5 * stiffness * rest * (rest - 2.0 * angles[:, number])
-            total += energy - energy[0]
-    return total
+            rest = values_at(table, sample_times(scene)[: len(angles)])
+            energy += 0.5 * (stiffness * (angles[:, number] - rest) ** 2)
+            if not is_constant(table):
+                moved = 0.5 * stiffness * rest * (rest - 2.0 * angles[:, number])
+                work += moved - moved[0]
+    return energy, work
 
 
 def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
