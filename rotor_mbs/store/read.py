@@ -6,7 +6,7 @@ import functools
 import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ class StoredRun:
     method: str
     _group: Any
     _verify: bool = True
+    _kept: dict[str, NDArray[Any]] | None = None  # arrays that were read, where they stay in memory
 
     @functools.cached_property
     def attributes(self) -> dict[str, Any]:
@@ -74,12 +75,16 @@ class StoredRun:
 
     def array(self, name: str) -> NDArray[Any]:
         """A dataset, whole. Raises StoreError where the run has none of that name, or it is not what was written."""
+        if self._kept and name in self._kept:
+            return self._kept[name]
         if name not in self:
             raise StoreError(f"{self._group.file.filename}: {self._group.name} has no readable {name}")
         with self._reading(name):
             dataset = hdf5.member(self._group, name)
             values = hdf5.values_of(dataset)
             self._prove(name, lambda: digests.dataset_digest(values, dataset.attrs))
+        if self._kept is not None:
+            self._kept[name] = values
         return values
 
     def get(self, name: str) -> NDArray[Any] | None:
@@ -144,27 +149,11 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
         yield OpenResults(path, attributes, scenes, file)
 
 
-class _ReadOnce(StoredRun):
-    """A run whose arrays stay in memory: claims and pages ask for each of them some six times."""
-
-    @functools.cached_property
-    def _known(self) -> dict[str, NDArray[Any]]:
-        return {}
-
-    def array(self, name: str) -> NDArray[Any]:
-        if name not in self._known:
-            self._known[name] = super().array(name)
-        return self._known[name]
-
-
 def in_memory(opened: OpenResults) -> OpenResults:
-    """An open file with its scenes in order, and with arrays that are read once."""
-
-    def read_once(scene: StoredScene) -> StoredScene:
-        runs = {name: _ReadOnce(*(getattr(run, one.name) for one in fields(run))) for name, run in scene.runs.items()}
-        return replace(scene, runs=dict(runs))
-
-    return replace(opened, scenes={name: read_once(opened.scenes[name]) for name in natural_order(opened.scenes)})
+    """An open file with its scenes in order, and with arrays that are read once: pages ask for each some six times."""
+    scenes = (opened.scenes[name] for name in natural_order(opened.scenes))
+    kept = {one.name: {name: replace(run, _kept={}) for name, run in one.runs.items()} for one in scenes}
+    return replace(opened, scenes={name: replace(opened.scenes[name], runs=runs) for name, runs in kept.items()})
 
 
 def is_sweep(path: Path) -> bool:

@@ -29,16 +29,14 @@ from rotor_mbs.store.read import damages_of
 # The scene's place in a record of how cost scales with blades or duration.
 COST_SCALING = "growth"
 
+# By kind.
 _FOLDERS = {
-    "bench": "bench",
-    "steps": "stability/steps",
-    "limits": "stability/limits",
-    "conservation": "stability/conservation",
-    "errata": "errata",
-    "modes": "modes",
-    "claims": "claims",
-    "comparison": "comparison",
-}
+    folder.rpartition("/")[2]: folder
+    for folder in (
+        "bench", "stability/steps", "stability/limits", "stability/conservation", "errata", "modes", "claims",
+        "comparison",
+    )
+}  # fmt: skip
 _DIMENSIONS = {"bench": "setting"}  # of the others: row
 _SETTING_UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
 _INTEGERS = ("repeats", "steps", "status", "false_success")

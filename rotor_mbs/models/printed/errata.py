@@ -51,7 +51,8 @@ def check_errata(seed: int = 2020, states: int = 5) -> list[CheckedEntry]:
     right = [right_entries(state) for state in drawn]
     derived = {
         subset: [derived_entries(state, Errata(*(name in subset for name in NAMES))) for state in drawn]
-        for subset in _subsets()
+        for size in range(len(NAMES) + 1)  # the fewest first
+        for subset in combinations(NAMES, size)
     }
     printed_text, right_text = printed_entries(SYMBOLS), right_formulas()
     checks = []
@@ -85,11 +86,6 @@ def _explanation(
     if _difference(key, derived[()], right) > TOLERANCE:
         return ()
     return next((subset for subset in derived if _difference(key, printed, derived[subset]) <= TOLERANCE), ())
-
-
-def _subsets() -> list[tuple[str, ...]]:
-    """Every choice of errata, the fewest first."""
-    return [subset for size in range(len(NAMES) + 1) for subset in combinations(NAMES, size)]
 
 
 def _difference(key: Key, first: Sequence[Entries], second: Sequence[Entries]) -> float:
