@@ -20,7 +20,6 @@ from rotor_mbs.errors import RotorError
 from rotor_mbs.foreign.trajectory import ForeignData
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.at_times import motion_at
-from rotor_mbs.models.lagrange.closed_form import accelerations
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations
 from rotor_mbs.models.lagrange.reference import TimedReference
 from rotor_mbs.scenario.scene import Scene
@@ -116,7 +115,7 @@ class CauseSearch:
         return states_of(reference)[np.searchsorted(reference.time, time)]
 
 
-def states_at(scene: Scene, time: Array, equations: Accelerations = accelerations) -> Array | None:
+def states_at(scene: Scene, time: Array, equations: Accelerations | None = None) -> Array | None:
     """(n, 2 (1 + blades)) Angles, then rates, of another scene, at increasing times from 0 on; None where it ends.
 
     equations   as of `motion_at`

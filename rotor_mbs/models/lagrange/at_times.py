@@ -13,7 +13,7 @@ from rotor_mbs.models.lagrange.closed_form import accelerations
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import Number, rotor_form
-from rotor_mbs.models.lagrange.taylor import Propagation, build_system
+from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
@@ -21,14 +21,14 @@ _TAYLOR = 2.0**-52
 _DOP853 = (1e-12, 1e-14)
 
 
-def motion_at(scene: Scene, times: Array, equations: Accelerations = accelerations) -> Trajectory:
+def motion_at(scene: Scene, times: Array, equations: Accelerations | None = None) -> Trajectory:
     """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early.
 
     equations: in place of the closed form, with its signature; one of `LEFT_OUT`, or of `at_azimuths`
     """
-    if equations is accelerations and is_available():
+    if equations is None and is_available():
         # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
-        run = Propagation(scene, build_system(scene), times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)
+        run = Propagation(scene, times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)
         run.integrate()
         return run.observe()
     solver = OdeSolver(scene, scipy_integrator("DOP853", *_DOP853), times, equations)

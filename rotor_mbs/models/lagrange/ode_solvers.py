@@ -61,7 +61,8 @@ class OdeSolver:
 
     def _right_hand_side(self, segment: Segment) -> RightHandSide:
         """d/dt of (angles, rates[, work]) on plain floats: for a handful of blades faster than arrays."""
-        form, work_unit, equations = self._form, self._work_unit, self._accelerations
+        form, work_unit = self._form, self._work_unit
+        equations = self._accelerations or closed_form.accelerations
         count = 1 + len(form.blades)
         changing = changing_loads(self._scene)
         constant = None if any(segment.slopes) else load_values(segment.values)
