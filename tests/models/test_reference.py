@@ -18,7 +18,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
 from rotor_mbs.models.lagrange.loads import quad_loads, sampled_loads
 from rotor_mbs.models.lagrange.reference import FallbackReference, ReferenceSolver, build, reference_at, uncertainty
-from rotor_mbs.models.lagrange.taylor import Propagation, build_system
+from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.scene_file import parse_scene
@@ -62,7 +62,7 @@ def test_recomputed_is_frozen(name: str) -> None:
 def _propagated(name: str, tolerance: float) -> Any:
     """(samples, coordinates that move) rad, quad precision."""
     scene = shipped_scene(name)
-    run = Propagation(scene, build_system(scene), quad=True, tol=tolerance, compact_mode=True)
+    run = Propagation(scene, quad=True, tol=tolerance, compact_mode=True)
     run.integrate()
     return run.states[:, : len(scene.moving_coordinates)]
 

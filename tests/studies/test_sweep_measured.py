@@ -265,12 +265,11 @@ def test_the_equations_as_written_are_those_of_the_models() -> None:
     from support.comparison_heyoka import written
 
     scene = paper("fig11")
-    system = build_system(scene)
-    numbers = array_of(system.parameters.values, quad=False)
+    equations, parameters = build_system(scene)
+    numbers = array_of(parameters.values, quad=False)
     states = np.random.default_rng(0).standard_normal((8, 5))
     own, others = (
-        hy.cfunc([right for _, right in equations], [left for left, _ in equations])
-        for equations in (system.equations, written(scene))
+        hy.cfunc([right for _, right in one], [left for left, _ in one]) for one in (equations, written(scene))
     )
     found = own(states, pars=np.repeat(numbers[: own.nparams, None], 5, axis=1))
     np.testing.assert_allclose(others(states), found, rtol=1e-12, atol=1e-12)

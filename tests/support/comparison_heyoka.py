@@ -51,9 +51,9 @@ def loop(scenes: list[Scene], *, as_written: bool) -> float:
     if as_written:
         integrator = hy.taylor_adaptive(written(scenes[0]), state=initial[0], tol=1e-15)
     else:
-        system = build_system(scenes[0])
-        integrator = hy.taylor_adaptive(system.equations, state=initial[0], tol=1e-15, high_accuracy=True)
-        integrator.pars[:] = array_of(system.parameters.values, quad=False)[: len(integrator.pars)]
+        equations, parameters = build_system(scenes[0])
+        integrator = hy.taylor_adaptive(equations, state=initial[0], tol=1e-15, high_accuracy=True)
+        integrator.pars[:] = array_of(parameters.values, quad=False)[: len(integrator.pars)]
     grid = np.linspace(0.0, scenes[0].duration, scenes[0].samples)
     start = time.perf_counter()
     for state in initial:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.models.lagrange.heyoka_adapter import heyoka
-from rotor_mbs.models.lagrange.parameters import load_segments
+from rotor_mbs.models.lagrange.parameters import changing_loads, load_segments
 from rotor_mbs.models.lagrange.taylor import build_system, set_parameters
 from rotor_mbs.scenario.scene import Scene
 
@@ -18,15 +18,15 @@ _TOLERANCE = "1e-42"
 
 def moving_angles(scene: Scene) -> Any:
     """(samples, coordinates that move) rad, numbers of 180 bits."""
-    system, columns = build_system(scene), scene.moving_coordinates
+    (equations, parameters), columns = build_system(scene), scene.moving_coordinates
     count, kind = len(columns), {"fp_type": heyoka().real, "tol": heyoka().real(_TOLERANCE, _BITS)}
     values = [*(scene.initial_angles[i] for i in columns), *(scene.initial_rates[i] for i in columns)]
-    start = _numbers([*values, *[0.0] * (len(system.equations) - 2 * count)])
-    integrator = heyoka().taylor_adaptive(system.equations, state=start, compact_mode=True, **kind)
-    set_parameters(integrator, _numbers(system.parameters.values))
+    start = _numbers([*values, *[0.0] * (len(equations) - 2 * count)])
+    integrator = heyoka().taylor_adaptive(equations, state=start, compact_mode=True, **kind)
+    set_parameters(integrator, _numbers(parameters.values))
     times, rows = np.linspace(0.0, scene.duration, scene.samples), [start[None, :]]
     for segment in load_segments(scene):
-        if numbers := [number for i in system.changing for number in segment.lines[i]]:
+        if numbers := [number for i in changing_loads(scene) for number in segment.lines[i]]:
             integrator.pars[-len(numbers) :] = _numbers(numbers)
         inside = times[(times > segment.start) & (times <= segment.end)]
         end = [] if len(inside) and inside[-1] == segment.end else [segment.end]

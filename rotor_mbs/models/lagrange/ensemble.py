@@ -151,7 +151,7 @@ def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) ->
     """Compiled once per computer (engine's cache on disk)."""
 
     def make() -> Any:
-        equations = build_system(example, in_momenta=True).equations
+        equations, _ = build_system(example, in_momenta=True)
         options = {"tol": tolerance, "compact_mode": is_compact(example), "high_accuracy": True}
         return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
 

@@ -14,7 +14,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.loads import quad_loads
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import rate_units
-from rotor_mbs.models.lagrange.taylor import Propagation, build_system
+from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
@@ -36,10 +36,7 @@ class ReferenceSolver:
 
     def __init__(self, scene: Scene, tolerance: float, check_tolerance: float) -> None:
         self._scene = scene
-        system = build_system(scene)
-        self._runs = [
-            Propagation(scene, system, quad=True, tol=tol, compact_mode=True) for tol in (tolerance, check_tolerance)
-        ]
+        self._runs = [Propagation(scene, quad=True, tol=tol, compact_mode=True) for tol in (tolerance, check_tolerance)]
 
     def integrate(self) -> Integration:
         best, check = (run.integrate() for run in self._runs)
@@ -96,7 +93,7 @@ def error_growth(scene: Scene) -> Array:
 def _transition_matrices(scene: Scene, times: Array | None = None) -> Array:
     """(n, 2k, 2k) from the variational equations, for k coordinates that move."""
     count = 2 * len(scene.moving_coordinates)
-    propagation = Propagation(scene, build_system(scene), variational=True, compact_mode=True, times=times)
+    propagation = Propagation(scene, variational=True, compact_mode=True, times=times)
     propagation.integrate()
     return np.asarray(propagation.states[:, count:].reshape(-1, count, count))
 
@@ -139,7 +136,7 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     In quad precision with heyoka, else by DOP853 at its tightest.
     """
     if is_available():
-        run = Propagation(scene, build_system(scene), quad=True, tol=_QUAD, compact_mode=True, times=times)
+        run = Propagation(scene, quad=True, tol=_QUAD, compact_mode=True, times=times)
         run.integrate()
         trajectory = run.observe()
         matrices = _transition_matrices(scene, times)

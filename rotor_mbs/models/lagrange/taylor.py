@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
 from importlib.util import find_spec
 from typing import Any
@@ -33,28 +32,13 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample
 _UNROLLED_BLADES = 4
 
 
-@dataclass
-class EquationSystem:
-    """First-order equations of a scene.
-
-    equations   [(symbol, right-hand side)]: angles, rates, and the work where it is not known in closed form
-    parameters  their numbers; the last ones are offset and slope of each load that changes over time
-    changing    those loads, as in `parameters.changing_loads`
-    """
-
-    equations: list[tuple[Any, Any]]
-    parameters: Parameters
-    changing: tuple[int, ...]
-
-    @property
-    def structure(self) -> tuple[int, ...]:
-        return (*self.parameters.structure, len(self.equations), *self.changing)
-
-
-def build_system(scene: Scene, *, in_momenta: bool = False) -> EquationSystem:
+def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[Any, Any]], Parameters]:
     """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed.
 
     in_momenta   in Hamilton's variables: momenta in place of rates
+
+    Returns the first-order equations [(symbol, right-hand side)], of angles, rates, and the work where it is not known
+    in closed form; and their numbers, of which the last are offset and slope of each of `changing_loads`.
     """
     engine = heyoka()
     parameters = Parameters()
@@ -69,7 +53,7 @@ def build_system(scene: Scene, *, in_momenta: bool = False) -> EquationSystem:
     if work_is_integrated(scene):
         working = at_constant_rests(changing_loads(scene), loads)
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
-    return EquationSystem(equations, parameters, changing_loads(scene))
+    return equations, parameters
 
 
 def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
@@ -123,7 +107,6 @@ class Propagation:
     def __init__(
         self,
         scene: Scene,
-        system: EquationSystem,
         *,
         quad: bool = False,
         variational: bool = False,
@@ -132,19 +115,20 @@ class Propagation:
     ) -> None:
         engine, self._scene = heyoka(), scene
         columns, count = scene.moving_coordinates, 2 * len(scene.moving_coordinates)
-        equations = system.equations
+        equations, parameters = build_system(scene)
+        self._changing = changing_loads(scene)
+        structure = (*parameters.structure, len(equations), *self._changing)
         values = [scene.initial_angles[i] for i in columns] + [scene.initial_rates[i] for i in columns]
         start = array_of([Fraction(value) for value in [*values, *[0.0] * (len(equations) - count)]], quad=quad)
-        key = (quad, variational, *options.items(), system.structure)
+        key = (quad, variational, *options.items(), structure)
         if quad:
             options |= {"tol": engine.real128(options["tol"]), "fp_type": engine.real128}
         if variational:
             equations, start = equations[:count], start[:count]
             equations = engine.var_ode_sys(equations, args=engine.var_args.vars, order=1)
         self._integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options))
-        set_parameters(self._integrator, array_of(system.parameters.values, quad=quad))
+        set_parameters(self._integrator, array_of(parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
-        self._changing = system.changing
         self._segments = load_segments(scene)
         self.times = sample_times(scene) if times is None else times
         self.states = self._initial[None, :]
@@ -174,7 +158,7 @@ class Propagation:
 
 def solver(scene: Scene, tolerance: float) -> Propagation:
     """In double precision, the samples as they are stored. Raises MethodRefusal where heyoka is not installed."""
-    return Propagation(scene, build_system(scene), tol=tolerance, compact_mode=is_compact(scene), high_accuracy=True)
+    return Propagation(scene, tol=tolerance, compact_mode=is_compact(scene), high_accuracy=True)
 
 
 def items(scene: Scene) -> list[BuiltItem]:
