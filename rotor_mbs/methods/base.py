@@ -142,8 +142,8 @@ class Method:
         interval: s, between samples.
         """
         for ladder in self.ladders:
-            for rung in () if ladder.variant else ladder.rungs(interval):
-                varied = {name: float(str(value)) for name, value in ladder.fill(rung.setting).items()}
+            for setting in () if ladder.variant else ladder.rungs(interval):
+                varied = {name: float(str(value)) for name, value in ladder.fill(setting).items()}
                 # By more than the rounding of a rung that was told to three digits.
                 lower = {name: value for name, value in varied.items() if value < 0.99 * float(str(settings[name]))}
                 if next(iter(varied)) in lower:

@@ -21,14 +21,6 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Rung:
-    """A setting of a ladder: the number it is plotted by (s, or the tolerance), and all that the method is given."""
-
-    setting: float
-    settings: Mapping[str, object]
-
-
-@dataclass(frozen=True)
 class Ladder:
     """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance.
 
@@ -61,10 +53,13 @@ class Ladder:
         """This ladder with every second value, without the coarsest third."""
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
-    def rungs(self, interval: float) -> tuple[Rung, ...]:
-        """The ladder on a scene whose samples are `interval` s apart."""
+    def rungs(self, interval: float) -> dict[float, dict[str, object]]:
+        """The ladder on a scene whose samples are `interval` s apart.
+
+        All that the method is given, by the number it is plotted by (s, or the tolerance).
+        """
         settings = [value * interval if self.kind == STEP else value for value in self.values]
-        return tuple(Rung(setting, {**self.choices, **self.fill(setting)}) for setting in settings)
+        return {setting: {**self.choices, **self.fill(setting)} for setting in settings}
 
 
 def step_ladder(

@@ -104,7 +104,7 @@ def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) ->
 
 
 def _bench_case(scene: Scene, ladder: Ladder, repeats: int, budget_s: float) -> Case:
-    rungs = [[rung.setting, sorted(rung.settings.items())] for rung in ladder.rungs(1.0)]
+    rungs = [[setting, sorted(settings.items())] for setting, settings in ladder.rungs(1.0).items()]
     options = {"curve": ladder.curve, "rungs": rungs, "repeats": repeats, "budget_s": budget_s}
     return Case(scene, ladder.method, ladder.choices, BENCH, options, reference_case(scene).key, SOURCES)
 
@@ -163,8 +163,8 @@ def facts_of(case: Case, short: Scene, reference: Trajectory) -> dict[str, Any]:
 def points_of(ladder: Ladder, interval: float) -> list[Point]:
     """A point per rung, on a scene whose samples are `interval` s apart."""
     return [
-        Point(ladder.curve, ladder.method, rung.setting, tuple(sorted(rung.settings.items())))
-        for rung in ladder.rungs(interval)
+        Point(ladder.curve, ladder.method, setting, tuple(sorted(settings.items())))
+        for setting, settings in ladder.rungs(interval).items()
     ]
 
 

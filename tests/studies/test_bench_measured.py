@@ -80,9 +80,9 @@ def test_every_method_but_the_printed_ones_has_a_ladder_of_six_rungs_or_more() -
     for one in found:
         rungs = one.rungs(0.1)
         assert len(rungs) >= 6
-        assert all(a.setting > b.setting for a, b in itertools.pairwise(rungs))
+        assert all(a > b for a, b in itertools.pairwise(rungs))
         settings = find_method(one.method).settings
-        assert all(settings.of(one.method, rung.settings) for rung in rungs)
+        assert all(settings.of(one.method, chosen) for chosen in rungs.values())
     assert len({one.curve for one in found}) == len(found)
 
 
