@@ -12,7 +12,7 @@ from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import check_names
-from rotor_mbs.report import verdict_formats
+from rotor_mbs.report.pages import check as formats
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.studies import check as study
@@ -39,9 +39,9 @@ def check(arguments: argparse.Namespace) -> int:
     stream = sys.stderr if arguments.json == _STANDARD_OUTPUT else sys.stdout
     failed = [verdict for verdict in found if not verdict.passed]
     for verdict in found if arguments.verbose else failed:
-        print(verdict_formats.line(verdict), file=stream)
+        print(formats.line(verdict), file=stream)
     if arguments.margins:
-        print(verdict_formats.margins(found), file=stream)
+        print(formats.margins(found), file=stream)
     if arguments.github:
         _tell_github(found, stream)
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(found).items())
@@ -52,25 +52,25 @@ def check(arguments: argparse.Namespace) -> int:
 
 def _tell_github(found: list[Verdict], stream: TextIO) -> None:
     """The worst failures as annotations; a table into the job's summary, where a job has one."""
-    failed = [verdict for verdict in verdict_formats.worst_first(found) if not verdict.passed]
-    for verdict in failed[: verdict_formats.WORST]:
-        print(verdict_formats.github(verdict), file=stream)
+    failed = [verdict for verdict in formats.worst_first(found) if not verdict.passed]
+    for verdict in failed[: formats.WORST]:
+        print(formats.github(verdict), file=stream)
     place = os.environ.get("GITHUB_STEP_SUMMARY")
     if place:
         try:
             with Path(place).open("a", encoding="utf-8") as file:
-                file.write(verdict_formats.summary(found))
+                file.write(formats.summary(found))
         except OSError as exc:
             raise StoreError(f"{place} (GITHUB_STEP_SUMMARY): cannot be written: {exc.strerror}") from exc
 
 
 def _write(arguments: argparse.Namespace, found: list[Verdict]) -> None:
     if arguments.junit is not None:
-        replace_file(arguments.junit, verdict_formats.junit(found))
+        replace_file(arguments.junit, formats.junit(found))
     for path, text in (
-        (arguments.json, verdict_formats.as_json),
-        (arguments.trend, verdict_formats.trend),
-        (arguments.badge, verdict_formats.badge),
+        (arguments.json, formats.as_json),
+        (arguments.trend, formats.trend),
+        (arguments.badge, formats.badge),
     ):
         if path == _STANDARD_OUTPUT:
             print(text(found))

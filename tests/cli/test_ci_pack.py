@@ -17,7 +17,7 @@ from support.checking import results_file, shipped
 
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli import main
-from rotor_mbs.report import verdict_formats
+from rotor_mbs.report.pages import check as verdict_formats
 from rotor_mbs.studies.check import regressions
 from rotor_mbs.studies.run import run_scenes
 

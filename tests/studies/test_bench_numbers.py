@@ -23,10 +23,10 @@ from rotor_mbs.analysis.work_precision import (
 )
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.looks import look_of
-from rotor_mbs.report.pages.bench import omissions
-from rotor_mbs.report.pages.cost import (
+from rotor_mbs.report.pages.bench import (
     csv_text,
     failure_table,
+    omissions,
     overview_table,
     reach_table,
 )

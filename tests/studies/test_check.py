@@ -32,7 +32,7 @@ from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Outcome, Result
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.models.lagrange import closed_form, parameters
-from rotor_mbs.report import verdict_formats
+from rotor_mbs.report.pages import check as verdict_formats
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder

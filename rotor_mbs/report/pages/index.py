@@ -15,16 +15,14 @@ from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables
+from rotor_mbs.report.pages.bench import cost_legend, cost_picture
 from rotor_mbs.report.pages.comparison_pictures import energy_of_scenes, key_picture
-from rotor_mbs.report.pages.cost import cost_legend, cost_picture
-from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text
+from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text, versions
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import paths
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 
 Scenes = Mapping[str, StoredScene]
-# Attributes of a results file that say what made it.
-_VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
 # Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
 _SHADES = (-12, -10, -8, -6, -4, -2, 0)
 _MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
@@ -171,11 +169,6 @@ def _heat_cell(run: StoredRun | None) -> tuple[int, str, str, str] | None:
     spoken = f"{label_of(run.method)}: {text or 'no error known'}, {status_text(run.status)}"
     shade = len(_SHADES) if error is None or not math.isfinite(error) else sum(error > 10.0**e for e in _SHADES)
     return shade, text, _MARKS.get(run.status, _FAILED), spoken
-
-
-def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
-    """(what, version) of the programs and the computer that made a file."""
-    return [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
 
 
 def _scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:

@@ -17,8 +17,8 @@ from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, l
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables, comparison_pictures, quantities, scene_tables
+from rotor_mbs.report.pages.bench import cost_section
 from rotor_mbs.report.pages.comparison_pictures import horizon_entry
-from rotor_mbs.report.pages.cost import cost_section
 from rotor_mbs.report.pages.drive import drive_section
 from rotor_mbs.report.pages.figures import HEADINGS
 from rotor_mbs.report.pages.scene_tables import metric

@@ -17,6 +17,8 @@ from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Array = NDArray[np.float64]
+# Attributes of a results file that say what made it.
+_VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
 
 
 def status_text(status: str) -> str:
@@ -164,3 +166,8 @@ def path_table(runs: Mapping[str, StoredRun]) -> PageTable:
     blades = range(len(columns[0]))
     rows = [[str(blade + 1), *(column[blade] for column in columns)] for blade in blades]
     return PageTable("Paths of the tips", head, rows, numeric=range(1, len(head)))
+
+
+def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
+    """(what, version) of the programs and the computer that made a file."""
+    return [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
