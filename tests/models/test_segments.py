@@ -19,7 +19,7 @@ from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
-from rotor_mbs.models.lagrange.taylor import Propagation, build_system
+from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.time_table import Segment
 
 TIMES = np.linspace(0.0, 3.0, 7)
@@ -102,7 +102,7 @@ def test_a_solver_at_chosen_times_has_those(engine: str) -> None:
     scene = paper("fig06", gravity=0.0, initial_rates=(0.5, 0.0, 0.0, 0.0))
     solver: Any = OdeSolver(scene, INTEGRATORS["DOP853"], times)
     if engine == "heyoka":
-        solver = Propagation(scene, build_system(scene), times=times, tol=1e-15, compact_mode=True)
+        solver = Propagation(scene, times=times, tol=1e-15, compact_mode=True)
     assert solver.integrate().success
     found = solver.observe()
     assert found.time.tolist() == times.tolist()
@@ -114,7 +114,7 @@ def test_a_load_over_time_is_in_quad_precision_in_a_quad_run() -> None:
     pytest.importorskip("heyoka")
     scene = paper("fig06", gravity=0.0, initial_angles=(0.0,) * 4, initial_rates=(0.0,) * 4, duration=3.0, samples=2)
     scene = replace(scene, rotor_torque=((0.0, 0.0), (3.0, 1000.0)))
-    run = Propagation(scene, build_system(scene), quad=True, tol=1e-32, compact_mode=True)
+    run = Propagation(scene, quad=True, tol=1e-32, compact_mode=True)
     assert run.integrate().success
     x, _, z = map(Fraction, scene.blades[0].centre_of_mass)
     inertia = 3 * Fraction(scene.blades[0].mass) * (x * x + z * z) + Fraction(scene.hub_inertia)
