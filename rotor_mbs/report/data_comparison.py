@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict
+from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, DataVerdict
 from rotor_mbs.foreign.trajectory import load_data
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.files import write_page
@@ -84,7 +84,12 @@ class DataComparison:
     def table(self) -> TextTable:
         """A row for each channel: errors (rad, rad/s), until when it agrees (s), lag (s), scale, offset."""
         head = ("channel", "largest error", "per growth", *(f"to {level:g}" for level in LEVELS))
-        return TextTable((*head, "lag (s)", "scale - 1", "offset"), [_row(one) for one in self.verdict.channels])
+        rows = []
+        for one in self.verdict.channels:
+            until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in one.agrees_until)
+            fit = (f"{one.lag_s:.1e}", f"{one.scale - 1.0:.1e}", f"{one.offset:.1e}")
+            rows.append((one.name, f"{one.error_max:.1e} {one.unit}", f"{one.error_per_growth:.1e}", *until, *fit))
+        return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
 
     def plot(self) -> Panels:
         """The error of each channel per unit of error growth over time, and the tolerance."""
@@ -133,11 +138,3 @@ class DataComparison:
         return (
             f"<p>{escape(self.status)} {escape(self.message)}</p>{self.table()._repr_html_()}{self.plot()._repr_svg_()}"
         )
-
-
-def _row(one: ChannelErrors) -> tuple[str, ...]:
-    until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in one.agrees_until)
-    return (
-        one.name, f"{one.error_max:.1e} {one.unit}", f"{one.error_per_growth:.1e}", *until,
-        f"{one.lag_s:.1e}", f"{one.scale - 1.0:.1e}", f"{one.offset:.1e}",
-    )  # fmt: skip

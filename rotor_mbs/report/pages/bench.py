@@ -27,6 +27,7 @@ from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.store.read import OpenResults, StoredScene
 from rotor_mbs.store.records import COST_SCALING, Record, read_records
 
+Curves = Mapping[str, Sequence[Record]]  # by scene
 _POINT_COLUMNS = (
     "method", "setting", "angle error (rad)", "at the end (rad)", "tip error (m)", "energy drift", "median",
     "quartiles", "shortest", "set-up", "again", "read-out", "repeats", "steps", "status",
@@ -35,11 +36,12 @@ _POINT_COLUMNS = (
 
 def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
     """By file name, the pages on the curves of `results`, and CSV; `main`: the file of the one over all scenes."""
-    grouped, made_with = work_precision.by_scene(read_records(results.path, "bench")), versions(results.attributes)
+    grouped = work_precision.by_scene(read_records(results.path, "bench"))
     scaling = {name: curves for name, curves in grouped.items() if name.startswith(f"{COST_SCALING}/")}
     scenes = {name: grouped[name] for name in natural_order(grouped) if name not in scaling}
     files = {name: f"bench-{file}" for name, file in page_names(scenes).items()}
-    pages = {main: render("bench", _index(scenes, scaling, files, made_with), site, main)}
+    index = _index(scenes, scaling, files) | {"versions": versions(results.attributes)}
+    pages = {main: render("bench", index, site, main)}
     pages["bench.csv"] = csv_text([curve for curves in scenes.values() for curve in curves])
     for name, curves in scenes.items():
         csv = files[name].removesuffix(".html") + ".csv"
@@ -71,10 +73,7 @@ def _scene(name: str, stored: StoredScene | None, curves: Sequence[Record], csv:
     }
 
 
-def _index(
-    scenes: Mapping[str, Sequence[Record]], scaling: Mapping[str, Sequence[Record]], files: Mapping[str, str],
-    made_with: Sequence[tuple[str, str]],
-) -> dict[str, object]:  # fmt: skip
+def _index(scenes: Curves, scaling: Curves, files: Mapping[str, str]) -> dict[str, object]:
     pictures = []
     for i, (name, curves) in enumerate(scenes.items()):
         link = Markup('<a href="{}">{}</a>').format(files[name], name)
@@ -90,7 +89,6 @@ def _index(
             (name.rpartition("/")[2], Section(tables=[scaling_table(curves)])) for name, curves in scaling.items()
         ],
         "csv": "bench.csv",
-        "versions": made_with,
     }
 
 

@@ -21,9 +21,7 @@ from rotor_mbs.report.pages.scene_tables import status_text
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
 
 _TOKEN = re.compile(
-    r"(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)(?P<square>[²³]?)"
-    r"|(?P<rate>q̇)(?P<rate_index>\d)(?P<rate_square>[²³]?)"
-    r"|(?P<name>[A-Za-zα-ω])(?P<name_square>[²³]?)"
+    r"(?:(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)|q̇(?P<rate_index>\d)|(?P<name>[A-Za-zα-ω]))(?P<square>[²³]?)"
     r"|(?P<number>\d+(?:/\d+)?)|(?P<sign>[-+=()])|(?P<space>\s+)"
 )
 _POWERS = {"²": "2", "³": "3"}
@@ -132,19 +130,15 @@ def _row(text: str) -> str | None:
 
 
 def _element(found: re.Match[str]) -> str:
-    if found["trig"]:
-        return _power(f"<msub><mi>{found['trig']}</mi><mn>{found['index']}</mn></msub>", found["square"])
-    if found["rate"]:
-        dotted = "<mover><mi>q</mi><mo>˙</mo></mover>"
-        return _power(f"<msub>{dotted}<mn>{found['rate_index']}</mn></msub>", found["rate_square"])
-    if found["name"]:
-        return _power(f"<mi>{found['name']}</mi>", found["name_square"])
     if found["number"]:
         return f"<mn>{found['number']}</mn>"
     if found["sign"]:
         return f"<mo>{found['sign'].replace('-', '−')}</mo>"
-    return '<mspace width="0.2em"/>'
-
-
-def _power(base: str, sign: str) -> str:
-    return f"<msup>{base}<mn>{_POWERS[sign]}</mn></msup>" if sign else base
+    if found["space"]:
+        return '<mspace width="0.2em"/>'
+    base = f"<mi>{found['name']}</mi>"
+    if found["trig"]:
+        base = f"<msub><mi>{found['trig']}</mi><mn>{found['index']}</mn></msub>"
+    elif found["rate_index"]:
+        base = f"<msub><mover><mi>q</mi><mo>˙</mo></mover><mn>{found['rate_index']}</mn></msub>"
+    return f"<msup>{base}<mn>{_POWERS[found['square']]}</mn></msup>" if found["square"] else base
