@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
 
 import numpy as np
 
@@ -96,16 +95,16 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
     shift[0] = 2.0 * math.pi
     best: Turn | None = None
     for _ in range(_CORRECTIONS):
-        end = system.propagate(state, torque, period)
-        if end.message:
-            return _not_found(speed, n, end.message)
-        residual = (end.state - state - shift) / units
+        end, by_state, by_torque, trace, message = system.propagate(state, torque, period)
+        if message:
+            return _not_found(speed, n, message)
+        residual = (end - state - shift) / units
         mismatch = float(np.abs(residual).max())
         if best is None or mismatch < best.mismatch:
-            best = Turn(speed, state, torque, end.by_state, *_invariants(scene, state, torque), end.trace, mismatch)
+            best = Turn(speed, state, torque, by_state, *_invariants(scene, state, torque), trace, mismatch)
         if mismatch < _CLOSED or mismatch > _LOST:
             break
-        jacobian = np.column_stack([end.by_torque, (end.by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
+        jacobian = np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
         sizes = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
         change = np.linalg.lstsq(jacobian / sizes, -residual, rcond=1e-13)[0] / sizes
         torque, state = torque + change[0], state + np.concatenate([[0.0], change[1:]])
@@ -131,16 +130,6 @@ def _invariants(scene: Scene, state: Array, torque: float) -> tuple[Array, Array
     angles, rates = state[:n].tolist(), state[n:].tolist()
     found = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
     return (np.zeros(2 * n) if scene.has_damping else gradient), np.array([*rates, *found])
-
-
-class _End(NamedTuple):
-    """State after a turn, its derivatives by the initial state and the torque, ∫ tr A dt; a message if it failed."""
-
-    state: Array
-    by_state: Array
-    by_torque: Array
-    trace: float
-    message: str
 
 
 class _Variational:
@@ -170,7 +159,8 @@ class _Variational:
         still = linearize(scene, scene.initial_angles, [0.0] * len(scene.initial_angles), 0.0)
         self._frequency = math.sqrt(np.abs(still.stiffness).max())
 
-    def propagate(self, state: Array, torque: float, period: float) -> _End:
+    def propagate(self, state: Array, torque: float, period: float) -> tuple[Array, Array, Array, float, str]:
+        """State after a turn, its derivatives by initial state and torque, ∫ tr A dt; a message where it failed."""
         count, integrator = len(state), self._integrator
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0
@@ -181,4 +171,4 @@ class _Variational:
             message = f"no periodic motion found: a turn takes more than {most} steps"
         whole = np.array(integrator.state)
         derivatives = whole[count:-1].reshape(count, count + 1)
-        return _End(whole[:count], derivatives[:, :count], derivatives[:, count], float(whole[-1]), message)
+        return whole[:count], derivatives[:, :count], derivatives[:, count], float(whole[-1]), message

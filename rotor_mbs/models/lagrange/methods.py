@@ -99,7 +99,9 @@ METHODS = (
         label="closed form, Taylor",
         look=Look(_BLUE, "-", "o"),
         settings=TaylorSettings,
-        build=lambda scene, settings: taylor.solver(scene, settings.tolerance),
+        build=lambda scene, settings: taylor.Propagation(
+            scene, tol=settings.tolerance, compact_mode=taylor.is_compact(scene), high_accuracy=True
+        ),
         items=taylor.items,
         solve_many=_taylor_many,
         load=heyoka_adapter.compile_anew,

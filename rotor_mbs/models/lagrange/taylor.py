@@ -1,4 +1,4 @@
-"""lagrange/taylor: the closed form as a symbolic system of heyoka, its propagation over the samples, and the solver."""
+"""lagrange/taylor: the closed form as a symbolic system of heyoka, and its propagation over the samples."""
 
 from __future__ import annotations
 
@@ -102,6 +102,8 @@ class Propagation:
     times        (n,) s, of the samples, increasing from 0 up to the duration; the scene's where it is left out
     options      of the engine's integrator
     states       (n, variables) at the samples of the last run, cut before the first row that is not finite
+
+    Raises MethodRefusal where heyoka is not installed.
     """
 
     def __init__(
@@ -154,11 +156,6 @@ class Propagation:
 
     def observe(self) -> Trajectory:
         return samples.trajectory(self._scene, self.times, self.states.astype(float, copy=False))
-
-
-def solver(scene: Scene, tolerance: float) -> Propagation:
-    """In double precision, the samples as they are stored. Raises MethodRefusal where heyoka is not installed."""
-    return Propagation(scene, tol=tolerance, compact_mode=is_compact(scene), high_accuracy=True)
 
 
 def items(scene: Scene) -> list[BuiltItem]:
