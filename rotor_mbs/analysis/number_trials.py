@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, order=True)
@@ -79,8 +78,8 @@ class NumberTrials:
 
     def of_row(self, row: str) -> list[Conditions]:
         """Those with this way of writing the row and the usual tolerances, by duration."""
-        written = [one for one in self.conditions if one.gravity_row == row]
-        return sorted(one for one in written if _tolerances(one) == _tolerances(self.usual))
+        usual = replace(self.usual, gravity_row=row)
+        return sorted(one for one in self.conditions if one == replace(usual, duration=one.duration))
 
     def with_tolerances(self) -> list[Conditions]:
         """Those of the usual row and duration, by tolerance."""
@@ -90,10 +89,5 @@ class NumberTrials:
 
 def count_of_rows(trials: NumberTrials, duration: float) -> tuple[int, int]:
     """(ways of writing the printed row that give all numbers for `duration`, all such ways)."""
-    rows: Iterable[str] = [row.name for row in trials.rows if row.is_of_56]
-    found = [duration in trials.durations_of_all(row) for row in rows]
+    found = [duration in trials.durations_of_all(row.name) for row in trials.rows if row.is_of_56]
     return sum(found), len(found)
-
-
-def _tolerances(one: Conditions) -> tuple[float, float]:
-    return one.relative_tolerance, one.absolute_tolerance

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.text_table import listed
 from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 from rotor_mbs.store.records import Record, read_records
@@ -107,7 +108,8 @@ def _suite_run(scene: StoredScene, run: StoredRun, ladder: Record | None) -> Sui
     error = facts.get("angle_error_max")
     reference = scene.reference
     step = ladder.attributes.get("step_for_target_s") if ladder is not None else None
-    ladder_reaches = ladder is not None and bool(np.any(_ok(ladder) & (ladder.arrays["angle_error_max"] <= TARGET)))
+    steps_ok = ladder is not None and ladder.arrays["status"] == code_of("ok")
+    ladder_reaches = ladder is not None and bool(np.any(steps_ok & (ladder.arrays["angle_error_max"] <= TARGET)))
     has_reference = reference is not None and reference.status == "ok"
     outcome = _outcome(run, ladder, has_motion=has_reference)
     return SuiteRun(
@@ -127,14 +129,10 @@ def _suite_run(scene: StoredScene, run: StoredRun, ladder: Record | None) -> Sui
     )
 
 
-def _ok(ladder: Record) -> np.ndarray:
-    return np.array([status == "ok" for status in ladder.statuses])
-
-
 def _outcome(run: StoredRun, ladder: Record | None, *, has_motion: bool) -> str:
     if run.status == "ok":
         return "holds" if "angle_error_max" in run.attributes else "energy_alone"
-    if ladder is not None and bool(_ok(ladder).any()):
+    if ladder is not None and "ok" in ladder.statuses:
         return "smaller_step"
     if run.status in ("timed_out", "unchecked"):
         return run.status

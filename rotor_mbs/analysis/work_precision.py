@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.run_selection import corrected_runs
-from rotor_mbs.solution.status import STATUSES, code_of
+from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
 
@@ -40,16 +40,13 @@ class Reach:
 
 def succeeded(curve: Record) -> NDArray[np.bool_]:
     """(settings,) Which points stand on the curve: run to the end, and not useless."""
-    ok = np.array([status == "ok" for status in curve.statuses])
-    known: NDArray[np.bool_] = np.isfinite(curve.arrays["angle_error_max"]) & np.isfinite(curve.arrays["run_time_s"])
-    return ok & known
+    known = np.isfinite(curve.arrays["angle_error_max"]) & np.isfinite(curve.arrays["run_time_s"])
+    return np.asarray(known & (curve.arrays["status"] == code_of("ok")))
 
 
 def failed(curve: Record) -> NDArray[np.bool_]:
     """(settings,) Which points are failures: run, and neither on the curve nor left out by the budget."""
-    failures: NDArray[np.bool_] = ~succeeded(curve)
-    failures[[status == "left_out" for status in curve.statuses]] = False
-    return failures
+    return np.asarray(~succeeded(curve) & (curve.arrays["status"] != code_of("left_out")))
 
 
 def left_out(curve: Record) -> int:
@@ -147,7 +144,7 @@ def own_points(scene: StoredScene) -> list[Record]:
             numbers |= {one: run.attributes.get(one, math.nan) for one in ("setup_time_s", "output_time_s")}
             arrays = {one: np.array([value]) for one, value in {"angle_error_max": error, **numbers}.items()}
             arrays["status"] = np.array([code_of("ok")])
-            found.append(Record("bench", scene.name, name, {"status_meanings": " ".join(STATUSES)}, arrays))
+            found.append(Record("bench", scene.name, name, arrays=arrays))
     return found
 
 

@@ -107,7 +107,9 @@ def execute(
     with writing(store.path, RESULTS) as parts:
         _merge(store, parts)
         stored = store.stored_keys()
-        missing = _missing(list(cases), stored)
+        cases = list(cases)
+        lacking = {case.key for case in cases if case.key not in stored}
+        missing = [case for case in cases if case.key in lacking or case.reference in lacking]
         made: list[Outcome] = []
         work = sum(case.work for case in missing)
         jobs = [Job(case, parts / f"{case.key}.h5", _place(case, parts, store, stored)) for case in missing]
@@ -118,12 +120,6 @@ def execute(
             on_progress(len(made), len(missing), made[-1])
         _merge(store, parts, even_none=not store.path.exists())
     return made
-
-
-def _missing(cases: Sequence[Case], stored: AbstractSet[str]) -> list[Case]:
-    """Those that are not stored, and those that are compared with one of these."""
-    keys = {case.key for case in cases if case.key not in stored}
-    return [case for case in cases if case.key in keys or case.reference in keys]
 
 
 def _merge(store: Store, parts: Path, *, even_none: bool = False) -> None:

@@ -84,7 +84,13 @@ def rows_of(chunk: Chunk) -> Rows:
     else:
         rows = empty_rows(len(scenes), chunk.row)
         for i, scene in enumerate(scenes):
-            _put_run(rows, i, scene, _solved(chunk, scene))
+            try:
+                run = solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
+            except OutOfTimeError as exc:
+                put_end(rows, i, "timed_out", str(exc))
+                rows["time_reached"][i] = 0.0
+            else:
+                _put_run(rows, i, scene, run)
     if "error_growth" in rows:
         for i, scene in enumerate(scenes):
             _put_amplification(rows, i, scene)
@@ -134,20 +140,7 @@ def _scenes(chunk: Chunk) -> list[Scene]:
         raise InputError(f"runs {chunk.first} to {last}: {keys}: {error}") from error
 
 
-def _solved(chunk: Chunk, scene: Scene) -> Solution | str:
-    """The run, or why there is none. Its time limit begins after the model is built: an interrupted import of an engine
-    could not be repeated in this process."""
-    try:
-        return solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
-    except OutOfTimeError as exc:
-        return str(exc)
-
-
-def _put_run(rows: Rows, i: int, scene: Scene, run: Solution | str) -> None:
-    if isinstance(run, str):
-        put_end(rows, i, "timed_out", run)
-        rows["time_reached"][i] = 0.0
-        return
+def _put_run(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
     _put_verdict(rows, i, scene, run)
     trajectory = run.trajectory
     n = len(trajectory.time)
