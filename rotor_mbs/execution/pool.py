@@ -296,7 +296,7 @@ class _Process:
                 future = self._future = pool.schedule(_answer, [request], timeout=timeout_s)
             return _result(future, pool)
         except TimeoutError:
-            raise TaskLostError(f"ended after {timeout_s:g} s", "timed_out") from None
+            raise _ended_at(timeout_s) from None
         except (OSError, RuntimeError, CancelledError) as exc:
             self.close()
             code = getattr(exc, "exitcode", None)
@@ -337,6 +337,18 @@ class _Process:
                 time.sleep(_RETRY_START_S)  # the system had no room; there may be some then
                 raise
         return self._pool
+
+
+def _ended_at(timeout_s: float) -> TaskLostError:
+    """Under a limit of its memory a library may wait for memory without end: that says nothing of the task."""
+    with suppress(ImportError):  # Windows
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        if limit != resource.RLIM_INFINITY:
+            text = f"ended after {timeout_s:g} s under a memory limit (ulimit -v) of {limit >> 20} MiB"
+            return TaskLostError(text, "worker_died")
+    return TaskLostError(f"ended after {timeout_s:g} s", "timed_out")
 
 
 def _result(future: Future[bytes], pool: ProcessPool) -> bytes:

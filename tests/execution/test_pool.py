@@ -79,6 +79,21 @@ def test_death_and_time_out_are_told_apart_and_cost_one_task_each(tmp_path: Path
         assert not before & {pool.submit(_pid, None, _LONG_S).result() for _ in range(4)}
 
 
+def test_a_time_out_under_a_memory_limit_is_no_end_of_a_task() -> None:
+    """What lacks memory may wait for it; a limit far above what is used bounds nothing here."""
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (1 << 46, limits[1]))
+    try:
+        with WorkerPool(1) as pool:
+            end = pool.submit(time.sleep, _LONG_S, 0.2).exception()
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+    assert isinstance(end, TaskLostError)
+    assert (end.failure, str(end)) == (
+        "worker_died", "ended after 0.2 s under a memory limit (ulimit -v) of 67108864 MiB",
+    )  # fmt: skip
+
+
 def test_a_process_killed_while_it_waits_is_replaced() -> None:
     """The task that finds it dead may be lost, and is then tried again; the pool goes on."""
     with WorkerPool(1) as pool:
