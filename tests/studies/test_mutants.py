@@ -28,7 +28,6 @@ from rotor_mbs.scenario.scene import Scene
 EQUIVALENT = {
     r"closed_form\.energies .*(0\.0 \* sin_q|:22: sin_q -> cos_q)": "a zero of the right kind of number",
     r"parameters\._cosine_of_turn .*sign in \(?turn \+ Fraction": "the same angle but for a whole turn",
-    r"samples\.trajectory .*2 \* count scaled": "a count of columns: what it is compared with is whole",
     r"geometry\._turn .*2 \* rest scaled": "compares whole numbers",
     r"geometry\.hub_body .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
     r"geometry\._joined .*r @ r \* np\.eye": (
@@ -45,9 +44,6 @@ EQUIVALENT = {
     r"sensor_samples\.unwrap .*scaled": "rounded to whole turns: 1 % of the way between two rows is no half turn",
     r"time_table\.intervals .*(0\.5 \* \(t0 \+ t1\)|right side of t0 \+ t1) scaled": (
         "any instant inside the interval determines its segment"
-    ),
-    r"time_table\.intervals .*right side of samples - 1 scaled": (
-        "a kink that is off its sample by a millionth of the interval is taken to be on it"
     ),
     r"time_table\.intervals .*end - start scaled": "rounded to a whole number of intervals",
     r"mjcf\.model .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone and feels no other inertia",
