@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.claim_shares import RULE, ClaimShare, ClaimShares
-from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials
+from rotor_mbs.analysis.number_trials import Conditions, NumberTrial, NumberTrials
 from rotor_mbs.analysis.published import published
+from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.read import OpenResults, open_results
@@ -93,9 +94,9 @@ def _numbers_record(study: NumberTrials) -> Record:
     texts = {
         "numbers": [one.number for one in trials],
         "gravity_rows": [one.conditions.gravity_row for one in trials],
-        "row_names": [row.name for row in study.rows],
-        "row_formulas": [row.formula for row in study.rows],
-        "rows_of_56": [row.name for row in study.rows if row.is_of_56],
+        "row_names": list(study.rows),
+        "row_formulas": [GRAVITY_ROWS[row].formula for row in study.rows],
+        "rows_of_56": [row for row in study.rows if GRAVITY_ROWS[row].of is not None],
     }
     arrays: dict[str, Any] = {
         **{name: np.array([getattr(one.conditions, name) for one in trials]) for name in _NUMBERS_OF_CONDITIONS},
@@ -115,8 +116,4 @@ def _numbers(record: Record) -> NumberTrials:
     trials = map(
         NumberTrial, facts["numbers"], conditions, values, map(bool, arrays["reproduced"]), arrays["remainder"]
     )
-    rows = [
-        GravityRowText(name, formula, name in facts["rows_of_56"])
-        for name, formula in zip(facts["row_names"], facts["row_formulas"], strict=True)
-    ]
-    return NumberTrials(tuple(trials), Conditions(*(facts[name] for name in _USUAL)), tuple(rows))
+    return NumberTrials(tuple(trials), Conditions(*(facts[name] for name in _USUAL)), tuple(facts["row_names"]))

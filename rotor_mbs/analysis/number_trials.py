@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
+
 
 @dataclass(frozen=True, order=True)
 class Conditions:
@@ -38,21 +40,16 @@ class NumberTrial:
 
 
 @dataclass(frozen=True)
-class GravityRowText:
-    """A way of writing the row: its formula, and whether it is the printed row, not what that was simplified from."""
-
-    name: str
-    formula: str
-    is_of_56: bool
-
-
-@dataclass(frozen=True)
 class NumberTrials:
-    """All trials of a study. usual: the conditions of the paper's scenes, but for the duration; rows: in order."""
+    """All trials of a study.
+
+    usual   the conditions of the paper's scenes, but for the duration
+    rows    tried ways of writing the row, names of `GRAVITY_ROWS`, in order
+    """
 
     trials: tuple[NumberTrial, ...]
     usual: Conditions
-    rows: tuple[GravityRowText, ...]
+    rows: tuple[str, ...]
 
     @property
     def numbers(self) -> list[str]:
@@ -89,5 +86,5 @@ class NumberTrials:
 
 def count_of_rows(trials: NumberTrials, duration: float) -> tuple[int, int]:
     """(ways of writing the printed row that give all numbers for `duration`, all such ways)."""
-    found = [duration in trials.durations_of_all(row.name) for row in trials.rows if row.is_of_56]
+    found = [duration in trials.durations_of_all(row) for row in trials.rows if GRAVITY_ROWS[row].of is not None]
     return sum(found), len(found)

@@ -17,7 +17,7 @@ import numpy as np
 from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
 from rotor_mbs.analysis.claims import rounds_to
-from rotor_mbs.analysis.number_trials import Conditions, GravityRowText, NumberTrial, NumberTrials
+from rotor_mbs.analysis.number_trials import Conditions, NumberTrial, NumberTrials
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.trajectory_numbers import measure
@@ -225,8 +225,7 @@ def number_trials(
                 raise end.error or RotorError(f"{end.task.scene.name}: {end.message}")
             found |= {(end.task.conditions, one.number): one for one in end.value}
     in_order = (found[conditions, item.id] for conditions in dict.fromkeys(tried) for item in items)
-    texts = (GravityRowText(row, GRAVITY_ROWS[row].formula, GRAVITY_ROWS[row].of is not None) for row in rows)
-    return NumberTrials(tuple(in_order), usual, tuple(texts))
+    return NumberTrials(tuple(in_order), usual, tuple(rows))
 
 
 def perform(task: Trial) -> list[NumberTrial]:

@@ -26,6 +26,7 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.solution.metrics import HORIZON_GROWTH, horizon
 from rotor_mbs.solution.quantities import Array, Quantity
 from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
 
 _AXES = "xyz"
@@ -67,11 +68,7 @@ def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
     text_of = FORMATS[to][1]
     texts = {output: text_of(scene)} if text_of else {output / name: text for name, text in _benchmark(scene).items()}
     for path, text in texts.items():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
-        except OSError as exc:
-            raise StoreError(f"{path}: cannot be written: {exc.strerror}") from exc
+        replace_file(path, text.encode())
     return list(texts)
 
 

@@ -9,6 +9,7 @@ from rotor_mbs.analysis.claim_shares import FAILS, HOLDS, RULE, UNDECIDED, Claim
 from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
 from rotor_mbs.analysis.number_trials import Conditions, NumberTrials, count_of_rows
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
+from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import fixed, number, power, with_unit
 from rotor_mbs.solution.text_table import listed
@@ -221,11 +222,12 @@ def trial_note(trials: NumberTrials) -> str:
 def _row_table(trials: NumberTrials, items: Mapping[str, Published], heads: Sequence[str]) -> PageTable:
     rows = []
     for row in trials.rows:
-        of_row = trials.of_row(row.name)
+        of_row = trials.of_row(row)
         usual = next((one for one in of_row if one.duration == trials.usual.duration), None)
         if usual is not None:
             remainder = next(iter(trials.under(usual).values())).remainder
-            rows.append([TableCell(row.formula), TableCell(number(remainder)), *_cells(trials, usual, items)])
+            texts = GRAVITY_ROWS[row].formula, number(remainder)
+            rows.append([*map(TableCell, texts), *_cells(trials, usual, items)])
     caption = f"By the way of writing the first row of (56), over {with_unit(trials.usual.duration, 's')}"
     return PageTable(caption, ("Row", "At the start (N m)", *heads), rows, numeric=range(1, 2 + len(heads)))
 
