@@ -72,9 +72,9 @@ def seal_all(group: Any) -> None:
     """Stores the digests of every group that has none: what was copied keeps those of when it was written."""
     if DIGESTS not in group.attrs:
         seal(group)
-    for item in group.values():
-        if hasattr(item, "items"):
-            seal_all(item)
+    for name in group:
+        if hasattr(group.get(name, getclass=True), "items"):
+            seal_all(group[name])
 
 
 def stored_digests(attributes: Mapping[str, Any]) -> dict[str, str]:

@@ -220,19 +220,20 @@ def copy_group(source: Any, file: Any, name: str) -> None:
 
 
 def _attach_scales(source: Any, copied: Any) -> None:
-    items = dict(members(copied))
-    for item in items.values():
-        if not is_group(item):
-            _refuse_outside(item)
-            for stale in _OF_SCALES & set(item.attrs):
-                h5py.h5a.delete(item.id, stale.encode())
+    items, users = dict(members(copied)), []
     for name, item in items.items():
         if is_group(item):
             _attach_scales(source[name], item)
             continue
+        _refuse_outside(item)
+        stale = _OF_SCALES & set(item.attrs)
+        users += [name] if "DIMENSION_LIST" in stale else []
+        for attribute in stale:
+            h5py.h5a.delete(item.id, attribute.encode())
+    for name in users:
         for axis, dimension in enumerate(dimensions_of(source[name])):
             if dimension:
-                item.dims[axis].attach_scale(items[dimension])
+                items[name].dims[axis].attach_scale(items[dimension])
 
 
 def _refuse_outside(dataset: Any) -> None:

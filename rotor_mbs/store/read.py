@@ -170,8 +170,8 @@ def _scenes(group: Any, name: str, verify: bool, seen: set[int]) -> Iterator[Sto
         seen.add(hdf5.address(item))
         path = f"{name}/{key}" if name else key
         if "scene_hash" in item.attrs:
-            known, attributes = digests.stored_digests(item.attrs), hdf5.attributes_of(item)
-            if verify and known and known.get(digests.ATTRIBUTES) != digests.attributes_digest(attributes):
+            known, attributes = digests.stored_digests(item.attrs) if verify else {}, hdf5.attributes_of(item)
+            if known and known.get(digests.ATTRIBUTES) != digests.attributes_digest(attributes):
                 raise StoreError(f"{item.file.filename}: {item.name}: attributes changed after they were written")
             runs = {run.method: run for run in _runs(item, path, verify)}
             yield StoredScene(path, attributes, runs)

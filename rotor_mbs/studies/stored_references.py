@@ -19,6 +19,8 @@ from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.store.read import StoredRun, open_results
 
+_SHORT = 5001  # samples: at some 30 numbers each, twenty references take 25 MB at most
+
 
 def shipped_files() -> list[Path]:
     """The files of frozen references."""
@@ -46,7 +48,17 @@ def digest(path: Path) -> str:
 
 
 def load_reference(path: Path, scene: Scene) -> Trajectory | None:
-    """The reference of `scene` in a results file; None where there is none, or where it is empty."""
+    """The reference of `scene` in a results file, not to be changed; None where there is none, or where it is empty.
+
+    Short ones stay in memory: a process judges runs of one scene by many methods.
+    """
+    state = path.stat() if path.is_file() else None
+    load = _load_reference if scene.samples <= _SHORT else _load_reference.__wrapped__
+    return load(path, state and (state.st_ino, state.st_mtime_ns, state.st_size), scene)
+
+
+@functools.lru_cache(maxsize=20)
+def _load_reference(path: Path, _state: object, scene: Scene) -> Trajectory | None:
     with open_results(path) as results:
         stored = results.scenes[scene.name].reference if scene.name in results.scenes else None
         if stored is None or not len(stored.array("time")):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -22,6 +23,7 @@ from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import merge
 from rotor_mbs.store.write import write_run
 from rotor_mbs.studies.run import store_failure
+from rotor_mbs.studies.stored_references import load_reference
 
 SCENE = paper("fig08", duration=1.0, samples=51)
 
@@ -103,6 +105,20 @@ def test_arrays_in_other_files_are_not_merged(tmp_path: Path) -> None:
         file.create_dataset("paper/fig08/lagrange/dop853/more", (3,), "f8", external=[(tmp_path / "x", 0, 24)])
     with pytest.raises(StoreError, match="more is stored in another file"):
         merge(tmp_path / "all.h5", [tmp_path / "a.h5"], {})
+
+
+def test_a_short_reference_stays_in_memory_until_its_file_changes(tmp_path: Path) -> None:
+    path, run = tmp_path / "a.h5", made()
+    for shift in (0.0, 0.5):
+        angles = run.angles + shift
+        shifted = run.trajectory.replace(angles=angles, angle_uncertainty=np.zeros(51))
+        write_run(path, scene_hash(SCENE), replace(run, method="reference", trajectory=shifted), {"status": "ok"})
+        found = load_reference(path, SCENE)
+        assert found is not None
+        np.testing.assert_array_equal(found.angles, angles)
+        assert load_reference(path, SCENE) is found
+    long = replace(SCENE, samples=5002)
+    assert load_reference(path, long) is not load_reference(path, long)
 
 
 def test_opens_in_xarray_with_units_and_named_dimensions(tmp_path: Path) -> None:
