@@ -61,7 +61,7 @@ def test_a_motion_too_fast_for_the_frames_is_stated(tmp_path: Path) -> None:
             scene = opened.scenes["paper/fig11"]
             found = viewer(scene, dict(scene.runs))
         assert found is not None
-        made[name] = list(found.notes)
+        made[name] = found["notes"]
     assert made["slow"] == []
     assert "turns by up to 13 rad from one frame to the next" in made["fast"][0].replace("\N{NO-BREAK SPACE}", " ")
 
@@ -90,7 +90,7 @@ def test_a_run_is_drawn_up_to_its_first_sample_that_is_not_finite(tmp_path: Path
         scene = opened.scenes["paper/fig11"]
         made = viewer(scene, dict(scene.runs))
     assert made is not None
-    data = json.loads(str(made.data))
+    data = json.loads(str(made["data"]))
     assert (len(unpacked(data["models"][0])) - 1) * data["step"] == pytest.approx(4.0, abs=0.05)
 
 

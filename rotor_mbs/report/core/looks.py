@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
 
 from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.methods.ladders import Look
@@ -28,6 +28,12 @@ _OTHERS = {GREY: "#a3adb8", PAPER: "#1d2127", "#c8c8c8": "#4d5560", "#dddddd": "
 PALETTE = {**_METHODS, **_COORDINATES, **_OTHERS}
 COLOURS, COORDINATES = tuple(_METHODS), tuple(_COORDINATES)
 _CLASSES = {colour: f"k{place}" for place, colour in enumerate(PALETTE)}
+_CLASS_RULES = "".join(f".{name}{{color:var(--{name})}}" for name in _CLASSES.values())
+# Of the style sheet, by name: the light and the dark colour.
+_VARIABLES = {name: (colour, PALETTE[colour]) for colour, name in _CLASSES.items()} | {
+    "sheet": (PAPER, PALETTE[PAPER]),
+    "grid": ("#e4e4e4", "#333b44"),
+}
 
 
 def class_of(colour: str) -> str:
@@ -37,23 +43,14 @@ def class_of(colour: str) -> str:
 
 def palette_css() -> str:
     """The palette as variables of a style sheet, light and, where the page is dark, dark; and a class per colour."""
-    light, dark = (_variables(shades) for shades in ({one: one for one in PALETTE}, PALETTE))
-    classes = "".join(f".{name}{{color:var(--{name})}}" for name in _CLASSES.values())
+    light, dark = (";".join(f"--{name}:{pair[i]}" for name, pair in _VARIABLES.items()) for i in (0, 1))
     night = "@media screen and (prefers-color-scheme:dark)"
-    return f":root{{{light}--grid:#e4e4e4}}\n{night}{{:root{{{dark}--grid:#333b44}}}}\n{classes}\n"
-
-
-def _variables(shades: Mapping[str, str]) -> str:
-    values = "".join(f"--{_CLASSES[one]}:{shown};" for one, shown in shades.items())
-    return f"{values}--sheet:{shades[PAPER]};"
+    return f":root{{{light}}}\n{night}{{:root{{{dark}}}}}\n{_CLASS_RULES}\n"
 
 
 def with_light_palette(css: str) -> str:
     """`css` of pictures and the classes of the palette, with light colours in place of variables."""
-    css = "".join(f".{name}{{color:{colour}}}" for colour, name in _CLASSES.items()) + css
-    for name, colour in [*((name, colour) for colour, name in _CLASSES.items()), ("sheet", PAPER), ("grid", "#e4e4e4")]:
-        css = css.replace(f"var(--{name})", colour)
-    return css
+    return re.sub(r"var\(--(\w+)\)", lambda found: _VARIABLES[found[1]][0], _CLASS_RULES + css)
 
 
 def with_capital(text: str) -> str:

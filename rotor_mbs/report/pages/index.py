@@ -52,7 +52,7 @@ def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
 def _glance(scenes: Scenes, context: Context) -> dict[str, object]:
     """What the index opens with; what the file has no data for is None."""
     name = _shown_scene(scenes, context.claims)
-    sides = _sides(scenes[name])
+    sides = run_selection.sides(scenes[name])
     benched = next((one for one in context.curves if one in scenes), "")
     tips = next((run for run in reversed(sides) if "tip" in run), None)
     own = [claim for claim in context.claims if name in claim.published.scenes]
@@ -77,13 +77,7 @@ def _shown_scene(scenes: Scenes, claims: Sequence[Claim]) -> str:
         item = claim.published
         if item.is_number and not item.rounding and item.of is not None and item.of.scene in scenes:
             return item.of.scene
-    return next((name for name, scene in scenes.items() if len(_sides(scene)) > 1), next(iter(scenes)))
-
-
-def _sides(scene: StoredScene) -> list[StoredRun]:
-    """The printed run and the one that stands for the corrected model."""
-    found = (run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene))
-    return [run for run in found if run is not None]
+    return next((name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1), next(iter(scenes)))
 
 
 def short_sentences(facts: Finding) -> list[str]:

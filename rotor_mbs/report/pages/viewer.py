@@ -10,7 +10,6 @@ import base64
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -31,22 +30,12 @@ _QUANTUM, _LARGEST = 1e-4, 32767  # rad: a pixel at the tip on any screen; 16 bi
 _VISIBLE = 0.1  # of the longest blade
 
 
-@dataclass(frozen=True)
-class Viewer:
-    """For the template. data: JSON, safe inside a script element; models: their names, in the order of the data.
+def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
+    """What the template needs of at most two runs, by the name to be shown; None without bodies or angles.
 
-    magnified: how many times the tip's distance from the pitch axis is drawn at first; None where it has none.
-    notes: where a motion is too fast for the frames.
+    data: JSON, safe inside a script element; models: their names, in the order of the data; notes: where a motion is
+    too fast for the frames; magnified: how many times the tip's distance from the pitch axis is drawn at first
     """
-
-    data: Markup
-    models: Sequence[str]
-    magnified: int | None
-    notes: Sequence[str] = ()
-
-
-def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> Viewer | None:
-    """runs: at most two, by the name to be shown. None where the scene's bodies or the angles are not known."""
     scene = scene_of(stored)
     if scene is None:
         return None
@@ -70,7 +59,7 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> Viewer | None:
     notes = [
         note for name, (time, angles) in moves.items() if (note := _coarseness(name, angles_at(time, angles, step)))
     ]
-    return Viewer(script_json(data), list(moves), magnification(scene), notes)
+    return {"data": script_json(data), "models": list(moves), "magnified": magnification(scene), "notes": notes}
 
 
 def frames(moves: Sequence[tuple[Array, Array]]) -> int:
