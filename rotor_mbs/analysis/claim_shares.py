@@ -6,7 +6,7 @@ many starts, for several durations, and holds or fails only where nearly all run
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,7 @@ from rotor_mbs.analysis.claims import NumberValues, all_hold, readings_of
 from rotor_mbs.analysis.published import Published, TrajectoryNumber
 from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.solution.status import COMPLETE, code_of
-
-Array = NDArray[np.float64]
+from rotor_mbs.solution.trajectory import Array
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 SURE = 0.95  # share of the deciding runs from which on a claim holds; 1 - SURE: up to which it fails
@@ -146,12 +145,11 @@ class SampledRuns:
         # Infinite or undefined: the energy is beyond all numbers.
         return complete & (np.nan_to_num(self.energy_drift, nan=np.inf) < ENERGY_GAIN)
 
-    def values(self, asked: Iterable[TrajectoryNumber]) -> list[dict[TrajectoryNumber, float | None]]:
+    def values(self, asked: Sequence[TrajectoryNumber]) -> list[dict[TrajectoryNumber, float | None]]:
         """(runs,) the `asked` numbers of each run, None where one is undefined; none of a run that decides nothing."""
-        numbers = list(asked)
         runs = zip(self.decides.tolist(), self.angles, self.rates, strict=True)
         return [
-            {one: measure({"time": self.time, "angles": angles, "rates": rates}, one) for one in numbers if decides}
+            {one: measure({"time": self.time, "angles": angles, "rates": rates}, one) for one in asked if decides}
             for decides, angles, rates in runs
         ]
 

@@ -86,8 +86,7 @@ def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
     growth, units   of `TimedReference`
     """
     largest = np.maximum.accumulate(np.maximum(np.abs(reference.angles).max(axis=1), 1.0))
-    carried: Array = np.maximum(np.maximum.accumulate(growth, axis=0), 1.0) * largest[:, None] * units
-    return carried
+    return np.asarray(np.maximum(np.maximum.accumulate(growth, axis=0), 1.0) * largest[:, None] * units)
 
 
 def channel_errors(

@@ -65,5 +65,4 @@ def _frames(scene: Scene, angles: Array, blade: int) -> Array:
 
 def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
     """(n, 3) m."""
-    rotated: Array = frames @ np.array(point)
-    return rotated
+    return np.asarray(frames @ np.array(point))

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.store.sweep_columns import parameter_name
 from rotor_mbs.store.sweep_dataset import StoredSweep
-
-Array = NDArray[np.float64]
 
 # A pitch that has grown tenfold is leaving: what stays bounded in a stable rotor only swings, by its amplitude.
 GROWN = 10.0
@@ -111,8 +110,7 @@ class StabilityMap:
     @property
     def unstable(self) -> NDArray[np.bool_]:
         """Where the pitches grew tenfold or more."""
-        grown: NDArray[np.bool_] = self.growth >= GROWN
-        return grown
+        return np.asarray(self.growth >= GROWN)
 
 
 def stability_map(sweep: StoredSweep, start: float) -> StabilityMap:

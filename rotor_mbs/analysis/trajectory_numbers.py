@@ -9,11 +9,9 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.analysis.published import TrajectoryNumber
-
-Array = NDArray[np.float64]
+from rotor_mbs.solution.trajectory import Array
 
 _DATASETS = {"angle": "angles", "rate": "rates"}
 

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.run_selection import corrected_runs
 from rotor_mbs.solution.status import code_of
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.store.read import StoredScene
 from rotor_mbs.store.records import Record
-
-Array = NDArray[np.float64]
 
 TARGETS_RAD = (1e-3, 1e-6, 1e-9)
 

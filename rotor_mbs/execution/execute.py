@@ -131,11 +131,6 @@ def _merge(store: Store, parts: Path, *, even_none: bool = False) -> None:
         part.unlink()
 
 
-def compute(cases: Iterable[Case], perform: Perform, workers: int, timeout_s: float) -> Iterator[Outcome]:
-    """Outcomes of cases of which nothing is stored, as they come."""
-    return _outcomes([[Job(case, Path()) for case in cases]], in_pool(perform, workers, timeout_s))
-
-
 def in_pool(perform: Perform, workers: int, timeout_s: float, on_time_out: OnTimeOut | None = None) -> JobRunner:
     """Computes jobs in parallel processes.
 

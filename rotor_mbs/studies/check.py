@@ -14,7 +14,7 @@ from rotor_mbs.analysis.run_integrity import defaults_faults
 from rotor_mbs.analysis.verdicts import Verdict, judged, verdicts
 from rotor_mbs.errors import StoreError
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import OnProgress, Outcome, compute, ignore_progress
+from rotor_mbs.execution.execute import Job, OnProgress, Result, ignore_progress, in_pool
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
 from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -162,14 +162,15 @@ def judge_frozen(bounds: Bounds) -> list[Verdict]:
 def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Verdict]:
     """Verdicts on measurements, in the order of `cases`; a measurement that was lost fails."""
     available = [case for case in cases if case.method == "*" or find_method(case.method).is_installed]
-    outcomes = {outcome.case: outcome for outcome in compute(available, perform_probe, workers, _TIMEOUT_S)}
-    return [judge_measured(one, bounds) for case in available for one in measurements(outcomes[case])]
+    ends = in_pool(perform_probe, workers, _TIMEOUT_S)([[Job(case, Path()) for case in available]])
+    results = {job.case: result for job, result in ends}
+    return [judge_measured(one, bounds) for case in available for one in measurements(case, results[case])]
 
 
-def measurements(outcome: Outcome) -> list[Verdict]:
+def measurements(case: Case, result: Result) -> list[Verdict]:
     """What a probe found; where it was lost, one measurement that is not a number."""
-    found: list[Verdict] | None = outcome.result.value
-    return found if found is not None else [measured(outcome.case, "all", math.nan, "", outcome.result.message)]
+    found: list[Verdict] | None = result.value
+    return found if found is not None else [measured(case, "all", math.nan, "", result.message)]
 
 
 def judge_measured(one: Verdict, bounds: Bounds) -> Verdict:

@@ -29,7 +29,7 @@ from support.checking import (
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli import main
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Outcome, Result
+from rotor_mbs.execution.execute import Result
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report.pages import check as verdict_formats
@@ -636,8 +636,8 @@ def test_json_on_standard_output_is_alone_there(good: Path, capsys: pytest.Captu
 
 
 def test_a_measurement_that_is_lost_fails() -> None:
-    lost = Outcome(probe("order", "paper/fig11", METHOD), Result("worker_died", "its process died"))
-    (found,) = check.measurements(lost)
+    case = probe("order", "paper/fig11", METHOD)
+    (found,) = check.measurements(case, Result("worker_died", "its process died"))
     verdict = check.judge_measured(found, load_bounds())
     assert not verdict.passed
     assert verdict.look_at == "its process died"
