@@ -20,7 +20,6 @@ from rotor_mbs.report.core import files
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.bench import bench_pages
-from rotor_mbs.report.pages.check import check_page
 from rotor_mbs.report.pages.data_comparison import comparison_page
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.figures import PaperFigure, available, walk_figure
@@ -28,7 +27,6 @@ from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
-from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.store.read import OpenResults, in_memory, is_sweep, open_results
 from rotor_mbs.store.records import Record, read_records
 from rotor_mbs.store.sweep_dataset import StoredSweep
@@ -51,6 +49,8 @@ def write_report(
     report, or where the folder cannot be written.
     """
     if is_sweep(results):
+        from rotor_mbs.report.pages.sweep import sweep_page  # late, as below: workers load what most files need
+
         return files.write_page(output, "sweep", sweep_page(StoredSweep(results)))
     with open_results(results) as opened:
         pages = _pages(in_memory(opened), jobs, on_page, checked)
@@ -91,6 +91,8 @@ def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> di
     for file, record in zip(data_files, compared, strict=True):
         pages[names[file]] = render("data_comparison", comparison_page(record), site, names[file])
     if has_runs and checked:
+        from rotor_mbs.report.pages.check import check_page
+
         pages[files.CHECK] = render("check", check_page(opened.path), site, files.CHECK)
     return pages
 
