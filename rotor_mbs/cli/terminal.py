@@ -160,8 +160,8 @@ class ProgressLine(_RenewedLine):
 class SweepProgress(_RenewedLine):
     """Called with runs stored, runs in all, and the statuses of those just stored; with a bar, or as JSON lines."""
 
-    def __init__(self, *, as_json: bool = False, stream: TextIO | None = None) -> None:
-        super().__init__(stream)
+    def __init__(self, *, as_json: bool = False) -> None:
+        super().__init__()
         self._as_json = as_json
         self._is_terminal = self._is_terminal and not as_json
         self._every_s = 0.1 if self._is_terminal else 10.0

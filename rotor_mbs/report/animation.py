@@ -57,7 +57,9 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
         if kind == ".mp4":
             _film(pictures, step, output)
         else:
-            _animated(pictures, step, output)
+            options = {"quality": 50, "method": 0} if kind == ".webp" else {"optimize": False}
+            duration = round(1000 * step)
+            next(pictures).save(output, save_all=True, append_images=pictures, duration=duration, loop=0, **options)
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror or exc}") from exc
     return output
@@ -149,12 +151,6 @@ def _rotor(pen: ImageDraw.ImageDraw, wire: Wires, frame: int, centre: tuple[floa
         pen.line([centre, axis, edge, root, centre], fill=colour, width=3 * _FINE, joint="curve")
     dot = 6 * _FINE
     pen.ellipse((centre[0] - dot, centre[1] - dot, centre[0] + dot, centre[1] + dot), fill=_INK)
-
-
-def _animated(pictures: Iterator[Image.Image], step: float, output: Path) -> None:
-    first = next(pictures)
-    options = {"quality": 50, "method": 0} if output.suffix.lower() == ".webp" else {"optimize": False}
-    first.save(output, save_all=True, append_images=pictures, duration=round(1000 * step), loop=0, **options)
 
 
 def _film(pictures: Iterator[Image.Image], step: float, output: Path) -> None:

@@ -189,23 +189,17 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
             draw(figure, [column[letters.index(letter)]] if is_paths else column, runs)
         for axes, key in zip(table[0], keys, strict=True):
             axes.text(0.5, heading, HEADINGS[key], transform=axes.transAxes, ha="center", weight="bold")
-        _tidy(table, letters if is_paths else [])
+        for axes in panels.axes:
+            if not axes.has_data():
+                axes.set_axis_off()
+            if axes not in [row[0] for row in table]:  # the labels of the first column are for all
+                axes.set_ylabel("")
+        for row, letter in zip(table, letters if is_paths else [], strict=False):
+            row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
     labelled = legend(figure, scenes)
     place = {"loc": "lower center", "ncols": min(len(labelled), 5), "handlelength": 2.6}
     canvas.legend(panels.figure, labelled, for_print=True, **place)
     return panels
-
-
-def _tidy(table: list[list[Any]], letters: list[str]) -> None:
-    """Letters at the rows of paths; labels of the vertical axes at the first column alone; no empty frames."""
-    for row in table:
-        for axes in row:
-            if not axes.has_data():
-                axes.set_axis_off()
-            if axes is not row[0]:
-                axes.set_ylabel("")
-    for row, letter in zip(table, letters, strict=False):
-        row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
 
 
 def walk_figure(figure: PaperFigure, scenes: Mapping[str, StoredScene], context: Context) -> dict[str, object]:

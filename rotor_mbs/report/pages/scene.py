@@ -120,7 +120,8 @@ def _lead(drawn: DrawnRuns) -> list[str]:
     elif printed is not None and departure is not None:
         gain = metric(printed, "energy_gain_J")
         energy = "" if gain is None else f"; its energy rises by up to {prefixed(gain, 'J')}"
-        parted = _parted(drawn)
+        sides = [run for run in drawn.sides.values() if "angles" in run]
+        parted = comparison_pictures.parting(*sides)[0] if len(sides) == 2 else None
         most = f"by up to {with_unit(departure, 'rad')}{energy}."
         if parted is not None:
             most = f"{comparison_pictures.at_time(parted)} by {comparison_pictures.VISIBLE:g} rad, in the end {most}"
@@ -132,12 +133,6 @@ def _lead(drawn: DrawnRuns) -> list[str]:
         horizon = with_unit(drawn.horizon, "s", 3)
         found.append(f"Corrected models are off the reference, up to the horizon at {horizon}, by: {each}.")
     return found
-
-
-def _parted(drawn: DrawnRuns) -> float | None:
-    """s, when printed and corrected angles first differ visibly; None: never, or one of them is not there."""
-    runs = [run for run in drawn.sides.values() if "angles" in run]
-    return comparison_pictures.parting(*runs)[0] if len(runs) == 2 else None
 
 
 def motion_section(drawn: DrawnRuns) -> Section:
