@@ -51,22 +51,21 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
     with open_results(results) as opened:
         if name not in opened.scenes:
             raise InputError(f"{results}: {name!r}: no such scene in it; allowed: {', '.join(opened.scenes) or 'none'}")
-        pictures, step = frames(opened.scenes[name], magnified)
+        pictures = frames(opened.scenes[name], magnified)
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         if kind == ".mp4":
-            _film(pictures, step, output)
+            _film(pictures, output)
         else:
             options = {"quality": 50, "method": 0} if kind == ".webp" else {"optimize": False}
-            duration = round(1000 * step)
-            next(pictures).save(output, save_all=True, append_images=pictures, duration=duration, loop=0, **options)
+            next(pictures).save(output, save_all=True, append_images=pictures, duration=1000 // RATE, loop=0, **options)
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror or exc}") from exc
     return output
 
 
-def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image.Image], float]:
-    """The pictures and the seconds each is shown. Raises InputError where nothing can be drawn."""
+def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
+    """The pictures. Raises InputError where nothing can be drawn."""
     scene = scene_of(stored)
     runs = {label_of(run.method): run for run in run_selection.sides(stored) if "angles" in run}
     if scene is None or not runs:
@@ -80,7 +79,7 @@ def frames(stored: StoredScene, magnified: float | None) -> tuple[Iterator[Image
         name: wires(scene, run.array("time"), np.nan_to_num(run.array("angles"), posinf=0.0, neginf=0.0), at, factor)
         for name, run in runs.items()
     }
-    return (_picture(drawn, i, float(at[i]), factor) for i in range(0, len(at), _PATH_POINTS)), 1.0 / RATE
+    return (_picture(drawn, i, float(at[i]), factor) for i in range(0, len(at), _PATH_POINTS))
 
 
 class Wires(NamedTuple):
@@ -153,11 +152,11 @@ def _rotor(pen: ImageDraw.ImageDraw, wire: Wires, frame: int, centre: tuple[floa
     pen.ellipse((centre[0] - dot, centre[1] - dot, centre[0] + dot, centre[1] + dot), fill=_INK)
 
 
-def _film(pictures: Iterator[Image.Image], step: float, output: Path) -> None:
+def _film(pictures: Iterator[Image.Image], output: Path) -> None:
     first = next(pictures)
     size = f"{first.width}x{first.height}"
     command = [
-        "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", f"{1 / step:g}",
+        "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATE),
         "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(output.absolute()),
     ]  # fmt: skip
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
