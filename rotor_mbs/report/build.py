@@ -122,7 +122,7 @@ def _run_pages(
     )
     made: list[Part] = [Path(file) for file in (files.INDEX, files.ERRATA, files.BENCH) if file in dict(site)]
     made += context.files
-    parts = _parts(context, [*made, *figures], jobs, on_page)
+    parts = _parts(context, [*figures, *made], jobs, on_page)
     pages: dict[str, str] = {}
     for part in made:
         pages |= parts[part]
