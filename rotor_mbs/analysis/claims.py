@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
@@ -14,6 +15,12 @@ from rotor_mbs.store.read import StoredRun, StoredScene
 Choice = Callable[[StoredScene], StoredRun | None]
 # What is read off the runs of one model: None where it is undefined; without it where no run can decide.
 NumberValues = Mapping[TrajectoryNumber, float | None]
+
+_RELATIONS: Mapping[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    ">": operator.gt,
+    "opposite": lambda value, other: value * other < 0.0,
+}
 
 
 @dataclass(frozen=True)
@@ -89,14 +96,6 @@ def _read(test: Condition, values: NumberValues) -> Reading:
     if any(side not in values for side in sides):
         return Reading(test, None, None, None)
     value, limit = values[test.of], None if test.than is None else values[test.than]
-    undefined = value is None or (test.than is not None and limit is None)
-    return Reading(test, value, limit, False if undefined else _relation(test, value, limit))
-
-
-def _relation(test: Condition, value: float | None, limit: float | None) -> bool:
-    assert value is not None
-    against = limit if limit is not None else test.bound
-    assert against is not None
-    if test.relation == "opposite":
-        return value * against < 0.0
-    return value < against if test.relation == "<" else value > against
+    against = test.bound if test.than is None else limit
+    holds = value is not None and against is not None and _RELATIONS[test.relation](value, against)
+    return Reading(test, value, limit, holds)

@@ -101,7 +101,8 @@ def run_scenes(
     cases: list[Case] = []
     for scene in scenes:
         reference = reference_case(scene, use_frozen=use_frozen)
-        cases += [reference, *run_cases(scene, methods[scene.name], reference, settings or {})]
+        own = {name: own_settings(scene, name, settings or {}) for name in methods[scene.name]}
+        cases += [reference, *(Case(scene, name, own[name], reference=reference.key) for name in own)]
     runs = {case.key for case in cases}
     cases += beside
     # Slowest first, so that no long run starts last and keeps one process busy while the others wait.
@@ -190,14 +191,6 @@ def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
     case = Case(scene, REFERENCE)
     path = frozen_file(case.scene_hash) if use_frozen else None
     return case if path is None else Case(scene, REFERENCE, options={"frozen": digest(path)})
-
-
-def run_cases(scene: Scene, methods: Iterable[str], reference: Case, settings: Mapping[str, object]) -> list[Case]:
-    """A run of the scene by each method, with those of the scene's settings and of `settings` that it has.
-
-    Raises InputError for a setting of the scene that no method has, or that is out of range.
-    """
-    return [Case(scene, name, own_settings(scene, name, settings), reference=reference.key) for name in methods]
 
 
 def own_settings(scene: Scene, method: str, given: Mapping[str, object]) -> dict[str, object]:
