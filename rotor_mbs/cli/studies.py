@@ -10,7 +10,6 @@ import json
 import sys
 import time
 import webbrowser
-from collections.abc import Sequence
 from pathlib import Path
 
 from rotor_mbs.cli.arguments import pages_beside
@@ -42,7 +41,8 @@ def bench(arguments: argparse.Namespace) -> int:
         measured = len({one.case.scene.name for one in made})
         if arguments.growth:
             made += run_cost_scaling(methods, output, on_progress=progress, **limits)
-    _print_lines(left_out)
+    for line in left_out:
+        print(line, file=sys.stderr)
     names = {scene.name for scene in scenes}
     print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
     print(f"{output}: {measured} scenes measured, {len(scenes) - measured} there already")
@@ -69,7 +69,8 @@ def stability(arguments: argparse.Namespace) -> int:
     print(f"{arguments.output}: {report.scenes} scenes, {len(report.runs)} runs, {seconds:.0f} s in all")
     _write_pages(arguments.output, arguments.report)
     missing = unreached(report.runs)
-    _print_lines([f"{scene}: no method reaches 1e-6 rad" for scene in missing])
+    for scene in missing:
+        print(f"{scene}: no method reaches 1e-6 rad", file=sys.stderr)
     return int(print_not_computed(report.made) or bool(missing))
 
 
@@ -177,8 +178,3 @@ def _write_pages(results: Path, folder: Path | None = None) -> None:
     from rotor_mbs.report.build import write_report
 
     print(f"report: {write_report(results, folder or pages_beside(results))}")
-
-
-def _print_lines(lines: Sequence[str]) -> None:
-    for line in lines:
-        print(line, file=sys.stderr)
