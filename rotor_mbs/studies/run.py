@@ -104,8 +104,9 @@ def run_scenes(
         own = {name: own_settings(scene, name, settings or {}) for name in methods[scene.name]}
         cases += [reference, *(Case(scene, name, own[name], reference=reference.key) for name in own)]
     runs = {case.key for case in cases}
-    cases += beside
-    # Slowest first, so that no long run starts last and keeps one process busy while the others wait.
+    # Slowest first, so that no long one starts last and keeps one process busy while the others wait; of a method that
+    # compiles code anew, those beside the runs take longest.
+    cases = [*beside, *cases]
     cases.sort(key=lambda case: -find_method(case.method).relative_cost)
     run = in_pool(perform or perform_run, workers, timeout_s, store_time_out)
     with writing(output, RESULTS):
