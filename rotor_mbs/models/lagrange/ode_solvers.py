@@ -41,7 +41,7 @@ class OdeSolver:
         times: Array | None = None,
         accelerations: Accelerations | None = None,
     ) -> None:
-        self._scene, self._accelerations = scene, accelerations or closed_form.accelerations
+        self._scene, self._accelerations = scene, accelerations
         self._integrator = integrator
         self._form = rotor_form(scene)
         self._segments = load_segments(scene)
