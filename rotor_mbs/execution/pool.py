@@ -6,6 +6,7 @@ killed while it waits, or while it writes a result, would stop the others (pebbl
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import pickle
@@ -388,6 +389,7 @@ def _initialize(initializer: Callable[[], None] | None, core: int | None) -> Non
         threading.Thread(target=_end_with_parent, daemon=True).start()
     except RuntimeError:  # the system has no room for it; pebble tries another process
         os._exit(1)
+    gc.set_threshold(50_000, 20, 20)  # loading engines and drawing leave few cycles, and collecting took a twentieth
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
     try:
