@@ -95,8 +95,8 @@ class TaskPool(ABC):
 class WorkerPool(TaskPool):
     """Worker processes, each of which keeps its state between tasks.
 
-    As many as there are cores start at once, the others when there is a task for them: afresh (spawn). They ignore
-    Ctrl-C and end with this process. One that dies, or is ended at a time limit, is replaced.
+    Each starts afresh (spawn) when there is a task for it, and as many as there are cores at once where there is an
+    initializer. They ignore Ctrl-C and end with this process. One that dies, or is ended at a time limit, is replaced.
 
     Parameters
     ----------
@@ -122,18 +122,15 @@ class WorkerPool(TaskPool):
         self._free: LifoQueue[_Process] = LifoQueue()
         for process in reversed(self._processes):
             self._free.put(process)
-        try:
-            for process in self._processes[: cores()]:
-                self._threads.submit(process.start)
-        except RuntimeError as exc:
-            raise ResourceError(f"not enough processes or threads: {exc}") from exc
+        for process in self._processes[: cores()] if initializer is not None else ():
+            self._in_thread(process.start)
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
-        """The future of `work(task)`: its result, what it raised, or a TaskLostError.
+        """The future of `work(task)`: its result, what it raised, or a TaskLostError. Raises ResourceError.
 
         work, task and the result must be picklable. The time limit counts from when a process begins with the task.
         """
-        return self._threads.submit(self._run, work, task, timeout_s)
+        return self._in_thread(self._run, work, task, timeout_s)
 
     def close(self) -> None:
         """Ends the processes at once, with what they do. Futures that were running raise TaskLostError."""
@@ -141,8 +138,16 @@ class WorkerPool(TaskPool):
             for process in self._processes:
                 process.cancel()
             self._threads.shutdown(cancel_futures=True)
-            with ThreadPoolExecutor(self.workers) as closing:
+            with suppress(RuntimeError), ThreadPoolExecutor(self.workers) as closing:
                 list(closing.map(_Process.close, self._processes))
+            for process in self._processes:  # those for which there was no room for a thread
+                process.close()
+
+    def _in_thread(self, function: Callable[..., R], *arguments: Any) -> Future[R]:
+        try:
+            return self._threads.submit(function, *arguments)
+        except RuntimeError as exc:
+            raise ResourceError(f"not enough processes or threads: {exc}") from exc
 
     def _run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
         process = self._free.get()

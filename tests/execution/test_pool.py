@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import multiprocessing
 import os
 import resource
 import signal
@@ -240,7 +241,7 @@ def test_a_process_that_lacks_a_thread_beside_it_is_started_anew(monkeypatch: py
         return launch(name, loop, *more)
 
     monkeypatch.setattr(process, "launch_thread", launch_but_once)
-    with WorkerPool(1) as pool:
+    with WorkerPool(1, gc.collect) as pool:  # which starts at once
         assert pool.submit(_pid, None, _LONG_S).result(_LONG_S) != os.getpid()
     assert refused
 
@@ -250,8 +251,18 @@ def test_a_system_without_room_for_a_thread_is_told(monkeypatch: pytest.MonkeyPa
         raise RuntimeError("can't start new thread")
 
     monkeypatch.setattr("concurrent.futures.thread.ThreadPoolExecutor.submit", refuse)
-    with pytest.raises(ResourceError, match="not enough processes or threads: can't start new thread"):
-        WorkerPool(1)
+    told = "not enough processes or threads: can't start new thread"
+    with pytest.raises(ResourceError, match=told), WorkerPool(1) as pool:
+        pool.submit(_pid, None, _LONG_S)
+    with pytest.raises(ResourceError, match=told):
+        WorkerPool(1, gc.collect)
+
+
+def test_no_more_processes_are_started_than_there_are_tasks() -> None:
+    before = set(multiprocessing.active_children())
+    with WorkerPool(4) as pool:
+        pool.submit(_pid, None, _LONG_S).result(_LONG_S)
+        assert len({*multiprocessing.active_children()} - before) == 1
 
 
 def _ends(work: Callable[[Any], Any], tasks: Sequence[Any], workers: int = 1) -> list[Finished[Any, Any]]:
