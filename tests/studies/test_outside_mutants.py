@@ -26,7 +26,7 @@ DEFAULTS, ANEW = "defaults", "anew"
 MUTANTS = {
     "rk44 step doubled": (_SCHEMES, "step: float = step(2.5e-4)", "step: float = step(5e-4)", DEFAULTS, "rk44"),
     "rk67 step doubled": (_SCHEMES, "step(6.7e-4)", "step(1.34e-3)", DEFAULTS, "rk67"),
-    "chain step doubled": (_CHAIN, "schemes.step(5e-4)", "schemes.step(1e-3)", DEFAULTS, "exudyn_chain"),
+    "chain step doubled": (_CHAIN, "step: float = step(5e-4)", "step: float = step(1e-3)", DEFAULTS, "exudyn_chain"),
     "dopri5 tolerance x 100": (_SCHEMES, "number(1e-11, above", "number(1e-9, above", DEFAULTS, "dopri5"),
     "Taylor tolerance 1e-13": (_TAYLOR, "number(_EPS, above", "number(1e-13, above", DEFAULTS, "taylor"),
     "chain spectral radius 0.6": (_SCHEMES, "number(0.9, at_least", "number(0.6, at_least", DEFAULTS, "alpha"),
@@ -49,7 +49,7 @@ MUTANTS = {
         "exudyn_tree/dopri5", "(steps|agreement) .*dopri5",
     ),
     "Taylor tolerance 1e-13 in the solver": (
-        "rotor_mbs.models.lagrange.taylor", "tol=tolerance, compact_mode=is", "tol=1e-13, compact_mode=is",
+        _TAYLOR, "tol=settings.tolerance, compact_mode", "tol=1e-13, compact_mode",
         "tests/models/test_segments.py", "test_the_order_of_taylors_series",
     ),
     "ode45's second failure quartered": (
