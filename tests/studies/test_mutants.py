@@ -77,6 +77,7 @@ EQUIVALENT = {
     r"ode_solvers\.__init__ .*0\.0 -> |(__init__|build_system) .*work_is_integrated\(scene\): always": (
         "the work of constant torques is integrated, too, where it is known from the angles"
     ),
+    r"samples\.loads_at .*is_constant\(one\): never": "a table of one value, read at every time, gives that value",
     r"(samples\.loads_at(_start)?|kinematics\.work_of_constant_loads|exact\.exact_rotor_angle) .*0\.0 -> ": (
         "a constant load is the same at any time"
     ),
@@ -84,7 +85,7 @@ EQUIVALENT = {
     r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\.(_settings .*|)(constraints|_OLD_JACOBIAN_FROM)": (
         "decides how long a run takes, not what comes out"
     ),
-    r"claims\._relation .*value \* against scaled": "its sign alone counts",
+    r"claims\._RELATIONS .*value \* other scaled": "its sign alone counts",
     r"verdicts\._log_distance .*:92: 0 -> 1": "compared by its length: no shipped reference has a single sample",
     r"run_integrity\._bent_columns .*0 -> 1": "one row is as much too short as none",
     r"verdicts\._(start|energies)_off .*1 -> 2": "one zero or two: the largest is zero",
