@@ -202,22 +202,21 @@ def damages_of(group: Any) -> list[str]:
     unfilled = digests.unfilled_in(known)
     found = {digests.ATTRIBUTES: _proved(lambda: digests.attributes_digest(group.attrs))}
     for name in group:
-        if _group_in(group, name) is None:
+        item = _member(group, name)
+        if not hdf5.is_group(item):
             part = digests.unfilled(name) if name in unfilled else name
-            found[part] = _proved(partial(_digest, group, name, name in unfilled))
+            found[part] = "" if item is None else _proved(partial(_digest, item, name in unfilled))
     return [name for name in {**known, **found} if known.get(name) != found.get(name)]
 
 
-def _group_in(group: Any, name: str) -> Any:
-    """A group's member that is a group; None for what is none, is a link, or cannot be read."""
+def _member(group: Any, name: str) -> Any:
+    """None where it is a link, or cannot be read."""
     with suppress(StoreError), hdf5.reading(""):
-        member = hdf5.member(group, name)
-        return member if hdf5.is_group(member) else None
+        return hdf5.member(group, name)
     return None
 
 
-def _digest(group: Any, name: str, is_unfilled: bool) -> str:
-    dataset = hdf5.member(group, name)
+def _digest(dataset: Any, is_unfilled: bool) -> str:
     if is_unfilled:
         return digests.attributes_digest(dataset.attrs)
     return digests.dataset_digest(hdf5.values_of(dataset), dataset.attrs)
@@ -238,6 +237,6 @@ def all_damages(group: Any, seen: set[int] | None = None) -> Iterator[tuple[str,
     seen.add(hdf5.address(group))
     yield from ((str(group.name).strip("/"), part) for part in damages_of(group))
     for name in group:
-        below = _group_in(group, name)
-        if below is not None:
-            yield from all_damages(below, seen)
+        item = _member(group, name)
+        if hdf5.is_group(item):
+            yield from all_damages(item, seen)
