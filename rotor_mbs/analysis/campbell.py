@@ -19,15 +19,15 @@ AGREEMENT = 1e-8
 _SLOW = 1e-3
 
 
-@dataclass(frozen=True)
-class LinearModes:
-    """The modes of one source over speed.
+@dataclass(frozen=True, kw_only=True)
+class LinearModes(ModeSet):
+    """The modes of one source over speed, the same mode in the same place at every speed.
 
+    names       "collective pitch" where symmetry tells the modes apart, else "mode 2"
     source      "lagrange", "exudyn_tree", ...; label: as a reader calls it
     kind        REST or ROTATION
     coordinates names of the coordinates that move; angles: their (speeds, n) steady values, rad
     stiffness, damping   (speeds, n, n), the mass matrix divided out
-    sets        the modes at each speed, the same mode in the same place at all; named at all or at none
     messages    why there is nothing at a speed; "" where there is
     """
 
@@ -40,25 +40,7 @@ class LinearModes:
     angles: Array
     stiffness: Array
     damping: Array
-    sets: tuple[ModeSet, ...]
     messages: tuple[str, ...] = ()
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the modes: "collective pitch" where symmetry tells them apart, else "mode 2"."""
-        if names := self.sets[0].names:
-            return tuple(name if name == "rotor" else f"{name} pitch" for name in names)
-        return tuple(f"mode {k + 1}" for k in range(len(self.coordinates)))
-
-    @property
-    def eigenvalues(self) -> Complex:
-        """(speeds, n, 2) 1/s."""
-        return np.array([each.eigenvalues for each in self.sets])
-
-    @property
-    def shapes(self) -> Complex:
-        """(speeds, n, n): by speed, mode and coordinate."""
-        return np.array([each.shapes for each in self.sets])
 
     @property
     def multiblade_shapes(self) -> Complex:
@@ -68,14 +50,10 @@ class LinearModes:
         whole[:, :, columns] = self.shapes
         return multiblade_shapes(whole)
 
-    def over_speed(self, name: str) -> Array:
-        """(speeds, n): undamped_frequencies, damped_frequencies, damping_ratios or growth_rates."""
-        return np.array([getattr(each, name) for each in self.sets])
-
     @property
     def whirl(self) -> tuple[Array, Array]:
         """(speeds, n) rad/s backward and forward whirl, NaN for modes that are no cosine and no sine of the blades."""
-        frequencies, speeds = self.over_speed("damped_frequencies"), self.speeds[:, None]
+        frequencies, speeds = self.damped_frequencies, self.speeds[:, None]
         backward, forward = np.full_like(frequencies, np.nan), np.full_like(frequencies, np.nan)
         for k, name in enumerate(self.names):
             if name.startswith(("cosine", "sine")):
@@ -164,14 +142,14 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
             rows += [
                 {
                     "state": "at rest" if one.kind == REST else "steady rotation without gravity",
-                    "speed": float(one.speeds[i]),
+                    "speed": float(speed),
                     "mode": name,
-                    "undamped_frequency": _number(each.undamped_frequencies[k]),
-                    "damped_frequency": _number(each.damped_frequencies[k]),
-                    "damping_ratio": _number(each.damping_ratios[k]),
-                    "growth_rate": _number(each.growth_rates[k]),
+                    "undamped_frequency": _number(one.undamped_frequencies[i, k]),
+                    "damped_frequency": _number(one.damped_frequencies[i, k]),
+                    "damping_ratio": _number(one.damping_ratios[i, k]),
+                    "growth_rate": _number(one.growth_rates[i, k]),
                 }
-                for i, each in enumerate(one.sets)
+                for i, speed in enumerate(one.speeds)
                 for k, name in enumerate(one.names)
             ]
     return rows
@@ -200,9 +178,8 @@ def _state_lines(one: LinearModes, i: int) -> list[str]:
     if one.messages[i]:
         return [f"  {state}: {one.messages[i]}"]
     lines = [f"  {state}"]
-    each = one.sets[i]
-    columns = (each.undamped_frequencies, each.damped_frequencies, each.damping_ratios, each.growth_rates)
-    for name, undamped, damped, ratio, growth in zip(one.names, *columns, strict=True):
+    columns = (one.undamped_frequencies, one.damped_frequencies, one.damping_ratios, one.growth_rates)
+    for name, undamped, damped, ratio, growth in zip(one.names, *(column[i] for column in columns), strict=True):
         if not math.isfinite(undamped):
             lines.append(f"    {name:18} grows without oscillating, {growth:.5g} 1/s")
             continue

@@ -26,7 +26,7 @@ from rotor_mbs.analysis.campbell import (
     SceneModes,
     StabilityChart,
 )
-from rotor_mbs.analysis.modes import Complex, ModeSet, multiblade
+from rotor_mbs.analysis.modes import Complex, multiblade
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.store.layout import Column
 from rotor_mbs.store.records import Record, read_records
@@ -88,7 +88,7 @@ def _linear_record(scene: str, one: LinearModes, common: Mapping[str, Any]) -> R
         **common,
         "label": one.label,
         "mode_labels": list(one.names),
-        "symmetric": bool(one.sets[0].names),
+        "symmetric": "rotor" in one.names,
         "coordinate_labels": list(one.coordinates),
         "component_labels": ["rotor", *multiblade(one.blades)[0]],
         "messages": list(one.messages),
@@ -98,7 +98,7 @@ def _linear_record(scene: str, one: LinearModes, common: Mapping[str, Any]) -> R
 
 def _linear_datasets(one: LinearModes) -> Datasets:
     mode, shape = partial(Column, ("speed", "mode")), one.multiblade_shapes
-    over, n, (backward, forward) = one.over_speed, np.arange(len(one.coordinates)), one.whirl
+    n, (backward, forward) = np.arange(len(one.coordinates)), one.whirl
     entry, part = partial(Column, ("speed", "equation", "coordinate")), partial(Column, ("speed", "mode", "component"))
     root, place = partial(Column, ("speed", "mode", "root")), partial(Column, ("speed", "mode", "coordinate"))
     return {
@@ -112,10 +112,10 @@ def _linear_datasets(one: LinearModes) -> Datasets:
         "equation": (n, Column(("equation",), "1", "equation of motion, of the coordinate with the same number")),
         "root": (np.arange(2), Column(("root",), "1", "both eigenvalues of a mode")),
         "steady_angle": (one.angles, Column(("speed", "coordinate"), "rad", "angle at the steady state")),
-        "undamped_frequency": (over("undamped_frequencies"), mode("rad/s", "undamped frequency, in the rotor's frame")),
-        "damped_frequency": (over("damped_frequencies"), mode("rad/s", "damped frequency, in the rotor's frame")),
-        "damping_ratio": (over("damping_ratios"), mode("1", "share of critical damping")),
-        "growth_rate": (over("growth_rates"), mode("1/s", "largest real part of the mode's eigenvalues")),
+        "undamped_frequency": (one.undamped_frequencies, mode("rad/s", "undamped frequency, in the rotor's frame")),
+        "damped_frequency": (one.damped_frequencies, mode("rad/s", "damped frequency, in the rotor's frame")),
+        "damping_ratio": (one.damping_ratios, mode("1", "share of critical damping")),
+        "growth_rate": (one.growth_rates, mode("1/s", "largest real part of the mode's eigenvalues")),
         "backward_whirl_frequency": (backward, mode("rad/s", "damped frequency less speed, in the base frame")),
         "forward_whirl_frequency": (forward, mode("rad/s", "damped frequency plus speed, in the base frame")),
         "eigenvalue_real": (one.eigenvalues.real, root("1/s", "eigenvalue, real part")),
@@ -195,10 +195,11 @@ def _complex(record: Record, name: str) -> Complex:
 
 def _linear(record: Record) -> LinearModes:
     facts, arrays = record.attributes, record.arrays
-    names = ("rotor", *multiblade(int(facts["blades"]))[0]) if facts["symmetric"] else ()
-    values, shapes = _complex(record, "eigenvalue"), _complex(record, "shape")
     source, _, kind = record.name.partition("/")
     return LinearModes(
+        eigenvalues=_complex(record, "eigenvalue"),
+        shapes=_complex(record, "shape"),
+        names=tuple(map(str, facts["mode_labels"])),
         source=source,
         label=str(facts["label"]),
         kind=kind,
@@ -208,7 +209,6 @@ def _linear(record: Record) -> LinearModes:
         angles=arrays["steady_angle"],
         stiffness=arrays["stiffness"],
         damping=arrays["damping"],
-        sets=tuple(ModeSet(value, shape, names) for value, shape in zip(values, shapes, strict=True)),
         messages=tuple(map(str, facts["messages"])),
     )
 

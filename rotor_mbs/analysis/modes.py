@@ -24,10 +24,10 @@ GROWTH = 1e-5
 
 @dataclass(frozen=True)
 class ModeSet:
-    """The modes at one speed, n of them.
+    """n modes: of one speed, or of several, whose number then comes first in every array.
 
-    eigenvalues (n, 2) 1/s: both of each mode, conjugate where it oscillates
-    shapes      (n, n): a row for each mode, rotor and pitch amplitudes, the largest one 1
+    eigenvalues (..., n, 2) 1/s: both of each mode, conjugate where it oscillates
+    shapes      (..., n, n): a row for each mode, rotor and pitch amplitudes, the largest one 1
     names       of the modes where symmetry tells them apart, else ()
     """
 
@@ -37,27 +37,27 @@ class ModeSet:
 
     @property
     def undamped_frequencies(self) -> Array:
-        """(n,) rad/s: root of the product of both eigenvalues; NaN where one of them grows without oscillating."""
-        product = (self.eigenvalues[:, 0] * self.eigenvalues[:, 1]).real
+        """(..., n) rad/s: root of the product of both eigenvalues; NaN where one of them grows without oscillating."""
+        product = (self.eigenvalues[..., 0] * self.eigenvalues[..., 1]).real
         return np.sqrt(np.where(product >= 0.0, np.abs(product), np.nan))
 
     @property
     def damped_frequencies(self) -> Array:
-        """(n,) rad/s: 0 where the mode does not oscillate."""
-        return np.asarray(np.abs(self.eigenvalues[:, 0].imag))
+        """(..., n) rad/s: 0 where the mode does not oscillate."""
+        return np.asarray(np.abs(self.eigenvalues[..., 0].imag))
 
     @property
     def damping_ratios(self) -> Array:
-        """(n,) share of critical damping, above 1 where overdamped; NaN where there is no undamped frequency or 0."""
+        """(..., n) share of critical damping, above 1 if overdamped; NaN where the undamped frequency is 0 or none."""
         frequencies = self.undamped_frequencies
-        rate = -0.5 * (self.eigenvalues[:, 0] + self.eigenvalues[:, 1]).real
+        rate = -0.5 * (self.eigenvalues[..., 0] + self.eigenvalues[..., 1]).real
         ratios = np.divide(rate, frequencies, out=np.full_like(rate, np.nan), where=frequencies > 0.0)
         return np.asarray(ratios + 0.0)  # no -0
 
     @property
     def growth_rates(self) -> Array:
-        """(n,) 1/s: the larger real part of each mode; above 0 it is unstable."""
-        return np.asarray(self.eigenvalues.real.max(axis=1) + 0.0)
+        """(..., n) 1/s: the larger real part of each mode; above 0 it is unstable."""
+        return np.asarray(self.eigenvalues.real.max(axis=-1) + 0.0)
 
 
 def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
@@ -160,36 +160,18 @@ def whirl_frequencies(frequency: Array, speed: Array, harmonic: int = 1) -> tupl
     return np.abs(frequency - harmonic * speed), frequency + harmonic * speed
 
 
-@dataclass(frozen=True)
-class Floquet:
-    """What a turn makes of small departures from a periodic motion.
-
-    multipliers (2n,) all of them, largest first
-    others      without those that are 1 for every such motion: a shift in time and, where energy is kept, in speed
-    """
-
-    multipliers: Complex
-    others: Complex
-
-    @property
-    def largest(self) -> float:
-        """Largest modulus of a multiplier, those that are always 1 left out."""
-        return float(np.abs(self.others).max(initial=0.0))
-
-    @property
-    def is_stable(self) -> bool:
-        return self.largest <= 1.0 + GROWTH
-
-
-def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> Floquet:
-    """Multipliers of a (2n, 2n) state transition matrix over a turn.
+def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> tuple[Complex, Complex]:
+    """Multipliers of a (2n, 2n) state transition matrix over a turn, the largest first.
 
     flow        (2n,) time derivative of the state: an eigenvector for 1
     gradient    (2n,) derivative of what the motion keeps: a left eigenvector for 1, or zeros where nothing is kept
+
+    Returns all of them, and those that are not 1 for every such motion (a shift in time and, where energy is kept, in
+    speed): the motion is stable where none of these is larger than 1, up to `GROWTH`.
     """
     if not np.isfinite(transition).all():
         nothing = np.full(len(transition), complex(np.nan, np.nan))
-        return Floquet(nothing, nothing)
+        return nothing, nothing
     units = np.repeat([1.0, speed], len(flow) // 2)
     scaled = transition * units / units[:, None]
     fixed = [flow / units, gradient * units]
@@ -198,7 +180,7 @@ def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> Fl
     rest = basis[:, len(fixed) :]
     values = np.linalg.eigvals(scaled).astype(complex)
     others = np.linalg.eigvals(rest.T @ scaled @ rest).astype(complex)
-    return Floquet(values[np.argsort(-np.abs(values))], others[np.argsort(-np.abs(others))])
+    return values[np.argsort(-np.abs(values))], others[np.argsort(-np.abs(others))]
 
 
 def _shape(vector: Complex, n: int, first: int) -> Complex:

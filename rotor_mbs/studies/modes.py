@@ -16,7 +16,7 @@ import numpy as np
 
 from rotor_mbs.analysis.campbell import REST, ROTATION, FloquetTable, LinearModes, SceneModes, StabilityChart
 from rotor_mbs.analysis.mode_records import to_records
-from rotor_mbs.analysis.modes import Array, Floquet, ModeSet, floquet, isotropic_modes, modes_of, track
+from rotor_mbs.analysis.modes import GROWTH, Array, Complex, ModeSet, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
@@ -189,19 +189,23 @@ def _modes_over_speed(
         else:
             sets.append(modes_of(one.stiffness, one.damping, is_cyclic=point[0].gravity == 0.0))
     tracked = iter(track(sets))
-    nothing = ModeSet(np.full((n, 2), complex(np.nan, np.nan)), unknown.astype(complex), sets[0].names)
+    nothing = ModeSet(np.full((n, 2), complex(np.nan, np.nan)), unknown.astype(complex))
+    at_speeds = [nothing if one is None else next(tracked) for one in made]
+    names = (name if name == "rotor" else f"{name} pitch" for name in sets[0].names)
     return LinearModes(
-        method.model,
-        method.model_label,
-        kind,
-        len(scene.blades),
-        speeds,
-        tuple(scene.coordinate_labels[column] for column in columns),
-        np.array([np.full(n, np.nan) if point is None else point[1][columns] for point in points]),
-        np.array([unknown if one is None else one.stiffness for one in made]),
-        np.array([unknown if one is None else one.damping for one in made]),
-        tuple(nothing if one is None else next(tracked) for one in made),
-        tuple(messages),
+        eigenvalues=np.array([each.eigenvalues for each in at_speeds]),
+        shapes=np.array([each.shapes for each in at_speeds]),
+        names=tuple(names) or tuple(f"mode {k + 1}" for k in range(n)),
+        source=method.model,
+        label=method.model_label,
+        kind=kind,
+        blades=len(scene.blades),
+        speeds=speeds,
+        coordinates=tuple(scene.coordinate_labels[column] for column in columns),
+        angles=np.array([np.full(n, np.nan) if point is None else point[1][columns] for point in points]),
+        stiffness=np.array([unknown if one is None else one.stiffness for one in made]),
+        damping=np.array([unknown if one is None else one.damping for one in made]),
+        messages=tuple(messages),
     )
 
 
@@ -219,18 +223,19 @@ def floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
     turns.reverse()
     rows = []
     for turn in turns:
-        found = floquet(turn.transition, turn.flow, turn.gradient, turn.speed)
-        is_stable = -1 if turn.message else int(found.is_stable)
-        error = _product_error(found, turn)
-        rows.append((found.multipliers, found.largest, is_stable, error, turn.torque, turn.mismatch))
+        every, others = floquet(turn.transition, turn.flow, turn.gradient, turn.speed)
+        modulus = float(np.abs(others).max(initial=0.0))
+        is_stable = -1 if turn.message else int(modulus <= 1.0 + GROWTH)
+        error = _product_error(every, turn)
+        rows.append((every, modulus, is_stable, error, turn.torque, turn.mismatch))
     multipliers, largest, stable, errors, torques, mismatches = map(np.array, zip(*rows, strict=True))
     messages = tuple(turn.message for turn in turns)
     return FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
 
 
-def _product_error(found: Floquet, turn: Turn) -> float:
+def _product_error(multipliers: Complex, turn: Turn) -> float:
     """ln of the product of the multipliers less the integrated trace; NaN where rounding leaves under six digits."""
-    sizes = np.abs(found.multipliers)
+    sizes = np.abs(multipliers)
     rounding = np.finfo(float).eps * np.linalg.norm(turn.transition)
     if turn.message or not rounding < 1e-6 * sizes.min():
         return float("nan")

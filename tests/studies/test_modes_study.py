@@ -34,11 +34,11 @@ def test_all_models_agree_on_the_nrel_rotor():
     assert found.agrees
     closed = found.rotation["lagrange"]
     assert closed.names == ("rotor", "collective pitch", "cosine pitch", "sine pitch")
-    frequencies = closed.over_speed("undamped_frequencies")
+    frequencies = closed.undamped_frequencies
     assert (np.diff(frequencies[:, 1]) > 0.0).all()  # centrifugal stiffening
     for other in list(found.rotation.values())[1:]:
-        np.testing.assert_allclose(other.over_speed("undamped_frequencies"), frequencies, rtol=1e-8)
-        np.testing.assert_allclose(other.over_speed("damping_ratios"), closed.over_speed("damping_ratios"), rtol=1e-7)
+        np.testing.assert_allclose(other.undamped_frequencies, frequencies, rtol=1e-8)
+        np.testing.assert_allclose(other.damping_ratios, closed.damping_ratios, rtol=1e-7)
 
 
 def test_a_model_of_another_rotor_is_found_out(monkeypatch):
@@ -160,5 +160,5 @@ def test_the_api_has_tables_figures_files(tmp_path):
         found.plot.multipliers()
     pytest.importorskip("xarray")
     data = found.to_xarray()
-    expected = found.rotation["lagrange"].over_speed("undamped_frequencies")[:, 2]
+    expected = found.rotation["lagrange"].undamped_frequencies[:, 2]
     np.testing.assert_array_equal(data.undamped_frequency.sel(solver="lagrange", mode="cosine pitch"), expected)

@@ -62,7 +62,7 @@ def _lead(modes: SceneModes) -> list[str]:
 
 def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Section, Section]:
     """The pictures over speed; the tables of the highest speed."""
-    if rotation is None or np.isnan(rotation.over_speed("growth_rates")).all():
+    if rotation is None or np.isnan(rotation.growth_rates).all():
         return Section(), Section()
     last = len(rotation.speeds) - 1
     fastest = Section(tables=_tables(rotation, last, f"{scene}, {number(float(rotation.speeds[last]), 4)} rad/s"))
@@ -72,8 +72,7 @@ def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Sect
         "Campbell diagram: damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
     )
     drawn = [picture(campbell(rotation), f"{name}-campbell", caption, caption)]
-    ratios = rotation.over_speed("damping_ratios")
-    if np.nanmax(np.abs(ratios), initial=0.0) > 1e-9 or np.nanmax(rotation.over_speed("growth_rates")) > 1e-9:
+    if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
         caption = "Damping ratios and growth rates"
         drawn.append(picture(damping(rotation), f"{name}-damping", caption, caption))
     legend = [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
@@ -90,18 +89,16 @@ def _tables(one: LinearModes, i: int, state: str) -> list[PageTable]:
 
 def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:
     """Frequencies at the i-th speed."""
-    each = first.sets[i]
-    backward, forward = (values[i] for values in first.whirl)
     columns = {
-        "undamped (Hz)": each.undamped_frequencies / (2.0 * math.pi),
-        "undamped (rad/s)": each.undamped_frequencies,
-        "damped (rad/s)": each.damped_frequencies,
-        "damping ratio": each.damping_ratios,
-        "growth rate (1/s)": each.growth_rates,
-        "backward whirl (rad/s)": backward,
-        "forward whirl (rad/s)": forward,
+        "undamped (Hz)": first.undamped_frequencies / (2.0 * math.pi),
+        "undamped (rad/s)": first.undamped_frequencies,
+        "damped (rad/s)": first.damped_frequencies,
+        "damping ratio": first.damping_ratios,
+        "growth rate (1/s)": first.growth_rates,
+        "backward whirl (rad/s)": first.whirl[0],
+        "forward whirl (rad/s)": first.whirl[1],
     }
-    rows = [[name, *(_shown(float(x[k]), 7) for x in columns.values())] for k, name in enumerate(first.names)]
+    rows = [[name, *(_shown(float(x[i, k]), 7) for x in columns.values())] for k, name in enumerate(first.names)]
     return PageTable(caption, ("Mode", *columns), rows, range(1, 1 + len(columns))).without_empty_columns()
 
 
@@ -158,8 +155,7 @@ def mode_look(index: int) -> Look:
 def campbell(modes: LinearModes) -> Panels:
     """Damped frequencies (rad/s) over speed above their change since the lowest speed, with multiples of the speed."""
     panel = panels((2.9, 1.7), SPEED_AXIS)
-    frequencies = modes.over_speed("damped_frequencies")
-    speeds = modes.speeds
+    frequencies, speeds = modes.damped_frequencies, modes.speeds
     top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
     apart = float(speeds[-1]) > 0.05 * top  # else the labels would lie on each other
     for k in _HARMONICS:
@@ -182,11 +178,9 @@ def campbell(modes: LinearModes) -> Panels:
 def damping(modes: LinearModes) -> Panels:
     """Damping ratio and growth rate (1/s) of each mode over speed."""
     panel = panels((2.0, 2.0), SPEED_AXIS)
-    for axes, name, label in (
-        (panel.axes[0], "damping_ratios", "damping ratio"),
-        (panel.axes[1], "growth_rates", "growth rate (1/s)"),
-    ):
-        for k, values in enumerate(modes.over_speed(name).T):
+    curves = {"damping ratio": modes.damping_ratios, "growth rate (1/s)": modes.growth_rates}
+    for axes, (label, numbers) in zip(panel.axes, curves.items(), strict=True):
+        for k, values in enumerate(numbers.T):
             curve(axes, modes.speeds, values, replace(mode_look(k), marker=""))
         axes.set_ylabel(label)
     return panel
