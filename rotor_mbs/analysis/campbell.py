@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.modes import Array, Complex, ModeSet, multiblade_shapes, whirl_frequencies
+from rotor_mbs.analysis.modes import Complex, ModeSet, multiblade_shapes, whirl_frequencies
+from rotor_mbs.solution.trajectory import Array
 
 REST, ROTATION, FLOQUET, CHART = "rest", "rotation", "floquet", "chart"
 # Sources agree where their frequencies differ by no more than this share.

@@ -114,15 +114,8 @@ class ClaimShares:
 
     def verdict(self, claim: str, method: str) -> str:
         """ "holds", "fails" or "undecided" whatever the rounding and the duration; "" without data."""
-        return joint_verdict(self.of(claim, method))
-
-
-def joint_verdict(shares: Iterable[ClaimShare]) -> str:
-    """The verdict of all durations where it is the same, else "undecided"; "" of none."""
-    verdicts = {one.verdict for one in shares}
-    if not verdicts:
-        return ""
-    return verdicts.pop() if len(verdicts) == 1 else UNDECIDED
+        verdicts = {one.verdict for one in self.of(claim, method)} or {""}
+        return verdicts.pop() if len(verdicts) == 1 else UNDECIDED
 
 
 @dataclass(frozen=True)

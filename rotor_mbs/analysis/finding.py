@@ -56,7 +56,6 @@ class Agreement:
 class Finding:
     """Parts are None, or empty, where the file does not have the data."""
 
-    scenes: int
     numbers: Tally | None
     numbers_corrected: Tally | None
     claims_printed: Tally | None
@@ -70,12 +69,11 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
     numbers = [claim for claim in said if claim.published.is_number]
     others = [claim for claim in said if not claim.published.is_number]
     return Finding(
-        len(scenes),
         _tally(claim.printed.holds for claim in numbers),
         _tally(claim.corrected.holds for claim in numbers),
         _tally(claim.printed.holds for claim in others),
         _printed_energy(scenes),
-        _agreement(scenes),
+        agreement(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values()),
     )
 
 
@@ -94,10 +92,6 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
     largest = max(complete, key=lambda name: complete[name], default="")
     ended_early = {name: gain for name, gain in gains.items() if runs[name].status not in COMPLETE}
     return PrintedEnergy(Tally(len(made), len(gains)), complete.get(largest, 0.0), largest, ended_early)
-
-
-def _agreement(scenes: Mapping[str, StoredScene]) -> tuple[Agreement, ...]:
-    return agreement(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values())
 
 
 def agreement(runs: Iterable[StoredRun]) -> tuple[Agreement, ...]:

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotor_mbs.solution.trajectory import Array
+
 Complex = NDArray[np.complex128]
 
 # A multiplier this much above 1 counts as growth: those of equal blades coincide, and rounding splits a double

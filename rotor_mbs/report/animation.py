@@ -7,10 +7,9 @@ import subprocess
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from rotor_mbs.analysis import run_selection
@@ -22,9 +21,9 @@ from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
 from rotor_mbs.report.plots.paths import projected
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.store.read import StoredScene, open_results
 
-Array = NDArray[Any]
 SUFFIXES = (".webp", ".gif", ".mp4")
 RATE = 20  # frames a second, in real time
 _LONGEST = 600  # frames: a longer scene is shown faster

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
-from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, joint_verdict, marks
+from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
 from rotor_mbs.analysis.number_trials import count_of_rows
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
 from rotor_mbs.solution.status import code_of
@@ -42,10 +42,14 @@ def test_a_claim_holds_or_fails_only_where_nearly_all_runs_say_so(moved: str, ve
 
 def test_a_claim_holds_only_where_it_does_for_every_duration() -> None:
     yes, no, half = share("y" * 9, 8.0), share("n" * 9, 10.0), share("y" * 5 + "n" * 4, 12.0)
-    assert joint_verdict([yes, share("n" + 8 * "y", 10.0)]) == "holds"
-    assert joint_verdict([no, share("y" + 8 * "n", 12.0)]) == "fails"
-    assert [joint_verdict(found) for found in ([yes, no], [yes, half], [no, half])] == ["undecided"] * 3
-    assert joint_verdict([]) == ""
+
+    def verdict(*shares: ClaimShare) -> str:
+        return ClaimShares(shares, 1e-15, 8).verdict(yes.claim, yes.method)
+
+    assert verdict(yes, share("n" + 8 * "y", 10.0)) == "holds"
+    assert verdict(no, share("y" + 8 * "n", 12.0)) == "fails"
+    assert [verdict(*found) for found in ([yes, no], [yes, half], [no, half])] == ["undecided"] * 3
+    assert verdict() == ""
 
 
 def runs(values: list[float], status: str = "ok", drift: float = 1e-3) -> SampledRuns:

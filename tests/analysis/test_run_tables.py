@@ -62,7 +62,7 @@ def test_a_bench_curve_has_its_smallest_error_and_the_times_to_given_ones() -> N
 
 
 def test_the_finding_says_how_many_numbers_and_claims() -> None:
-    facts = Finding(1, Tally(4, 4), Tally(0, 4), Tally(8, 14), None, ())
+    facts = Finding(Tally(4, 4), Tally(0, 4), Tally(8, 14), None, ())
     assert finding_lines(facts, None) == [
         "published numbers: 4 of 4 come out of the printed equations; the corrected ones give none",
         "claims in words: 8 of 14 hold in the printed equations",

@@ -166,6 +166,6 @@ def test_the_heat_map_has_the_errors_the_methods_and_the_marks(report: Path, tmp
 
 
 def test_a_report_without_a_paper_has_a_short_finding_of_its_own() -> None:
-    one = Finding(1, None, None, None, None, (Agreement("lagrange/taylor", Tally(1, 1), 1e-11, 1e-14, 0.1),))
+    one = Finding(None, None, None, None, (Agreement("lagrange/taylor", Tally(1, 1), 1e-11, 1e-14, 0.1),))
     (sentence,) = short_sentences(one)
     assert sentence.startswith("The corrected model agrees with a quad-precision reference to 1.0×10⁻¹¹")

@@ -25,12 +25,12 @@ from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.looks import look_of
 from rotor_mbs.report.pages.bench import (
     csv_text,
+    diagram,
     failure_table,
     omissions,
     overview_table,
     reach_table,
 )
-from rotor_mbs.report.plots.work_precision import diagram
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.records import Record, read_records, write_records
 from rotor_mbs.store.results_file import merge

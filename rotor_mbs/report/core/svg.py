@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, hex_colour, is_map, style
 from rotor_mbs.report.core.elements import MARKS, LegendEntry, Picture
 from rotor_mbs.report.core.looks import INK, PAPER, class_of
 from rotor_mbs.report.core.numbers import SPACE, power
+from rotor_mbs.solution.trajectory import Array
 
-Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 _DASHES = {"--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
 _ANCHORS = {"left": "start", "right": "end", "center": "middle"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from rotor_mbs.analysis.claim_shares import FAILS, HOLDS, RULE, UNDECIDED, ClaimShare, ClaimShares, joint_verdict
+from rotor_mbs.analysis.claim_shares import FAILS, HOLDS, RULE, UNDECIDED, ClaimShares
 from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
 from rotor_mbs.analysis.number_trials import Conditions, NumberTrials, count_of_rows
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
@@ -78,8 +78,7 @@ def _claim_row(claim: Claim, shares: ClaimShares | None) -> Row:
     quoted = TableCell(item.statement, note=f"«{item.quote}»", note_language="es")
     if shares is None or item.id not in shares.claims:
         return [item.figure, quoted, _stored_verdict(claim.printed), _stored_verdict(claim.corrected)]
-    cells = (_verdict_cell(shares.of(item.id, method)) for method in shares.methods)
-    return [item.figure, quoted, *cells]
+    return [item.figure, quoted, *(_verdict_cell(shares, item.id, method) for method in shares.methods)]
 
 
 def _stored_verdict(result: ClaimResult) -> TableCell:
@@ -130,16 +129,16 @@ def _measured(value: float | None, asked: TrajectoryNumber) -> str:
     return with_unit(value, unit_of(asked), 3) if unit_of(asked) else number(value, 3)
 
 
-def _verdict_cell(shares: Sequence[ClaimShare]) -> TableCell:
+def _verdict_cell(study: ClaimShares, claim: str, method: str) -> TableCell:
     """The verdict of one model whatever the rounding and the duration; the shares below it.
 
     Such as "100 %, 97 % and 12 % of 100, 100 and 87 deciding runs over 8, 10 and 12 s".
     """
+    shares, verdict = study.of(claim, method), study.verdict(claim, method)
     percents = listed(["–" if not one.deciding else f"{100.0 * one.share:.0f}\N{NO-BREAK SPACE}%" for one in shares])
     deciding = [str(one.deciding) for one in shares]
     runs = deciding[0] if len(set(deciding)) == 1 else listed(deciding)
     note = f"{percents} of {runs} deciding runs over {_durations([one.duration for one in shares])}"
-    verdict = joint_verdict(shares)
     return TableCell(verdict, tone=_TONES[verdict], note=note)
 
 
@@ -185,24 +184,26 @@ def trial_tables(trials: NumberTrials) -> list[PageTable]:
         for item in items.values()
         if item.of is not None  # every number has it
     ]
-    by_duration, by_tolerance = trials.of_row(trials.usual.gravity_row), trials.with_tolerances()
+    usual = trials.usual
+    over = f", over {with_unit(usual.duration, 's')}"
+
+    def table(caption: str, head: Sequence[str], labels: Mapping[Conditions, Row], first: int = 1) -> PageTable:
+        rows = [[*texts, *_cells(trials, one, items)] for one, texts in labels.items()]
+        return PageTable(caption, (*head, *heads), rows, numeric=range(first, len(head) + len(heads)))
+
+    durations: dict[Conditions, Row] = {one: [with_unit(one.duration, "s")] for one in trials.of_row(usual.gravity_row)}
+    tolerances: dict[Conditions, Row] = {
+        one: [_power(one.relative_tolerance), _power(one.absolute_tolerance)] for one in trials.with_tolerances()
+    }
+    rows: dict[Conditions, Row] = {}
+    for row in trials.rows:
+        conditions = replace(usual, gravity_row=row)
+        for trial in list(trials.under(conditions).values())[:1]:
+            rows[conditions] = [TableCell(GRAVITY_ROWS[row].formula), number(trial.remainder)]
     return [
-        PageTable(
-            "The published numbers by the duration of the run",
-            ("Duration", *heads),
-            [[TableCell(with_unit(one.duration, "s")), *_cells(trials, one, items)] for one in by_duration],
-            numeric=range(1, 1 + len(heads)),
-        ),
-        PageTable(
-            f"The published numbers by the tolerances of ode45, over {with_unit(trials.usual.duration, 's')}",
-            ("RelTol", "AbsTol", *heads),
-            [
-                [_power(one.relative_tolerance), _power(one.absolute_tolerance), *_cells(trials, one, items)]
-                for one in by_tolerance
-            ],
-            numeric=range(2, 2 + len(heads)),
-        ),
-        _row_table(trials, items, heads),
+        table("The published numbers by the duration of the run", ("Duration",), durations),
+        table(f"The published numbers by the tolerances of ode45{over}", ("RelTol", "AbsTol"), tolerances, 2),
+        table(f"By the way of writing the first row of (56){over}", ("Row", "At the start (N m)"), rows),
     ]
 
 
@@ -219,19 +220,6 @@ def trial_note(trials: NumberTrials) -> str:
     )
 
 
-def _row_table(trials: NumberTrials, items: Mapping[str, Published], heads: Sequence[str]) -> PageTable:
-    rows = []
-    for row in trials.rows:
-        of_row = trials.of_row(row)
-        usual = next((one for one in of_row if one.duration == trials.usual.duration), None)
-        if usual is not None:
-            remainder = next(iter(trials.under(usual).values())).remainder
-            texts = GRAVITY_ROWS[row].formula, number(remainder)
-            rows.append([*map(TableCell, texts), *_cells(trials, usual, items)])
-    caption = f"By the way of writing the first row of (56), over {with_unit(trials.usual.duration, 's')}"
-    return PageTable(caption, ("Row", "At the start (N m)", *heads), rows, numeric=range(1, 2 + len(heads)))
-
-
 def _cells(trials: NumberTrials, conditions: Conditions, items: Mapping[str, Published]) -> list[TableCell]:
     found = trials.under(conditions)
     return [
@@ -240,8 +228,8 @@ def _cells(trials: NumberTrials, conditions: Conditions, items: Mapping[str, Pub
     ]
 
 
-def _power(value: float) -> TableCell:
-    return TableCell(power(int(f"{value:.0e}".partition("e")[2])))
+def _power(value: float) -> str:
+    return power(int(f"{value:.0e}".partition("e")[2]))
 
 
 def _durations(values: Sequence[float]) -> str:

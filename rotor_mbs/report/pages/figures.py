@@ -48,11 +48,6 @@ class PaperFigure:
     kind: str
     panels: tuple[tuple[str, str], ...]
 
-    @property
-    def scenes(self) -> tuple[str, ...]:
-        """The scenes of all panels."""
-        return tuple(scene for _, scene in self.panels)
-
 
 def _figure(number: str, kind: str, **panels: str) -> PaperFigure:
     return PaperFigure(number, kind, tuple((letter.strip("_"), f"paper/{name}") for letter, name in panels.items()))
@@ -102,8 +97,8 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     return found
 
 
-def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple[str, str, dict[str, StoredRun]]]:
-    """(letter, key, runs by label) of each picture, row by row.
+def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
+    """The runs of each picture by label, row by row: by letter, then by key of HEADINGS.
 
     A figure of torques is one row, with the runs of all its scenes in one picture; elsewhere a picture has one run.
     """
@@ -113,7 +108,7 @@ def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[t
         for key, run in compared_runs(scenes[name]).items():
             if figure.kind != PATHS or "tip" in run:
                 rows.setdefault(letter, {}).setdefault(key, {})[label] = run
-    return [(letter, key, runs) for letter, row in rows.items() for key, runs in row.items()]
+    return rows
 
 
 def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
@@ -148,7 +143,7 @@ def legend(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple
     """(label, look) of the curves: coordinates, blades, or torques."""
     if figure.kind == TORQUES:
         return [(label, torque_look(i)) for i, (label, _) in enumerate(figure.panels)]
-    runs = compared_runs(scenes[figure.scenes[0]])
+    runs = compared_runs(scenes[figure.panels[0][1]])
     labels = next(iter(runs.values())).labels if runs else []
     if figure.kind == MOTION:
         return [(label, coordinate_look(i)) for i, label in enumerate(labels)]
@@ -177,16 +172,16 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
 def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
     """The whole figure, a column per model: position above velocity, or a row per panel where paths are shown."""
     pictures = panel_runs(figure, scenes)
-    letters = list(dict.fromkeys(letter for letter, _, _ in pictures))
-    keys = [key for key in HEADINGS if key in {key for _, key, _ in pictures}]
+    keys = [key for key in HEADINGS if any(key in row for row in pictures.values())]
     is_paths = figure.kind == PATHS
     with canvas.style(for_print=True):
-        rows, height, heading = (len(letters), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
+        rows, height, heading = (len(pictures), 1.8, 1.02) if is_paths else (2, 1.55, 1.16)
         panels = canvas.print_grid(rows, len(keys), height)
         table = [panels.axes[i : i + len(keys)] for i in range(0, len(panels.axes), len(keys))]
-        for letter, key, runs in pictures:
-            column = [row[keys.index(key)] for row in table]
-            draw(figure, [column[letters.index(letter)]] if is_paths else column, runs)
+        for i, row_of_runs in enumerate(pictures.values()):
+            for key, runs in row_of_runs.items():
+                column = [row[keys.index(key)] for row in table]
+                draw(figure, [column[i]] if is_paths else column, runs)
         for axes, key in zip(table[0], keys, strict=True):
             axes.text(0.5, heading, HEADINGS[key], transform=axes.transAxes, ha="center", weight="bold")
         for axes in panels.axes:
@@ -194,7 +189,7 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
                 axes.set_axis_off()
             if axes not in [row[0] for row in table]:  # the labels of the first column are for all
                 axes.set_ylabel("")
-        for row, letter in zip(table, letters if is_paths else [], strict=False):
+        for row, letter in zip(table, pictures if is_paths else (), strict=False):
             row[0].text(-0.08, 0.94, f"({letter})", transform=row[0].transAxes)
     labelled = legend(figure, scenes)
     place = {"loc": "lower center", "ncols": min(len(labelled), 5), "handlelength": 2.6}
@@ -209,8 +204,8 @@ def walk_figure(figure: PaperFigure, scenes: Mapping[str, StoredScene], context:
     pictures = panel_runs(figure, scenes)
     is_torques = figure.kind == TORQUES  # all in one picture per model
     panels = []
-    for letter, name in [("", figure.scenes[0])] if is_torques else figure.panels:
-        row = {key: runs for place, key, runs in pictures if place == letter}
+    for letter, name in [("", figure.panels[0][1])] if is_torques else figure.panels:
+        row = pictures.get(letter, {})
         same, different = _torques(figure, scenes, row) if is_torques else same_and_different(scenes[name])
         panels.append({
             "letter": letter,
@@ -235,7 +230,7 @@ def _torques(
     figure: PaperFigure, scenes: Mapping[str, StoredScene], row: Mapping[str, Mapping[str, StoredRun]]
 ) -> tuple[str, str]:
     """What is the same and what is not in a figure of torques."""
-    gaps = [gap for name in figure.scenes if (gap := _exudyn_gap(scenes[name])) is not None]
+    gaps = [gap for _, name in figure.panels if (gap := _exudyn_gap(scenes[name])) is not None]
     same = "The same: every torque accelerates the rotor from rest"
     same += f"; Exudyn and the corrected model differ by {with_unit(max(gaps)[0], 'rad')} at most." if gaps else "."
     turned = [

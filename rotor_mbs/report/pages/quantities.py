@@ -5,7 +5,7 @@ Those that are judged against the reference, such as loads, are drawn of the ref
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,9 +18,10 @@ from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.time_histories import LOWEST, Array, Series
+from rotor_mbs.report.plots.time_histories import LOWEST, Series
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities
 from rotor_mbs.solution.quantities import sizes as lengths
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.store.read import StoredRun, StoredScene
 
 Runs = Mapping[str, StoredRun]
@@ -96,11 +97,18 @@ def _section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: flo
 
 def sizes(quantity: Quantity, runs: Runs) -> Curves:
     """The largest magnitude of the quantity over its components, of each run that has it."""
-    found = {}
-    for method, run in runs.items():
-        if quantity.name in run:
-            columns = np.abs(run.array(quantity.name)).reshape(len(run.array("time")), -1)
-            found[method] = Series(run.array("time"), columns.max(axis=1), look_of(method))
+    return _curves(runs, quantity.name, lambda run: _largest(np.abs(run.array(quantity.name))))
+
+
+def _curves(runs: Runs, name: str, measure: Callable[[StoredRun], Array]) -> Curves:
+    """What `measure` makes of each run that has the array `name`, over the run's first samples."""
+    values = {method: measure(run) for method, run in runs.items() if name in run}
+    return {m: Series(runs[m].array("time")[: len(x)], x, look_of(m)) for m, x in values.items()}
+
+
+def _largest(sizes: Array) -> Array:
+    """(n,) of (n, ...): the largest over the components."""
+    found: Array = sizes.reshape(len(sizes), -1).max(axis=1)
     return found
 
 
@@ -135,14 +143,14 @@ def _pictures(quantity: Quantity, plot: Plot, run: StoredRun, name: str, horizon
 
 def _errors(quantity: Quantity, runs: Runs) -> Curves:
     """The largest difference from the reference over blades, at the samples that both have; vectors by their length."""
-    exact, found = runs[REFERENCE].array(quantity.name), {}
-    for method, run in runs.items():
-        if method != REFERENCE:
-            values = run.array(quantity.name)
-            n = min(len(values), len(exact))
-            off = lengths(quantity, values[:n] - exact[:n]).reshape(n, -1).max(axis=1)
-            found[method] = Series(run.array("time")[:n], off, look_of(method))
-    return found
+    exact = runs[REFERENCE].array(quantity.name)
+
+    def off(run: StoredRun) -> Array:
+        values = run.array(quantity.name)
+        n = min(len(values), len(exact))
+        return _largest(lengths(quantity, values[:n] - exact[:n]))
+
+    return _curves({method: run for method, run in runs.items() if method != REFERENCE}, quantity.name, off)
 
 
 def _extremes(quantity: Quantity, time: Array, parts: Sequence[Component]) -> PageTable:
@@ -187,8 +195,7 @@ def differences(runs: Runs, reference: StoredRun | None) -> Curves:
     """Largest angle difference (rad) from the reference over the coordinates, at the samples that both have."""
     if reference is None or "angles" not in reference or not len(reference.array("time")):
         return {}
-    gaps = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
-    return {method: Series(reference.array("time")[: len(gap)], gap, look_of(method)) for method, gap in gaps.items()}
+    return _curves(runs, "angles", lambda run: angle_difference(run, reference))
 
 
 def angle_difference(one: StoredRun, other: StoredRun) -> Array:
@@ -200,11 +207,7 @@ def angle_difference(one: StoredRun, other: StoredRun) -> Array:
 
 def energy_picture(runs: Runs, horizon: float | None = None) -> tuple[Picture | None, list[str]]:
     """Total energy less work, from its start (J), of each run that has it; None without. The methods that are drawn."""
-    curves = {
-        method: Series(run.array("time"), run.array("energy_error"), look_of(method))
-        for method, run in runs.items()
-        if "energy_error" in run
-    }
+    curves = _curves(runs, "energy_error", lambda run: run.array("energy_error"))
     caption = (
         "Energy that comes from nothing (total energy less work, from its start): filled marks gained, open ones lost"
     )

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claim_records import ClaimStudy
@@ -28,46 +27,32 @@ from rotor_mbs.report.plots.time_histories import LOWEST, Series
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-Array = NDArray[np.float64]
 
+class DrawnRuns(NamedTuple):
+    """The runs of a scene that are drawn: those that have samples.
 
-@dataclass(frozen=True)
-class DrawnRuns:
-    """The runs of a scene that are drawn.
-
-    printed, corrected   the printed model, and the run that stands for the corrected one
-    others               the other runs of corrected models, by method
+    sides   printed, and the one that stands for the corrected model, by the heading of their column
+    all     these, then the other runs of corrected models, by method
     """
 
     scene: StoredScene
-    printed: StoredRun | None
-    corrected: StoredRun | None
-    others: dict[str, StoredRun]
+    sides: Mapping[str, StoredRun]
+    all: Mapping[str, StoredRun]
     horizon: float | None
 
-    @classmethod
-    def of(cls, scene: StoredScene) -> DrawnRuns:
-        """The runs of `scene` that have samples."""
-        printed, corrected = run_selection.printed_run(scene), run_selection.reference_or_corrected_run(scene)
-        good = {n: run for n, run in run_selection.corrected_runs(scene).items() if run_selection.has_samples(run)}
-        others = {name: run for name, run in good.items() if corrected is None or name != corrected.method}
-        return cls(scene, printed, corrected, others, scene_tables.horizon(scene))
 
-    @property
-    def sides(self) -> dict[str, StoredRun]:
-        """Printed and corrected, by the heading of their column."""
-        runs = {HEADINGS["printed"]: self.printed, HEADINGS["corrected"]: self.corrected}
-        return {heading: run for heading, run in runs.items() if run is not None}
-
-    @property
-    def all(self) -> dict[str, StoredRun]:
-        """Every run that is drawn, by method."""
-        return {run.method: run for run in self.sides.values()} | self.others
+def _drawn_runs(scene: StoredScene) -> DrawnRuns:
+    sides = {
+        HEADINGS["corrected" if run.method != run_selection.PRINTED else "printed"]: run
+        for run in run_selection.sides(scene)
+    }
+    good = {n: run for n, run in run_selection.corrected_runs(scene).items() if run_selection.has_samples(run)}
+    return DrawnRuns(scene, sides, {run.method: run for run in sides.values()} | good, scene_tables.horizon(scene))
 
 
 def scene_page(scene: StoredScene, context: Context) -> dict[str, object]:
     """The content of the page of a scene."""
-    drawn, pages = DrawnRuns.of(scene), ["", *context.files.values(), ""]
+    drawn, pages = _drawn_runs(scene), ["", *context.files.values(), ""]
     place = pages.index(context.files[scene.name])
     claims = [claim for claim in context.claims if scene.name in claim.published.scenes]
     own = context.conditions.get(scene.name.rpartition("/")[2])
@@ -89,7 +74,7 @@ def scene_page(scene: StoredScene, context: Context) -> dict[str, object]:
         "motion": motion_section(drawn),
         "difference": difference_section(drawn),
         "energy": energy_section(drawn),
-        "drive": drive_section(scene, drawn.corrected),
+        "drive": drive_section(scene, drawn.sides.get(HEADINGS["corrected"])),
         "cost": cost_section(scene, context.curves.get(scene.name, ())),
         "quantities": quantities.quantity_sections(scene, drawn.all, drawn.horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)], notes=scene_tables.metrics_notes(scene)),
@@ -112,7 +97,7 @@ def _claims_section(claims: Sequence[Claim], study: ClaimStudy | None, notes: li
 
 def _lead(drawn: DrawnRuns) -> list[str]:
     """What the pictures show, a sentence each."""
-    printed, found = drawn.printed, []
+    printed, found = drawn.sides.get(HEADINGS["printed"]), []
     departure = None if printed is None else metric(printed, "angle_error_whole")
     if printed is not None and printed.status not in COMPLETE:
         end = with_unit(float(printed.array("time")[-1]), "s", 3)

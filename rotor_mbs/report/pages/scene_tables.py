@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.exact import escape_rate
@@ -14,9 +13,9 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.store.read import StoredRun, StoredScene
 
-Array = NDArray[np.float64]
 # Attributes of a results file that say what made it.
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap, spread_of, stability_map
 from rotor_mbs.errors import InputError, StoreError
@@ -21,10 +19,10 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import status_text, versions
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.store.sweep_columns import parameter_name
 from rotor_mbs.store.sweep_dataset import StoredSweep
 
-Array = NDArray[Any]
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
 _RESPONSE, _MOST_RESPONSES = "pitch_max", 3

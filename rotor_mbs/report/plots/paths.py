@@ -6,13 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.looks import GREY, coordinate_look
+from rotor_mbs.solution.trajectory import Array
 
-Array = NDArray[Any]
 _AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the direction from which paths are seen
 
 

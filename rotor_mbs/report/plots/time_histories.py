@@ -7,14 +7,12 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.core.numbers import scaled
-
-Array = NDArray[Any]
+from rotor_mbs.solution.trajectory import Array
 
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
 # Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double of order one.
