@@ -341,7 +341,10 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     parser, known = _parser(), [command.name for command in _COMMANDS]
     if argv and not argv[0].startswith("-") and argv[0] not in known:
         parser.error(f"no command {argv[0]!r}{nearest(argv[0], known)}; allowed: {', '.join(known)}")
-    arguments = parser.parse_args(argv or ["--help"])
+    arguments, unknown = parser.parse_known_args(argv or ["--help"])
+    if unknown:
+        parser.prog += f" {arguments.command.name}"
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     if hasattr(arguments, "results"):
         arguments.file = arguments.results or arguments.file or default_results()
     return arguments

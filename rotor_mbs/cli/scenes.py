@@ -43,6 +43,8 @@ def new(arguments: argparse.Namespace) -> int:
     """A commented scene file; never in the place of another file."""
     from rotor_mbs.scenario.scene_file import new_scene_text
 
+    if arguments.file.suffix != ".toml":
+        raise InputError(f"{arguments.file}: is not a TOML file's name; allowed: a name that ends in .toml")
     try:
         with arguments.file.open("x", encoding="utf-8") as file:
             file.write(new_scene_text())

@@ -7,7 +7,7 @@
     group = "paper/fig08/lagrange/taylor"   # of an HDF5 file, where it has several
 
 A channel is sign * (column + offset), the offset in the column's own unit. What a mapping leaves out is not compared;
-the time alone is guessed then.
+the time alone is guessed then. All are guessed where it names a group alone.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rotor_mbs.foreign.channels import ALLOWED_UNITS, BASE_UNITS, TIME, UNITS, C
 from rotor_mbs.foreign.table import DataTable, shown_names
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError, read_toml
-from rotor_mbs.scenario.validation import Number, Table, validate
+from rotor_mbs.scenario.validation import Number, Table, validate, validate_file
 
 
 class Entry(Table):
@@ -75,17 +75,21 @@ def read_mapping(
     """
     if columns is None:
         return {}, ""
-    name, tables = ("columns", columns) if isinstance(columns, Mapping) else (str(columns), read_toml(Path(columns))[1])
     described = Field(None, description="a column's name, or a table with `column`")
     keys: dict[str, Any] = {channel.key: (Annotated[Entry | None, _OfName], described) for channel in channels(scene)}
     keys["group"] = (str, Field("", description="the path of a group in the file"))
+    model = create_model("MappingTable", __base__=Table, **keys)
     try:
-        found = dict(validate(create_model("MappingTable", __base__=Table, **keys), tables))
+        if isinstance(columns, Mapping):
+            name, found = "columns", dict(validate(model, columns))
+        else:
+            name, (text, tables) = str(columns), read_toml(Path(columns))
+            found = dict(validate_file(model, tables, text, name))
     except TableError as error:
-        raise InputError(f"{name}: {problem.message}" for problem in error.problems) from error
+        raise InputError(f"columns: {problem.message}" for problem in error.problems) from error
     group = found.pop("group")
     entries = {key: entry for key, entry in found.items() if entry is not None}
-    if entries.keys() <= {TIME}:
+    if entries.keys() == {TIME} or not (entries or group):
         raise InputError(f"{name}: no channel to compare; allowed: {', '.join(found)}")
     return entries, group
 

@@ -105,7 +105,7 @@ def open_file(path: Path) -> Iterator[Any]:
         with reading(path):
             written_by, version = (plain(file.attrs.get(name)) for name in ("format", "format_version"))
         if written_by != FORMAT:
-            raise StoreError(f"{path}: not a {FORMAT} results file (attribute format is {written_by!r})")
+            raise StoreError(f"{path}: its attribute format is {written_by!r}; allowed: a file that rotor-mbs wrote")
         if version != FORMAT_VERSION:
             raise StoreError(f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}")
         yield file

@@ -33,7 +33,7 @@ _CROISSANT_PROFILE = "http://mlcommons.org/croissant/1.0"
 _CONTEXT = Path(__file__).parent / "templates" / "croissant-context.json"
 
 
-def describe(path: Path) -> list[Path]:
+def describe(path: Path | str) -> list[Path]:
     """Writes the three files beside the dataset at `path`; returns their paths.
 
     Raises
@@ -42,6 +42,7 @@ def describe(path: Path) -> list[Path]:
         Where `path` is no sweep's dataset, a file cannot be written, or the folder's ro-crate-metadata.json was not
         written here and would be lost.
     """
+    path = Path(path)
     stored = StoredSweep(path)
     content = hashlib.sha256(path.read_bytes()).hexdigest()
     files = {

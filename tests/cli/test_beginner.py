@@ -32,6 +32,9 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a report of a scene file": ({}, "report {file}", "allowed: a file that rotor-mbs wrote"),
     "a report of nothing": ({}, "report missing.h5", "as rotor-mbs run or reproduce writes it"),
     "a folder as the output": ({}, "run {file} -o .", "a file's name, not a folder"),
+    "a method of the file": ({"methods = []": 'methods = ["rk67"]'}, "run {file}", "mine:10: methods: unknown method"),
+    "an option that is none": ({}, "run {file} --stiff", "rotor-mbs run: unrecognized arguments: --stiff; see"),
+    "a new file that would not run": ({}, "new mine.txt", "allowed: a name that ends in .toml"),
     "a new file over an old one": ({}, "new {file}", "allowed: a file that is not there yet"),
 }  # fmt: skip
 SLIPS: dict[str, tuple[str, str, str]] = {
@@ -139,4 +142,4 @@ def test_a_scene_names_its_methods_and_settings(
     capsys.readouterr()
     scene_file(tmp_path, edits | {"# step = 1e-3": "stp = 0.002"})
     assert main(["run", str(path), "-o", "r.h5"]) == 2
-    assert "mine: settings: no setting 'stp', perhaps step" in capsys.readouterr().err
+    assert "mine:38: settings: no setting 'stp', perhaps step" in capsys.readouterr().err

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from rotor_mbs.cli.arguments import pages_beside, parse
+from rotor_mbs.report.pages.scene_tables import metrics_table
 from rotor_mbs.store.read import open_results
 
 RUN = [sys.executable, "-m", "rotor_mbs"]
@@ -127,6 +128,8 @@ def test_settings_are_stored_and_unknown_ones_refused(tmp_path: Path, quick: Pat
     assert rotor_mbs(*command, "relative_tolerance=1e-6", cwd=tmp_path).returncode == 1  # inaccurate
     with open_results(tmp_path / "r.h5") as results:
         assert results.scenes["quick"].runs["lagrange/dop853"].settings["relative_tolerance"] == 1e-6
+        (*_, (cell, *_)) = metrics_table(results.scenes["quick"]).rows
+        assert str(cell.note) == "lagrange/dop853, relative_tolerance = 1e-06"
     assert "1 runs made" in rotor_mbs(*command, "relative_tolerance=1e-7", cwd=tmp_path).stdout
     for wrong, says in (("tolerence=1e-3", "tolerence"), ("relative_tolerance=-1", "-1"), ("x", "NAME=VALUE")):
         refused = rotor_mbs(*command, wrong, cwd=tmp_path)

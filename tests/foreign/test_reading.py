@@ -125,11 +125,12 @@ def test_results_of_this_program_are_data_too(tmp_path: Path) -> None:
     rm.compare(scene, ["lagrange/dop853", "exudyn_tree/rk67"]).save(tmp_path / "r.h5")
     with pytest.raises(RotorError, match=r"several groups; .*paper/fig03/exudyn_tree/rk67"):
         load_data(tmp_path / "r.h5", scene)
-    (tmp_path / "map.toml").write_text('group = "exudyn_tree/rk67"\nrotor = "angles[0]"\n')
-    data = load_data(tmp_path / "r.h5", scene, tmp_path / "map.toml")
-    assert (
-        data.values[:, 0].tobytes() == rm.open(tmp_path / "r.h5")["paper/fig03/exudyn_tree/rk67"].angles[:, 0].tobytes()
-    )
+    stored = rm.open(tmp_path / "r.h5")["paper/fig03/exudyn_tree/rk67"]
+    for columns, count in (('rotor = "angles[0]"\n', 1), ("", 4)):  # a group alone: columns are guessed
+        (tmp_path / "map.toml").write_text(f'group = "exudyn_tree/rk67"\n{columns}')
+        data = load_data(tmp_path / "r.h5", scene, tmp_path / "map.toml")
+        assert len(data.columns) == count
+        assert data.values[:, 0].tobytes() == stored.angles[:, 0].tobytes()
 
 
 def _sparse(path: Path) -> None:
@@ -208,7 +209,7 @@ def test_wrong_arrays_are_refused(arrays: dict[str, object], message: str) -> No
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
-        ('rotr = "a"', "rotr: is not a key here, perhaps rotor; allowed: time, rotor, pitch_1"),
+        ('time = "t"\nrotr = "a"', "map.toml:2: rotr: is not a key here, perhaps rotor; allowed: time, rotor, pitch_1"),
         ('rotor = "c"', "no column 'c'; it has: t, a, b"),
         ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
         ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is not one of them; allowed: 1, -1"),

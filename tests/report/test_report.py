@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
+from rotor_mbs.analysis.campbell import FloquetTable
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report.build import write_report
@@ -33,6 +34,7 @@ from rotor_mbs.report.core.looks import (
     label_of,
     look_of,
 )
+from rotor_mbs.report.pages.modes import multipliers
 from rotor_mbs.report.pages.scene_tables import range_table
 from rotor_mbs.report.plots import time_histories as figures
 from rotor_mbs.report.plots.paths import paths
@@ -212,6 +214,14 @@ def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
     assert ">pitch angle (10⁻⁴ rad)<" in text
     assert ">3.0<" in text
     assert "1e" not in text
+
+
+def test_multipliers_that_differ_tenfold_have_powers_of_ten_as_labels() -> None:
+    ones, small = np.ones(2), np.array([0.02, 0.5])
+    table = FloquetTable(np.array([0.1, 3.0]), np.stack([ones, small], 1), small, np.ones(2, int), ones, ones, ones)
+    text = str(svg.picture(multipliers(table), "n", "t", "d").svg)
+    assert re.findall(r">(10[⁻\d⁰¹²³⁴-⁹]+)<", text) == ["10⁻²", "10⁻¹", "10⁰"]
+    assert "$" not in text
 
 
 def test_no_tick_stands_outside_its_axes() -> None:

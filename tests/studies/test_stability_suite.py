@@ -72,7 +72,8 @@ def test_a_run_judged_by_its_energy_alone_says_so(tmp_path: Path) -> None:
     pytest.importorskip("heyoka")
     path = tmp_path / "needle.h5"
     (one,) = find_scenes(["extreme/needle-fig05-1e-15"])
-    run_scenes([replace(one, samples=2)], {one.name: ["lagrange/taylor"]}, path, workers=0, timeout_s=60.0)
+    run_scenes([replace(one, samples=2)], {one.name: ["lagrange/taylor"]}, path, workers=0, timeout_s=60.0,
+               settings={"tolerance": 1e-15})  # fmt: skip
     (cell,) = suite_runs(path)
     assert (cell.status, cell.outcome) == ("ok", "energy_alone")
     assert cell.message == "judged by its energy alone: the horizon is before the second sample"
@@ -86,6 +87,7 @@ def test_a_run_judged_by_its_energy_alone_says_so(tmp_path: Path) -> None:
     assert "closed form, Taylor: holds on 1 of 1 (1 by its energy alone); use for “on a needle”" in page
     own = (tmp_path / "report" / "extreme-needle-fig05-1e-15.html").read_text(encoding="utf-8")
     assert cell.message in own
+    assert "lagrange/taylor, tolerance = 10⁻¹⁵" in own.replace("<wbr>", "")
 
 
 def test_records_come_back_as_they_were(tmp_path: Path) -> None:

@@ -101,7 +101,7 @@ def test_the_crate_and_croissant_name_every_variable_and_the_content(dataset: Pa
 def test_a_second_dataset_joins_the_crate_and_a_foreign_crate_stays(dataset: Path, tmp_path: Path) -> None:
     for name in ("a.h5", "b.h5", "a.h5"):
         (tmp_path / name).write_bytes(dataset.read_bytes())
-        describe(tmp_path / name)
+        describe(str(tmp_path / name))
     crate = _json(tmp_path / "ro-crate-metadata.json")["@graph"]
     assert [one["@id"] for one in crate if one["@type"] == "File"] == ["a.h5", "b.h5"]
     assert len({one["@id"] for one in crate}) == len(crate)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor_mbs.analysis.campbell import FloquetTable, LinearModes, SceneModes, StabilityChart, floquet_sentence
 from rotor_mbs.analysis.modes import GROWTH, multiblade
-from rotor_mbs.report.core.canvas import Panels, curve, growth_map, panels
+from rotor_mbs.report.core.canvas import Panels, curve, growth_map, log_axis, panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
@@ -197,7 +197,7 @@ def multipliers(table: FloquetTable) -> Panels:
     axes.axhline(1.0, color=GREY, linewidth=0.8)
     known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
     if len(known) and known.max() / known.min() > 10.0:
-        axes.set_yscale("log")
+        log_axis(axes, float(known.min()), float(known.max()))
     elif len(known) and known.max() / known.min() < 1.0 + 10.0 * GROWTH:
         axes.set_ylim(0.9, 1.1)
     axes.set_ylabel("modulus of the multipliers")

@@ -9,7 +9,7 @@ import numpy as np
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.rehydrate import scene_of
-from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
+from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
@@ -36,6 +36,15 @@ def method_cell(name: str) -> TableCell | str:
     """A method's label, and below it the name that the command line and the file have."""
     label = label_of(name)
     return label if label == name else TableCell(label, note=name)
+
+
+def run_cell(run: StoredRun) -> TableCell | str:
+    """A run's method, and below it the settings that are not the method's defaults."""
+    method = look_up(run.method)
+    defaults = {} if method is None else method.defaults
+    own = [f"{name} = {value}" for name, value in run.settings.items() if defaults.get(name, value) != value]
+    note = ", ".join([run.method, *own])
+    return TableCell(label_of(run.method), note=note) if own else method_cell(run.method)
 
 
 def metric(run: StoredRun, name: str) -> float | None:
@@ -71,7 +80,7 @@ def _metrics_row(run: StoredRun) -> Row:
     counts = [metric(run, name) for name in ("steps", "rhs_evaluations")]
     texts += ["" if count is None else f"{count:.0f}" for count in counts]
     texts += [prefixed(metric(run, name), "s") for name in ("setup_time_s", "run_time_s")]
-    return [method_cell(run.method), status_cell(run), *texts]
+    return [run_cell(run), status_cell(run), *texts]
 
 
 def _zero_pitch(run: StoredRun) -> str:

@@ -16,7 +16,7 @@ from rotor_mbs.report.core.numbers import number
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import quantities
 from rotor_mbs.report.pages.scene import opening_comment
-from rotor_mbs.report.pages.scene_tables import horizon, method_cell
+from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.solution.text_table import listed
 from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
@@ -143,7 +143,7 @@ def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[R
         "failures": (),
         "source": opening_comment(scene),
         "toml": str(scene.attributes["scene_toml"]),
-        "outcomes": Section(tables=[_outcome_table(own)]),
+        "outcomes": Section(tables=[_outcome_table(scene, own)]),
         "motion": _motion(run_selection.reference_or_corrected_run(scene)),
         "errors": _errors(scene, runs),
         "steps": _error_over_step(ladders),
@@ -167,7 +167,7 @@ def _lead(scene: StoredScene, own: Sequence[SuiteRun]) -> list[str]:
     ]
 
 
-def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
+def _outcome_table(scene: StoredScene, own: Sequence[SuiteRun]) -> PageTable:
     rows: list[Row] = []
     for cell in own:
         symbol, text = OUTCOMES[cell.outcome]
@@ -176,7 +176,7 @@ def _outcome_table(own: Sequence[SuiteRun]) -> PageTable:
         else:  # the tone brings its own symbol
             outcome = TableCell(text, "bad", note=cell.message)
         numbers = [number(x) for x in (cell.angle_error, cell.energy_drift, cell.run_time_s or None, cell.step)]
-        rows.append([method_cell(cell.method), outcome, *numbers, f"{cell.time_reached:.4g}"])
+        rows.append([run_cell(scene.runs[cell.method]), outcome, *numbers, f"{cell.time_reached:.4g}"])
     head = (
         "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 10⁻⁶ rad (s)",
         "reached (s)",
