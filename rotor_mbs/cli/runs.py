@@ -9,11 +9,13 @@ import time
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
 from rotor_mbs.execution.output_lock import has_unfinished
+from rotor_mbs.execution.pool import local_pool
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.store.hdf5 import replace_file
@@ -23,8 +25,12 @@ from rotor_mbs.studies.reproduce import made_from, summary_of
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
 
+if TYPE_CHECKING:
+    from rotor_mbs.execution.execute import Outcome
+
 # Of the time of `reproduce`: runs, pages.
 _REPRODUCE_PARTS = (0.8, 0.2)
+_PAGES = "rotor_mbs.report.build"
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -63,8 +69,8 @@ def reproduce(arguments: argparse.Namespace) -> int:
     if there and stamp.read_text() == made_from(results, arguments.timeout) and not has_unfinished(results):
         print(f"{results}: nothing to do, every run is there already")
     else:
-        status = _reproduce(arguments, results, pages)
-        replace_file(summary, summary_of(results).encode())
+        status, text = _reproduce(arguments, results, pages)
+        replace_file(summary, text.encode())
         if status == 0:
             replace_file(stamp, made_from(results, arguments.timeout).encode())
     print_text(summary.read_text(encoding="utf-8"))
@@ -72,15 +78,24 @@ def reproduce(arguments: argparse.Namespace) -> int:
     return status
 
 
-def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> int:
-    # The code of the pages is loaded while this process waits for the runs.
-    threading.Thread(target=import_module, args=("rotor_mbs.report.build",)).start()
-    with ProgressLine(parts=_REPRODUCE_PARTS) as progress:
-        report = reproduce_paper(results, workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress)
+def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
+    """The exit status and the summary. One pool does all, so that its processes load code while this one is busy."""
+    load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
+    with local_pool(arguments.jobs, load_runs) as pool, ProgressLine(parts=_REPRODUCE_PARTS) as progress:
+
+        def on_progress(done: int, total: int, outcome: Outcome) -> None:
+            progress(done, total, outcome)
+            if done == total:  # the results are merged now
+                for _ in range(pool.workers):
+                    pool.submit(import_module, _PAGES, arguments.timeout)
+
+        threading.Thread(target=import_module, args=(_PAGES,)).start()
+        report = reproduce_paper(results, workers=pool, timeout_s=arguments.timeout, on_progress=on_progress)
         from rotor_mbs.report.build import write_report
 
-        write_report(results, pages, arguments.jobs, partial(progress.stage, "pages and figures"))
-    return print_summary(report, results)
+        summary = pool.submit(summary_of, results, arguments.timeout)
+        write_report(results, pages, pool, partial(progress.stage, "pages and figures"))
+        return print_summary(report, results), summary.result()
 
 
 def reference(arguments: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeAlias
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.output_lock import RESULTS, writing
-from rotor_mbs.execution.pool import WorkerPool, run_in
+from rotor_mbs.execution.pool import TaskPool, Workers, pool_of, run_in
 
 # Statuses of a case of which there is no record: the same call tries it again.
 NOT_COMPUTED = ("worker_died", "error", "no_reference")
@@ -131,11 +131,11 @@ def _merge(store: Store, parts: Path, *, even_none: bool = False) -> None:
         part.unlink()
 
 
-def in_pool(perform: Perform, workers: int, timeout_s: float, on_time_out: OnTimeOut | None = None) -> JobRunner:
+def in_pool(perform: Perform, workers: Workers, timeout_s: float, on_time_out: OnTimeOut | None = None) -> JobRunner:
     """Computes jobs in parallel processes.
 
     perform       computes a job and writes its part
-    workers       parallel processes; 0: one job after the other in this process
+    workers       parallel processes, or a pool that is open; 0: one job after the other in this process
     timeout_s     of one job; its process is ended where it has not ended itself a while after that
     on_time_out   writes the part of a job whose process was ended, in this process
 
@@ -147,11 +147,11 @@ def in_pool(perform: Perform, workers: int, timeout_s: float, on_time_out: OnTim
         if not workers:
             yield from ((job, perform(job)) for jobs in limited for job in jobs)
             return
-        with WorkerPool(workers) as pool:
+        with pool_of(workers) as pool:
             for jobs in limited:
                 yield from ends(pool, jobs)
 
-    def ends(pool: WorkerPool, jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
+    def ends(pool: TaskPool, jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
         # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
         for end in run_in(pool, perform, jobs, 1.2 * timeout_s + 10.0):
             if isinstance(end.error, RotorError):

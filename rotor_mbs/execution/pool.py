@@ -16,13 +16,13 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import resource_tracker
 from queue import LifoQueue
-from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
-from rotor_mbs.errors import ResourceError
+from rotor_mbs.errors import ResourceError, RotorError
 from rotor_mbs.execution import cores
 
 if TYPE_CHECKING:  # loaded with the first process
@@ -42,7 +42,7 @@ _RETRY_START_S = 1.0  # after the system had no room for a process
 _POLL_S = 1.0  # how often a waiting thread looks whether its pool still works
 
 
-class TaskLostError(Exception):
+class TaskLostError(RotorError):
     """A task left no result. failure: "timed_out" where it was over its limit, "worker_died" where its process died."""
 
     def __init__(self, message: str, failure: str) -> None:
@@ -92,6 +92,9 @@ class TaskPool(ABC):
         self.close()
 
 
+Workers: TypeAlias = int | TaskPool  # how many processes, or a pool that is open
+
+
 class WorkerPool(TaskPool):
     """Worker processes, each of which keeps its state between tasks.
 
@@ -114,7 +117,7 @@ class WorkerPool(TaskPool):
     3
     """
 
-    def __init__(self, workers: int, initializer: Callable[[], None] | None = None, core: int | None = None) -> None:
+    def __init__(self, workers: int, initializer: Callable[[], object] | None = None, core: int | None = None) -> None:
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers)
         self._processes = [_Process(initializer, core) for _ in range(workers)]
@@ -184,9 +187,14 @@ class SerialPool(TaskPool):
         return future
 
 
-def local_pool(workers: int, initializer: Callable[[], None] | None = None) -> TaskPool:
+def local_pool(workers: int, initializer: Callable[[], object] | None = None) -> TaskPool:
     """So many worker processes of this machine; 0: none, tasks run in this process, without a time limit."""
     return WorkerPool(workers, initializer) if workers else SerialPool()
+
+
+def pool_of(workers: Workers) -> AbstractContextManager[TaskPool]:
+    """A `local_pool` that ends with the block, or one that is given, which does not."""
+    return nullcontext(workers) if isinstance(workers, TaskPool) else local_pool(workers)
 
 
 def run_in(
@@ -247,11 +255,6 @@ def one_line(error: BaseException) -> str:
     """The type of an exception and the first line of its text."""
     text = str(error).strip().splitlines()
     return f"{type(error).__name__}: {text[0] if text else 'no message'}"
-
-
-def last_core() -> int | None:
-    """The core to time on: the last allowed one, as the first serves most interrupts; None where that is not known."""
-    return max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
 
 
 @contextmanager
@@ -386,7 +389,7 @@ def _blocked_interrupts() -> Iterator[None]:
 _initial_error: Exception | None = None
 
 
-def _initialize(initializer: Callable[[], None] | None, core: int | None) -> None:
+def _initialize(initializer: Callable[[], object] | None, core: int | None) -> None:
     global _initial_error
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's handler would wait for the engine to return

@@ -14,7 +14,7 @@ from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
-from rotor_mbs.execution.pool import local_pool, run_in
+from rotor_mbs.execution.pool import Workers, pool_of, run_in
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core import files
 from rotor_mbs.report.core.files import Site, page_names, render
@@ -39,9 +39,11 @@ OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
 def write_report(
-    results: Path, output: Path, jobs: int = 1, on_page: OnPage = lambda *_: None, *, checked: bool = False
+    results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None, *, checked: bool = False
 ) -> Path:
-    """Write the pages about any file that this program writes into the folder `output`, with `jobs` processes.
+    """Write the pages about any file that this program writes into the folder `output`.
+
+    jobs: so many processes, or a pool that is open.
 
     Runs, the stability suite, a bench, modes, a sweep: what the file has is one site with one navigation. checked:
     also a page with the verdicts of `check` on its runs, which takes seconds of its own. Returns the path of the index.
@@ -58,7 +60,7 @@ def write_report(
     return output / files.INDEX
 
 
-def _pages(opened: OpenResults, jobs: int, on_page: OnPage, checked: bool) -> dict[str, str]:
+def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -> dict[str, str]:
     """By file name. What comes first is the index."""
     modes, bench, compared = (read_records(opened.path, kind) for kind in ("modes", "bench", "comparison"))
     has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench or compared)
@@ -104,7 +106,12 @@ def _has_errata(opened: OpenResults) -> bool:
 
 
 def _run_pages(
-    opened: OpenResults, site: Site, figures: Sequence[PaperFigure], bench: Sequence[Record], jobs: int, on_page: OnPage
+    opened: OpenResults,
+    site: Site,
+    figures: Sequence[PaperFigure],
+    bench: Sequence[Record],
+    jobs: Workers,
+    on_page: OnPage,
 ) -> dict[str, str]:
     """The index, errata, error against run time, figures one by one, and a page per scene."""
     if not opened.scenes:
@@ -131,14 +138,14 @@ def _run_pages(
     return pages
 
 
-def _parts(context: Context, parts: Sequence[Part], jobs: int, on_page: OnPage) -> dict[Part, Any]:
+def _parts(context: Context, parts: Sequence[Part], jobs: Workers, on_page: OnPage) -> dict[Part, Any]:
     """The parts, in `jobs` processes (in this one where it is 1)."""
-    workers = min(jobs, len(parts))
-    # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
-    count = _GROUPS * workers if workers > 1 else 1
-    groups, found = [parts[start::count] for start in range(count)], dict[Part, Any]()
+    found: dict[Part, Any] = {}
     on_page(0, len(parts))
-    with local_pool(workers if count > 1 else 0) as pool:
+    with pool_of(0 if jobs == 1 else jobs) as pool:
+        # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
+        count = min(_GROUPS * pool.workers, len(parts)) if pool.workers > 1 else 1
+        groups = [parts[start::count] for start in range(count)]
         for finished in run_in(pool, partial(make_parts, context), groups, _TIMEOUT_S):
             if finished.value is None:
                 raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")

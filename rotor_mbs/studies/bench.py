@@ -20,9 +20,10 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
+from rotor_mbs.execution import last_core
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
-from rotor_mbs.execution.pool import WorkerPool, last_core, run_in
+from rotor_mbs.execution.pool import WorkerPool, run_in
 from rotor_mbs.execution.timing import Timings, conduct, statistics
 from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder

@@ -21,7 +21,7 @@ from rotor_mbs.analysis.run_tables import finding_lines, method_table
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Result, ignore_progress
-from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
+from rotor_mbs.execution.pool import OF_THE_MACHINE, Workers, one_line
 from rotor_mbs.execution.provenance import fingerprint, versions
 from rotor_mbs.methods.catalogue import default_methods, errata_methods, ladders
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
@@ -39,7 +39,9 @@ BENCHED = "paper/fig11"
 _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next one takes up to eight times as long
 
 
-def reproduce(output: Path, *, workers: int, timeout_s: float, on_progress: OnProgress = ignore_progress) -> RunReport:
+def reproduce(
+    output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
+) -> RunReport:
     """Into the results file `output`; what it has already is kept. Raises InputError, StoreError."""
     scenes, benched = find_scenes(["paper"]), find_scenes([BENCHED])[0]
     names = (*default_methods(), *errata_methods().values())

@@ -13,7 +13,7 @@ from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.execution.output_lock import RESULTS, writing
-from rotor_mbs.execution.pool import OF_THE_MACHINE, one_line
+from rotor_mbs.execution.pool import OF_THE_MACHINE, Workers, one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     check_names,
@@ -80,7 +80,7 @@ def run_scenes(
     methods: Mapping[str, Sequence[str]],
     output: Path,
     *,
-    workers: int,
+    workers: Workers,
     timeout_s: float,
     settings: Mapping[str, object] | None = None,
     use_frozen: bool = True,
@@ -91,7 +91,7 @@ def run_scenes(
     """Every scene's reference and runs into the results file `output`; what it has already is kept.
 
     methods      by scene name
-    workers      parallel processes; 0: all in this process
+    workers      parallel processes, or a pool that is open; 0: all in this process
     timeout_s    a run over this ends itself, and is stored with the status timed_out
     settings     of the methods that have them, in place of defaults and of the scene's own
     use_frozen   whether a shipped reference may stand for a computed one

@@ -17,16 +17,15 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]
     """Whether a call did the work, which here is to write a results file and an index once; and its exit status."""
     done: list[int] = []
 
-    def work(_arguments: argparse.Namespace, results: Path, pages: Path) -> int:
+    def work(_arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
         done.append(1)
         pages.mkdir(parents=True, exist_ok=True)
         (pages / "index.html").touch()
         if not results.exists():
             results.write_bytes(bytes(1000))
-        return int((tmp_path / "fails").exists())
+        return int((tmp_path / "fails").exists()), "what came out\n"
 
     monkeypatch.setattr(runs, "_reproduce", work)
-    monkeypatch.setattr(runs, "summary_of", lambda _: "what came out\n")
 
     def called(*options: str) -> bool:
         done.clear()
