@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from rotor_mbs.models.lagrange.closed_form import accelerations
+from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import Number, rotor_form
@@ -38,19 +38,8 @@ def motion_at(scene: Scene, times: Array, equations: Accelerations | None = None
 
 def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
     """The closed form with each blade at another angle about the shaft than `Scene.phases`: (blades,) rad."""
-    form = rotor_form(scene)
-    places = [(math.cos(azimuth), math.sin(azimuth)) for azimuth in azimuths]
-    moving = [column - 1 for column in scene.moving_coordinates[1:]]
-    fixed = [i for i in range(len(places)) if i not in moving]
-    turned = replace(
-        form,
-        blades=tuple(
-            replace(blade, cos_phase=places[i][0], sin_phase=places[i][1])
-            for blade, i in zip(form.blades, moving, strict=True)
-        ),
-        fixed=tuple((weight, *places[i]) for (weight, _, _), i in zip(form.fixed, fixed, strict=True)),
-    )
-    return lambda angles, rates, _form, *rest: accelerations(angles, rates, turned, *rest)
+    form = rotor_form(scene, phases=[(Fraction(math.cos(one)), Fraction(math.sin(one))) for one in azimuths])
+    return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, form, *rest)
 
 
 def _sum(*parts: tuple[float, float, float]) -> Accelerations:
@@ -59,7 +48,8 @@ def _sum(*parts: tuple[float, float, float]) -> Accelerations:
     def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
         total = np.zeros(len(rates))
         for weight, spin, pitch in parts:
-            total += weight * np.array(accelerations(angles, [spin * rates[0], *(pitch * w for w in rates[1:])], *rest))
+            parted = [spin * rates[0], *(pitch * rate for rate in rates[1:])]
+            total += weight * np.array(closed_form.accelerations(angles, parted, *rest))
         return total.tolist()
 
     return equations

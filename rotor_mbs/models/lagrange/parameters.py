@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -83,8 +83,12 @@ class RotorForm:
     shaft_damping: Number
 
 
-def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
+def rotor_form(
+    scene: Scene, convert: Convert = float, phases: Sequence[tuple[Fraction, Fraction]] | None = None
+) -> RotorForm:
     """The coefficients of `scene`, each correctly rounded from its exact value by `convert`.
+
+    phases   (blades,) cosines and sines of the mounting angles, where they are not those of `Scene.phases`
 
     The scene's doubles are taken as exact, so that every precision solves the same rotor.
     """
@@ -94,7 +98,7 @@ def rotor_form(scene: Scene, convert: Convert = float) -> RotorForm:
     fixed: list[tuple[Number, Number, Number]] = []
     inertia = Fraction(scene.hub_inertia)
     for i, blade in enumerate(scene.blades):
-        phase = phase_of(i, count)
+        phase = phases[i] if phases else phase_of(i, count)
         if blade.has_pitch_inertia:
             bearing = (Fraction(value) for value in scene.bearing(i))
             values = [*phase, *_coefficients(blade, gravity), *bearing, *_rotor_inertia(blade)]
