@@ -242,18 +242,3 @@ def test_a_loose_tolerance_is_found_out_run_by_run() -> None:
         assert rows["angles"].dtype == np.float32
         assert (rows["steps"] > 10).all()
     assert statuses == {1e-6: ["inaccurate"] * 3, 1e-15: ["ok"] * 3}
-
-
-def test_loads_of_the_fast_path_are_those_of_single_runs() -> None:
-    """One of them with a torque that changes, which runs alone; a run that breaks off is NaN after its end."""
-    outputs = ("angles", "rates", "energy", "loads")
-    scenes = [replace(scene, outputs=outputs) for scene in _perturbed(general(duration=0.5, samples=21), 2)]
-    scenes.append(replace(scenes[0], rotor_torque=((0.0, 0.0), (1.0, 1e4))))
-    block = solve_many(scenes, _EPS)
-    for i, scene in enumerate(scenes):
-        one = solve("lagrange/taylor", scene, {}).trajectory
-        for name in ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment"):
-            exact = one.get(name)
-            assert exact is not None
-            assert np.abs(block.quantities[name][i] - exact).max() < 1e-11 * np.abs(exact).max(), name
-            assert np.array_equal(block.trajectory(i).get(name), block.quantities[name][i])

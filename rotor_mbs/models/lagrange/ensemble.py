@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, hamilton
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.loads import sampled_loads
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.models.lagrange.taylor import (
@@ -73,7 +72,7 @@ class Block:
 
 
 def empty_block(scenes: Sequence[Scene]) -> Block:
-    """Room for their samples, all of which are to be put there; that of loads is made when they are."""
+    """Room for their samples, all of which are to be put there."""
     first, runs = scenes[0], len(scenes)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
     blades = len(first.blades)
@@ -97,7 +96,8 @@ def lanes() -> int:
 
 
 def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
-    """Runs of all `scenes`, which have the same number of blades and samples and the same outputs.
+    """Runs of all `scenes`, which have the same number of blades and samples and the same outputs, loads not among
+    them.
 
     Raises MethodRefusal where heyoka is not installed. A run that breaks off is in the result, cut and with its reason.
     """
@@ -115,19 +115,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
     for places in groups.values():
         of_group = [scenes[i] for i in places]
         _propagate(block, _Group(places, of_group, [rotors[scene.rotor_key] for scene in of_group], tolerance))
-    if scenes[0].wants("loads"):
-        _put_loads(block, scenes)
     return block
-
-
-def _put_loads(block: Block, scenes: Sequence[Scene]) -> None:
-    """Adds the loads of every run by itself, from its angles and rates."""
-    for i, (scene, n) in enumerate(zip(scenes, block.samples, strict=True)):
-        angles, rates = (block.quantities[name][i, :n] for name in ("angles", "rates"))
-        found = sampled_loads(scene, block.time[i, :n], angles, rates)
-        for name, values in found.items():
-            shape = (*block.time.shape, *values.shape[1:])
-            block.quantities.setdefault(name, np.full(shape, np.nan))[i, :n] = values
 
 
 def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
