@@ -79,13 +79,20 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
 
     Where there is none, `message` says why. Raises MethodRefusal where heyoka is not installed.
     """
+    try:
+        return _closed_turn(scene, speed, guess)
+    except InputError as exc:
+        size = 2 * len(scene.moving_coordinates)
+        nothing, matrix = np.full(size, np.nan), np.full((size, size), np.nan)
+        return Turn(speed, nothing, math.nan, matrix, nothing, nothing, math.nan, math.nan, str(exc))
+
+
+def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
+    """As `periodic_turn`. Raises InputError where there is none."""
     system = _Variational(scene)
     n = system.coordinates
     if guess is None:
-        try:
-            angles = steady_rotation(scene, speed)[scene.moving_coordinates]
-        except InputError as exc:
-            return _not_found(speed, n, str(exc))
+        angles = steady_rotation(scene, speed)[scene.moving_coordinates]
         state, torque = np.concatenate([angles, [speed], np.zeros(n - 1)]), holding_torque(scene, speed)
     else:
         state, torque = guess.start * np.repeat([1.0, speed / guess.speed], n), guess.torque
@@ -95,9 +102,8 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
     shift[0] = 2.0 * math.pi
     best: Turn | None = None
     for _ in range(_CORRECTIONS):
-        end, by_state, by_torque, trace, message = system.propagate(state, torque, period)
-        if message:
-            return _not_found(speed, n, message)
+        end, derivatives, trace = system.propagate(state, torque, period)
+        by_state, by_torque = derivatives[:, :-1], derivatives[:, -1]
         residual = (end - state - shift) / units
         mismatch = float(np.abs(residual).max())
         if best is None or mismatch < best.mismatch:
@@ -110,13 +116,8 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
         torque, state = torque + change[0], state + np.concatenate([[0.0], change[1:]])
     if best is None or best.mismatch > _ACCEPTED:
         left = math.inf if best is None else best.mismatch
-        return _not_found(speed, n, f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
+        raise InputError(f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
     return best
-
-
-def _not_found(speed: float, n: int, message: str) -> Turn:
-    nothing, matrix = np.full(2 * n, np.nan), np.full((2 * n, 2 * n), np.nan)
-    return Turn(speed, nothing, math.nan, matrix, nothing, nothing, math.nan, math.nan, message)
 
 
 def _invariants(scene: Scene, state: Array, torque: float) -> tuple[Array, Array]:
@@ -159,8 +160,11 @@ class _Variational:
         still = linearize(scene, scene.initial_angles, [0.0] * len(scene.initial_angles), 0.0)
         self._frequency = math.sqrt(np.abs(still.stiffness).max())
 
-    def propagate(self, state: Array, torque: float, period: float) -> tuple[Array, Array, Array, float, str]:
-        """State after a turn, its derivatives by initial state and torque, ∫ tr A dt; a message where it failed."""
+    def propagate(self, state: Array, torque: float, period: float) -> tuple[Array, Array, float]:
+        """(2n,) state after a turn, (2n, 2n + 1) its derivatives by initial state and torque, and ∫ tr A dt.
+
+        Raises InputError where it does not get there.
+        """
         count, integrator = len(state), self._integrator
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0
@@ -169,6 +173,7 @@ class _Variational:
         message = failure(integrator.propagate_until(period, max_steps=most)[0])
         if "step_limit" in message:
             message = f"no periodic motion found: a turn takes more than {most} steps"
+        if message:
+            raise InputError(message)
         whole = np.array(integrator.state)
-        derivatives = whole[count:-1].reshape(count, count + 1)
-        return whole[:count], derivatives[:, :count], derivatives[:, count], float(whole[-1]), message
+        return whole[:count], whole[count:-1].reshape(count, count + 1), float(whole[-1])
