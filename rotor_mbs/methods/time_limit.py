@@ -24,36 +24,33 @@ class OutOfTimeError(Exception):
 class _State:
     end = math.inf
     polled = False
-    reported = False
+    is_over = False  # as the signal, or who asked, has found
     has_signal = False
-    signalled = False
 
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
     """Raises OutOfTimeError in the block after `seconds` (inf: never), except inside `polled`."""
-    usable = hasattr(signal, "SIGALRM") and threading.current_thread() is threading.main_thread()
     if seconds > _LONGEST_S:
         yield
         return
-    _State.end, _State.reported = time.monotonic() + seconds, False
-    _State.has_signal, _State.signalled = usable, False
-    if usable:
+    has_signal = hasattr(signal, "SIGALRM") and threading.current_thread() is threading.main_thread()
+    _State.end, _State.is_over, _State.has_signal = time.monotonic() + seconds, False, has_signal
+    if has_signal:
         before = signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
-        if usable:
+        if has_signal:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             signal.signal(signal.SIGALRM, before)
-        _State.end, _State.reported = math.inf, False
-        _State.has_signal, _State.signalled = False, False
+        _State.end, _State.is_over = math.inf, False
 
 
 def _interrupt(_number: int, _frame: object) -> None:
-    _State.signalled = True
-    if not (_State.polled or _State.reported):
+    was_known, _State.is_over = _State.is_over, True
+    if not (_State.polled or was_known):
         raise OutOfTimeError(message())
 
 
@@ -76,14 +73,14 @@ def step_callback() -> Callable[[object], bool] | None:
     if math.isinf(_State.end):
         return None
     if _State.has_signal:
-        return lambda _: not _State.signalled
+        return lambda _: not _State.is_over
     return lambda _: not is_over()
 
 
 def is_over() -> bool:
-    """Whether the limit is reached; once it has been reported, a late signal interrupts no more."""
-    _State.reported = _State.reported or _State.signalled or time.monotonic() > _State.end
-    return _State.reported
+    """Whether the limit is reached; once that is known, a late signal interrupts no more."""
+    _State.is_over = _State.is_over or time.monotonic() > _State.end
+    return _State.is_over
 
 
 def message() -> str:
