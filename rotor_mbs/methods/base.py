@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -173,11 +174,4 @@ def late(place: str) -> Callable[..., Any]:
 
 def stability_polynomial(*coefficients: float) -> Callable[[complex], complex]:
     """R(z) of an explicit Runge-Kutta method, from its coefficients of z⁰ up."""
-
-    def function(z: complex) -> complex:
-        value = 0j
-        for coefficient in reversed(coefficients):
-            value = value * z + coefficient
-        return value
-
-    return function
+    return lambda z: functools.reduce(lambda value, coefficient: value * z + coefficient, reversed(coefficients), 0j)

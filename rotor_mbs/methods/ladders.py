@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 STEP, TOLERANCE = "step", "tolerance"
 
@@ -62,16 +63,9 @@ class Ladder:
         return {setting: {**self.choices, **self.fill(setting)} for setting in settings}
 
 
-def step_ladder(
-    count: int,
-    choices: Mapping[str, object] | None = None,
-    variant: str = "",
-    label: str = "",
-    look: Look | None = None,
-) -> Ladder:
-    """`count` values of the setting `step`, from the sample interval down by halves."""
-    values = tuple(0.5**k for k in range(count))
-    return Ladder(STEP, values, lambda step: {"step": step}, choices or {}, variant, label, look)
+def step_ladder(count: int, first: int = 0, **facts: Any) -> Ladder:
+    """`count` values of the setting `step`, by halves from 0.5**first of the sample interval; facts: of a `Ladder`."""
+    return Ladder(STEP, tuple(0.5**k for k in range(first, first + count)), lambda step: {"step": step}, **facts)
 
 
 def tolerance_ladder(fill: Callable[[float], Mapping[str, object]], *tolerances: float) -> Ladder:

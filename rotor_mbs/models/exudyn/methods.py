@@ -145,22 +145,28 @@ _RADII = {0.9: ("", "", "-", "-."), 0.7: ("_rho0.7", "ρ∞ 0.7", "--", "--"), 1
 _NODES = {"euler_parameters": ("", "", "^"), "rotation_vector": ("_rotation_vector", "rotation vector", ">")}
 
 _TREE_ALPHA_LADDERS = tuple(
-    step_ladder(8, {"spectral_radius": radius}, variant, label, Look(_YELLOW, line, "^"))
+    step_ladder(8, choices={"spectral_radius": radius}, variant=variant, label=label, look=Look(_YELLOW, line, "^"))
     for radius, (variant, label, line, _) in _RADII.items()
 )
 _CHAIN_ALPHA_LADDERS = tuple(
     step_ladder(
         7,
-        {"spectral_radius": radius, "node": node},
-        of_radius[0] + of_node[0],
-        ", ".join(filter(None, (of_radius[1], of_node[1]))),
-        Look(_GREEN, of_radius[3], of_node[2]),
+        choices={"spectral_radius": radius, "node": node},
+        variant=of_radius[0] + of_node[0],
+        label=", ".join(filter(None, (of_radius[1], of_node[1]))),
+        look=Look(_GREEN, of_radius[3], of_node[2]),
     )
     for (node, of_node), (radius, of_radius) in product(_NODES.items(), _RADII.items())
 )
 _NEWMARK_LADDERS = (
-    step_ladder(7, {"node": "euler_parameters"}),
-    step_ladder(7, {"node": "rotation_vector"}, "_rotation_vector", "rotation vector", Look(_PURPLE, ":", "p")),
+    step_ladder(7, choices={"node": "euler_parameters"}),
+    step_ladder(
+        7,
+        choices={"node": "rotation_vector"},
+        variant="_rotation_vector",
+        label="rotation vector",
+        look=Look(_PURPLE, ":", "p"),
+    ),
 )
 
 METHODS = (

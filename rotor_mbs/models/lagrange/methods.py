@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from rotor_mbs.methods.base import Look, Method, RunBlock
+from rotor_mbs.methods.base import Look, Method, late
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.lagrange import heyoka_adapter, reference, taylor
-from rotor_mbs.models.lagrange.ode_solvers import Integrator, OdeSolver, ode45_integrator, scipy_integrator
+from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.linearization import Linearization
 
 _EPS = float(np.finfo(float).eps)
+_SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 _BLUE, _LIGHT_BLUE = "#0072b2", "#56b4e9"
 
 
@@ -55,23 +55,10 @@ class RadauSettings(Settings):
     absolute_tolerance: float = _absolute(1e-11)
 
 
-def _taylor_many(scenes: Sequence[Scene], settings: TaylorSettings) -> RunBlock:
-    from rotor_mbs.models.lagrange.ensemble import solve_many
-
-    return solve_many(scenes, settings.tolerance)
-
-
 def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
     from rotor_mbs.models.lagrange.linearization import linearize
 
     return linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], torque)
-
-
-def _ode_solver(make: Callable[[float, float], Integrator]) -> Callable[[Scene, Any], OdeSolver]:
-    def build(scene: Scene, settings: Any) -> OdeSolver:
-        return OdeSolver(scene, make(settings.relative_tolerance, settings.absolute_tolerance))
-
-    return build
 
 
 def _scipy_method(
@@ -83,7 +70,9 @@ def _scipy_method(
         label=f"closed form, {solver}",
         look=look,
         settings=settings,
-        build=_ode_solver(lambda relative, absolute: scipy_integrator(solver, relative, absolute)),
+        build=lambda scene, chosen: OdeSolver(
+            scene, scipy_integrator(solver, chosen.relative_tolerance, chosen.absolute_tolerance)
+        ),
         items=equation_items,
         distributions=("scipy",),
         ladders=(ladder,),
@@ -103,7 +92,7 @@ METHODS = (
             scene, tol=settings.tolerance, compact_mode=taylor.is_compact(scene), high_accuracy=True
         ),
         items=taylor.items,
-        solve_many=_taylor_many,
+        solve_many=lambda scenes, settings: late(_SOLVE_MANY)(scenes, settings.tolerance),
         load=heyoka_adapter.compile_anew,
         distributions=("heyoka",),
         fallback="lagrange/dop853",
@@ -121,7 +110,9 @@ METHODS = (
         label="closed form, Dormand-Prince 5(4)",
         look=Look(_LIGHT_BLUE, "-", "v"),
         settings=Ode45Settings,
-        build=_ode_solver(ode45_integrator),
+        build=lambda scene, chosen: OdeSolver(
+            scene, ode45_integrator(chosen.relative_tolerance, chosen.absolute_tolerance)
+        ),
         items=equation_items,
         ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
         cost_scaling={"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},

@@ -9,7 +9,7 @@ from typing import Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
-from rotor_mbs.methods.ladders import STEP, Ladder, step_ladder
+from rotor_mbs.methods.ladders import step_ladder
 from rotor_mbs.methods.settings import Settings, step
 from rotor_mbs.models.mujoco import mjcf
 from rotor_mbs.scenario.scene import Scene
@@ -62,9 +62,6 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
     )
 
 
-# Of a first-order method, from a thirty-second of the sample interval: above that nothing is left of a motion.
-_FINE_LADDER = Ladder(STEP, tuple(0.5**k for k in range(5, 15)), lambda step: {"step": step})
-
 METHODS = (
     _method(
         "rk4", "RK4", look=Look(_PURPLE, "--", "X"), settings=Rk4Settings, order=4,
@@ -73,8 +70,9 @@ METHODS = (
         linearize=late("rotor_mbs.models.mujoco.solver:linearize"),
     ),
     # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
+    # The ladder of this first-order method begins where something is left of a motion.
     _method(
         "implicitfast", "implicit fast", look=Look(_PURPLE, "-.", "h"), settings=ImplicitFastSettings, order=1,
-        ladders=(_FINE_LADDER,), cost_scaling={"step": 1e-3},
+        ladders=(step_ladder(10, first=5),), cost_scaling={"step": 1e-3},
     ),
 )  # fmt: skip
