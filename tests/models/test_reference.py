@@ -17,7 +17,9 @@ from rotor_mbs.execution.pool import WorkerPool, run_in
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
 from rotor_mbs.models.lagrange.loads import quad_loads, sampled_loads
-from rotor_mbs.models.lagrange.reference import FallbackReference, ReferenceSolver, build, reference_at, uncertainty
+from rotor_mbs.models.lagrange.methods import ReferenceSettings
+from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
+from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, reference_at, uncertainty
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import scene_hash
@@ -144,7 +146,7 @@ def test_a_reference_has_loads_where_they_are_asked_for() -> None:
     scene = paper("fig03", duration=0.1, samples=3)
     assert "blade_root_force" not in solve("reference", scene, {}).trajectory.quantities
     scene = replace(scene, outputs=("angles", "rates", "loads"))
-    solver = ReferenceSolver(scene, 1e-30, 1e-33)
+    solver = build(scene, ReferenceSettings())
     solver.integrate()
     found = solver.observe()
     name, at_doubles = "blade_root_force", sampled_loads(scene, found.time, found.angles, found.rates)
@@ -152,28 +154,34 @@ def test_a_reference_has_loads_where_they_are_asked_for() -> None:
     assert found.quantities[name].tobytes() == in_quad[name].tobytes() != at_doubles[name].tobytes()
 
 
-@pytest.mark.parametrize("kind", [ReferenceSolver, FallbackReference])
+@pytest.mark.parametrize("is_available", [True, False])
 @pytest.mark.parametrize("shorter", [0, 1])
-def test_a_reference_of_which_one_run_ends_early(kind: Any, shorter: int) -> None:
-    """In quad precision it ends there, too; the fallback's uncertainty is infinite past the end of the looser run."""
+@pytest.mark.parametrize("rows", [1, 3])
+def test_a_reference_of_which_one_run_ends_early_ends_there(
+    is_available: bool, shorter: int, rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In quad precision and without heyoka: past that nothing bounds the error."""
     pytest.importorskip("heyoka")
+    monkeypatch.setattr(reference_module, "is_available", lambda: is_available)
     scene = paper("fig03", duration=0.1, samples=4, outputs=("angles", "rates"))
-    solver = kind(scene, 1e-30, 1e-33) if kind is ReferenceSolver else kind(scene)
+    solver = build(scene, ReferenceSettings())
     solver.integrate()
-    name, run = "states" if kind is ReferenceSolver else "_states", solver._runs[shorter]
-    setattr(run, name, getattr(run, name)[:1])
+    whole = solver.observe()
+    solver._runs[shorter].states = solver._runs[shorter].states[:rows]
     found = solver.observe()
-    rows = 4 if kind is FallbackReference and shorter else 1
-    assert len(found.time) == len(found.error_growth) == rows
-    assert np.isfinite(found.angle_uncertainty).tolist() == [True] + [False] * (rows - 1)
-    assert found.error_growth[0] == pytest.approx(1.0, rel=1e-6)  # the fallback's are quotients of differences of 1e-9
+    assert found.error_growth is not None
+    assert len(found.time) == len(found.error_growth) == len(found.angle_uncertainty) == rows
+    assert found.angles.tobytes() == whole.angles[:rows].tobytes()
+    assert found.angle_uncertainty.tobytes() == whole.angle_uncertainty[:rows].tobytes()
+    # Without heyoka quotients of differences of 1e-9.
+    np.testing.assert_allclose(found.error_growth, whole.error_growth[:rows], rtol=1e-6)
 
 
 def test_where_heyoka_is_not_installed_the_fallback_takes_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reference_module, "is_available", lambda: False)
     monkeypatch.setattr(reference_module, "Propagation", None)
     scene = paper("fig03", duration=0.1, samples=3)
-    assert isinstance(build(scene, None), FallbackReference)
+    assert all(isinstance(run, OdeSolver) for run in build(scene, None)._runs)
     assert len(reference_at(scene, np.linspace(0.0, 0.1, 3)).trajectory.time) == 3
 
 

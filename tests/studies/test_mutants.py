@@ -92,7 +92,7 @@ EQUIVALENT = {
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"kinematics\._frames .*:25: s -> c": "zeros of its shape",
     r"exact\._pendulum .*sign in ellipk": "sn is the same on both sides of its quarter period",
-    r"reference\.transition_matrices .*sign of start\[i\]": "all columns change their sign, their norms do not",
+    r"reference\._matrices_by_quotients .*sign of start\[i\]": "all columns change their sign, their norms do not",
     r"adapter\.linearized .*0 -> 1": "a column of zeros among the joints' directions hinders no motion",
     r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": "nobody asks for the scale of a run without energies",
 }

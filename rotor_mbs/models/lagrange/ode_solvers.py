@@ -30,7 +30,7 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 class OdeSolver:
     """Any integrator over the scene, one call per segment of the loads.
 
-    times           as of `taylor.Propagation`
+    times, states   as of `taylor.Propagation`
     accelerations   the equations, where they are not the closed form as it is
     """
 
@@ -50,10 +50,10 @@ class OdeSolver:
         start = [np.array(scene.initial_angles)[columns], np.array(scene.initial_rates)[columns]]
         self._initial = np.concatenate([*start, np.zeros(int(self._work_unit > 0.0))])
         self._times = sample_times(scene) if times is None else times
-        self._states: Array = self._initial[None, :]
+        self.states: Array = self._initial[None, :]
 
     def integrate(self) -> Integration:
-        self._states, integration = over_segments(self._times, self._segments, self._initial, self._advance)
+        self.states, integration = over_segments(self._times, self._segments, self._initial, self._advance)
         return integration
 
     def _advance(self, segment: Segment, state: Array, times: Array) -> Advance:
@@ -83,7 +83,7 @@ class OdeSolver:
         return derivative
 
     def observe(self) -> Trajectory:
-        states = self._states.copy()
+        states = self.states.copy()
         if self._work_unit:
             states[:, -1] *= self._work_unit
         return samples.trajectory(self._scene, self._times, states)

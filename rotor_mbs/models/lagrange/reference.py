@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.loads import quad_loads
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
@@ -27,29 +26,41 @@ SAFETY = 10.0
 _QUAD_EPSILON = 2.0**-112
 
 
-class ReferenceSolver:
-    """Two quad runs and the double precision variational equations over the scene's sample times.
+# Where heyoka is not installed: DOP853 at the tightest that SciPy takes, 100 eps, and a hundred times looser beside it,
+# which shows how much the tolerance still decides.
+_TIGHTEST = (2.3e-14, 1e-16)
+_LOOSER = (2.3e-12, 1e-14)
+_DOUBLE_EPSILON = float(np.finfo(float).eps)
+# Far above round-off, far below what bends the neighbouring trajectory away from the linear.
+_PERTURBATION = 1e-9
 
-    The tolerance of the run that is kept is a thousandth of the other's: their distance is the truncation error of the
-    other, or, where both are at quad round-off, of the size of that.
+
+class ReferenceSolver:
+    """Two runs over the scene's sample times, and how errors grow along them.
+
+    The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka a hundredth): their
+    distance is the truncation error of the other, or, where both are at round-off, of the size of that.
+
+    epsilon  of the runs' arithmetic
     """
 
-    def __init__(self, scene: Scene, tolerance: float, check_tolerance: float) -> None:
-        self._scene = scene
-        self._runs = [Propagation(scene, quad=True, tol=tol, compact_mode=True) for tol in (tolerance, check_tolerance)]
+    def __init__(self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float) -> None:
+        self._scene, self._runs, self._epsilon = scene, runs, epsilon
 
     def integrate(self) -> Integration:
         best, check = (run.integrate() for run in self._runs)
-        return best if not best.success else replace(check, time_reached=best.time_reached, steps=best.steps)
+        failed = best if not best.success else check
+        return replace(best, success=failed.success, message=failed.message, out_of_time=failed.out_of_time)
 
     def observe(self) -> Trajectory:
         rows = min(len(run.states) for run in self._runs)
         best, check = (run.states[:rows] for run in self._runs)
-        result = samples.trajectory(self._scene, self._runs[0].times, best.astype(float))
-        if self._scene.wants("loads"):
+        self._runs[0].states = best
+        result = self._runs[0].observe()
+        if self._scene.wants("loads") and best.dtype != np.float64:
             result.quantities |= quad_loads(self._scene, result.time, best)
         difference = np.abs((best - check)[:, : len(self._scene.moving_coordinates)]).astype(float).max(axis=1)
-        result.angle_uncertainty = uncertainty(difference, result.angles, _QUAD_EPSILON)
+        result.angle_uncertainty = uncertainty(difference, result.angles, self._epsilon)
         # Over what was reached: the rest of a run that its time limit ended may take for ever.
         if rows > 1:
             reached = replace(self._scene, duration=float(result.time[-1]), samples=rows)
@@ -74,11 +85,20 @@ def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
     return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
 
 
-def build(scene: Scene, settings: Any) -> ReferenceSolver | FallbackReference:
-    """In quad precision with heyoka; without it the fallback, whose uncertainty is larger by many orders."""
+def build(scene: Scene, settings: Any) -> ReferenceSolver:
+    """In quad precision with heyoka; without it by DOP853, with an uncertainty that is larger by many orders."""
     if not is_available():
-        return FallbackReference(scene)
-    return ReferenceSolver(scene, settings.tolerance, settings.check_tolerance)
+        return ReferenceSolver(scene, [_in_doubles(scene, one) for one in (_TIGHTEST, _LOOSER)], _DOUBLE_EPSILON)
+    tolerances = settings.tolerance, settings.check_tolerance
+    return ReferenceSolver(scene, [_in_quad(scene, tolerance) for tolerance in tolerances], _QUAD_EPSILON)
+
+
+def _in_quad(scene: Scene, tolerance: float, times: Array | None = None) -> Propagation:
+    return Propagation(scene, quad=True, tol=tolerance, compact_mode=True, times=times)
+
+
+def _in_doubles(scene: Scene, tolerances: tuple[float, float], times: Array | None = None) -> OdeSolver:
+    return OdeSolver(scene, scipy_integrator("DOP853", *tolerances), times)
 
 
 def error_growth(scene: Scene) -> Array:
@@ -87,15 +107,40 @@ def error_growth(scene: Scene) -> Array:
     The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the
     variational equations of the closed form; infinite once it is past what double precision can hold.
     """
-    return _largest_growth(scene, _transition_matrices(scene))
+    return _largest_growth(scene, _variational_matrices(scene))
 
 
-def _transition_matrices(scene: Scene, times: Array | None = None) -> Array:
-    """(n, 2k, 2k) from the variational equations, for k coordinates that move."""
+def _transition_matrices(scene: Scene, times: Array) -> Array:
+    """(n, 2k, 2k) for k coordinates that move, as far as the motion goes."""
+    return _variational_matrices(scene, times) if is_available() else _matrices_by_quotients(scene, times)
+
+
+def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
     count = 2 * len(scene.moving_coordinates)
     propagation = Propagation(scene, variational=True, compact_mode=True, times=times)
     propagation.integrate()
     return np.asarray(propagation.states[:, count:].reshape(-1, count, count))
+
+
+def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
+    """From one more run for each initial value, perturbed."""
+    moving = scene.moving_coordinates
+
+    def states(start: Scene) -> Array:
+        run = _in_doubles(start, _TIGHTEST, times)
+        run.integrate()
+        return run.states[:, : 2 * len(moving)]
+
+    here, columns = states(scene), []
+    for name, i in itertools.product(("initial_angles", "initial_rates"), moving):
+        start = list(getattr(scene, name))
+        start[i] += _PERTURBATION
+        beside: dict[str, Any] = {name: tuple(start)}
+        near = states(replace(scene, **beside))
+        rows = min(len(near), len(here))
+        columns.append(np.full_like(here, np.inf))
+        columns[-1][:rows] = (near[:rows] - here[:rows]) / _PERTURBATION
+    return np.stack(columns, axis=-1)
 
 
 def _largest_growth(scene: Scene, matrices: Array) -> Array:
@@ -135,16 +180,10 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
 
     In quad precision with heyoka, else by DOP853 at its tightest.
     """
-    if is_available():
-        run = Propagation(scene, quad=True, tol=_QUAD, compact_mode=True, times=times)
-        run.integrate()
-        trajectory = run.observe()
-        matrices = _transition_matrices(scene, times)
-        trajectory.error_growth = _largest_growth(scene, matrices)[: len(trajectory.time)]
-    else:
-        fallback = FallbackReference(scene, times)
-        fallback.integrate()
-        trajectory, matrices = fallback.observe(), fallback.transition_matrices()
+    run = _in_quad(scene, _QUAD, times) if is_available() else _in_doubles(scene, _TIGHTEST, times)
+    run.integrate()
+    trajectory, matrices = run.observe(), _transition_matrices(scene, times)
+    trajectory.error_growth = _largest_growth(scene, matrices)[: len(trajectory.time)]
     rows, moving, count = len(trajectory.time), scene.moving_coordinates, len(scene.initial_angles)
     columns = [*moving, *(count + i for i in moving)]
     units, growth = np.ones(2 * count), np.ones((rows, 2 * count))
@@ -155,58 +194,3 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
         norms = np.linalg.norm(_in_units(scene, matrices[:known]), axis=2)
     growth[np.ix_(range(known), columns)] = np.where(np.isfinite(norms), norms, np.inf)
     return TimedReference(trajectory, growth, units)
-
-
-# Where heyoka is not installed: DOP853 at its tightest, with the larger uncertainty that it has.
-
-# The tightest SciPy takes is 100 eps; a hundred times looser beside it shows how much the tolerance still decides.
-_TIGHTEST = (2.3e-14, 1e-16)
-_LOOSER = (2.3e-12, 1e-14)
-
-# Far above round-off, far below what bends the neighbouring trajectory away from the linear.
-_PERTURBATION = 1e-9
-
-
-class FallbackReference:
-    """Two DOP853 runs, and one more for each initial value, perturbed, to see how errors grow."""
-
-    def __init__(self, scene: Scene, times: Array | None = None) -> None:
-        self._scene, self._times = scene, times
-        self._runs = [
-            OdeSolver(scene, scipy_integrator("DOP853", *tolerances), times) for tolerances in (_TIGHTEST, _LOOSER)
-        ]
-
-    def integrate(self) -> Integration:
-        best, _ = (run.integrate() for run in self._runs)
-        return best
-
-    def observe(self) -> Trajectory:
-        result, check = (run.observe() for run in self._runs)
-        rows = min(len(result.time), len(check.time))
-        difference = np.full(len(result.time), np.inf)
-        difference[:rows] = np.abs(result.angles[:rows] - check.angles[:rows]).max(axis=1)
-        result.angle_uncertainty = uncertainty(difference, result.angles, float(np.finfo(float).eps))
-        result.error_growth = _largest_growth(self._scene, self.transition_matrices())[: len(result.time)]
-        return result
-
-    def transition_matrices(self) -> Array:
-        """(n, 2k, 2k) by difference quotients, in place of the variational equations."""
-        moving = self._scene.moving_coordinates
-        state = _state(self._runs[0].observe(), moving)
-        columns = []
-        for name, i in itertools.product(("initial_angles", "initial_rates"), moving):
-            start = list(getattr(self._scene, name))
-            start[i] += _PERTURBATION
-            beside: dict[str, Any] = {name: tuple(start)}
-            solver = OdeSolver(replace(self._scene, **beside), scipy_integrator("DOP853", *_TIGHTEST), self._times)
-            solver.integrate()
-            near = _state(solver.observe(), moving)
-            column = np.full_like(state, np.inf)
-            rows = min(len(near), len(state))
-            column[:rows] = (near[:rows] - state[:rows]) / _PERTURBATION
-            columns.append(column)
-        return np.stack(columns, axis=-1)
-
-
-def _state(run: Trajectory, moving: Sequence[int]) -> Array:
-    return np.hstack([run.angles[:, moving], run.rates[:, moving]])
