@@ -96,9 +96,12 @@ def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
         with ExitStack() as stack:
             results = stack.enter_context(open_results(path, verify=False))
             shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
-            return verdicts(results, shipped, bounds)
+            found = verdicts(results, shipped, bounds)
     except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
         raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
+    if path.resolve() in shipped_files():  # their digests stand beside them
+        found = [one for one in found if one.check != "integrity"] + judge_frozen(bounds, [path])
+    return found
 
 
 def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Verdict]:
@@ -142,10 +145,10 @@ def judge_defaults(bounds: Bounds) -> list[Verdict]:
     return found
 
 
-def judge_frozen(bounds: Bounds) -> list[Verdict]:
-    """Every shipped reference against its digests, one verdict a scene."""
+def judge_frozen(bounds: Bounds, paths: Sequence[Path] = ()) -> list[Verdict]:
+    """Every shipped reference, or those of `paths`, against the digests beside its file, one verdict a scene."""
     found = []
-    for path in shipped_files():
+    for path in paths or shipped_files():
         with open_results(path) as results:
             try:
                 scenes = changed_arrays(results)

@@ -368,6 +368,18 @@ def test_a_frozen_reference_touched_in_its_last_bit_fails(own_references: Path) 
     assert "paper.h5: angles not as frozen" in verdict_formats.line(verdict)
 
 
+def test_a_shipped_reference_is_judged_by_the_digests_beside_it(own_references: Path) -> None:
+    """It has none inside: it would fail for what it is."""
+    path = own_references / "check.h5"
+    found = check.judge_file(path, load_bounds())
+    assert not failed(found)
+    assert {one.scene for one in found if one.check == "frozen"} == {one.scene for one in found}
+    with h5py.File(path, "r+") as file:
+        file["check/held/reference/error_growth"][5] *= 1.0 + 1e-15
+    (verdict,) = failed(check.judge_file(path, load_bounds()))
+    assert (verdict.check, verdict.scene, verdict.channel) == ("frozen", "check/held", "error_growth")
+
+
 def test_a_frozen_reference_gone_added_or_without_digests_fails(own_references: Path) -> None:
     with h5py.File(own_references / "check.h5", "r+") as file:
         file["check/held/reference/angles2"] = np.zeros(3)
