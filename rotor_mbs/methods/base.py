@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # reading the catalogue needs none of them
     from rotor_mbs.scenario.accuracy_bounds import Bound
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.linearization import Linearization
-    from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+    from rotor_mbs.solution.trajectory import Integration, RunBlock, Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,24 +39,6 @@ class Solver(Protocol):
 
     def observe(self) -> Trajectory:
         """Samples of the last integration, cut before the first row that is not finite."""
-
-
-class RunBlock(Protocol):
-    """Many runs at once, of scenes with the same number of blades and samples and the same outputs.
-
-    quantities              by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
-    integrations, samples   what the engine reports of each run, and how many samples it has
-    """
-
-    @property
-    def integrations(self) -> Sequence[Integration]: ...
-    @property
-    def samples(self) -> Sequence[int]: ...
-    @property
-    def quantities(self) -> Mapping[str, Array]: ...
-
-    def trajectory(self, i: int) -> Trajectory:
-        """Run i alone, cut where it broke off."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.quantities import NAMES, Array, sample_times
-
-__all__ = ["Array", "Integration", "Trajectory", "all_coordinates", "finite_rows", "finite_samples", "sample_times"]
+from rotor_mbs.solution.quantities import NAMES
+from rotor_mbs.solution.quantities import Array as Array  # with the samples, for the models
+from rotor_mbs.solution.quantities import sample_times as sample_times
 
 
 class Trajectory:
@@ -90,6 +90,35 @@ class Integration:
     steps: int | None = None
     rhs_evaluations: int | None = None
     out_of_time: bool = False
+
+
+@dataclass
+class RunBlock:
+    """Many runs at once, of scenes with the same number of blades and samples and the same outputs.
+
+    time            (runs, samples) s
+    quantities      by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
+    integrations    the engine's report of each run
+    samples         how many rows of each are finite
+    """
+
+    time: Array
+    quantities: dict[str, Array]
+    integrations: list[Integration]
+    samples: list[int]
+
+    def trajectory(self, i: int) -> Trajectory:
+        """Run i alone, cut where it broke off."""
+        n = self.samples[i]
+        return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
+
+    def end(self, i: int, integration: Integration, samples: int) -> None:
+        """Run i has so many samples, though a fixed pitch, or a term that vanishes, stays finite for longer."""
+        if samples < self.time.shape[1]:
+            for values in self.quantities.values():
+                values[i, samples:] = np.nan
+        integration.time_reached = float(self.time[i, max(samples - 1, 0)])
+        self.integrations[i], self.samples[i] = integration, samples
 
 
 def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, Array]:

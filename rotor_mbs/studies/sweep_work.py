@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.base import Method, RunBlock
+from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
@@ -23,7 +23,7 @@ from rotor_mbs.solution.metrics import energy_drifts, horizon, largest, running_
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, RunBlock, Trajectory
 from rotor_mbs.store.sweep_columns import AMPLIFICATION, MESSAGE_BYTES, METRICS, Rows, RunColumns
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes

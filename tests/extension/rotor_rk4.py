@@ -9,7 +9,7 @@ from rotor_mbs.methods.base import BuiltItem, Look, Method, Settings, stability_
 from rotor_mbs.methods.ladders import step_ladder
 from rotor_mbs.methods.settings import number
 from rotor_mbs.scenario.accuracy_bounds import Bound
-from rotor_mbs.solution.trajectory import Integration, Trajectory
+from rotor_mbs.solution.trajectory import Integration, RunBlock, Trajectory
 
 NAMES = ("tip", "kinetic_energy", "potential_energy", "work")
 
@@ -71,16 +71,12 @@ class Solver:
         return Trajectory(self.time, angles, rates, tip=tip, **energies)
 
 
-class Block:
+def solve_many(scenes, settings):
     """Runs of many scenes, for sweeps."""
-
-    def __init__(self, scenes, settings):
-        solvers = [Solver(scene, settings) for scene in scenes]
-        self.integrations = [solver.integrate() for solver in solvers]
-        self.runs = [solver.observe() for solver in solvers]
-        self.samples = [len(run.time) for run in self.runs]
-        self.quantities = {name: np.stack([run.get(name) for run in self.runs]) for name in (*NAMES, "angles", "rates")}
-        self.trajectory = self.runs.__getitem__
+    solvers = [Solver(scene, settings) for scene in scenes]
+    integrations, runs = [solver.integrate() for solver in solvers], [solver.observe() for solver in solvers]
+    arrays = {name: np.stack([run.get(name) for run in runs]) for name in ("time", "angles", "rates", *NAMES)}
+    return RunBlock(arrays.pop("time"), arrays, integrations, [len(run.time) for run in runs])
 
 
 def items(scene):
@@ -92,7 +88,7 @@ def items(scene):
 
 METHOD = Method(
     name="outside/rk4", label="from outside, RK4", look=Look("#882255", "-", "h"), settings=Rk4Settings, build=Solver,
-    items=items, order=4, fixed_step=True, ladders=(step_ladder(6),), solve_many=Block,
+    items=items, order=4, fixed_step=True, ladders=(step_ladder(6),), solve_many=solve_many,
     stability_function=stability_polynomial(1.0, 1.0, 1 / 2, 1 / 6, 1 / 24),
     bounds=(Bound("agreement", "outside/rk4", 1e-6, "order 4"), Bound("energy", "outside/rk4", 1e-6, "order 4")),
 )  # fmt: skip

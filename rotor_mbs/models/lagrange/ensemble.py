@@ -9,7 +9,6 @@ bits. Runs in one process and one thread: processes are the parallelism.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -30,7 +29,7 @@ from rotor_mbs.models.lagrange.taylor import (
     state_symbols,
 )
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
 
 # rad. From 1e14 on a vector's sines are found in another way, which rounds those of the other lanes otherwise, too.
 _HUGE = 1e13
@@ -43,35 +42,7 @@ _AT_ONCE = 4096
 _OBSERVED_AT_ONCE = 1024
 
 
-@dataclass
-class Block:
-    """Samples of k runs, NaN after a run broke off.
-
-    time            (k, n) s
-    quantities      by name, what the scenes ask for: (k, n, ...), units as of a trajectory
-    integrations    the engine's report of each run; samples: how many rows of each are finite
-    """
-
-    time: Array
-    quantities: dict[str, Array]
-    integrations: list[Integration]
-    samples: list[int]
-
-    def trajectory(self, i: int) -> Trajectory:
-        """Run i alone, cut where it broke off."""
-        n = self.samples[i]
-        return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
-
-    def end(self, i: int, integration: Integration, samples: int) -> None:
-        """Run i has so many samples, though a fixed pitch, or a term that vanishes, stays finite for longer."""
-        if samples < self.time.shape[1]:
-            for values in self.quantities.values():
-                values[i, samples:] = np.nan
-        integration.time_reached = float(self.time[i, max(samples - 1, 0)])
-        self.integrations[i], self.samples[i] = integration, samples
-
-
-def empty_block(scenes: Sequence[Scene]) -> Block:
+def empty_block(scenes: Sequence[Scene]) -> RunBlock:
     """Room for their samples, all of which are to be put there."""
     first, runs = scenes[0], len(scenes)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
@@ -82,7 +53,7 @@ def empty_block(scenes: Sequence[Scene]) -> Block:
     if first.wants("energy"):
         shapes |= dict.fromkeys(_ENERGIES, ())
     arrays = {name: np.empty((*time.shape, *shape)) for name, shape in shapes.items()}
-    return Block(time, arrays, [Integration(False)] * runs, [0] * runs)
+    return RunBlock(time, arrays, [Integration(False)] * runs, [0] * runs)
 
 
 # What runs of one rotor share: (parameters,) of the equations, then of the tips; the structure, in which rotors agree
@@ -95,7 +66,7 @@ def lanes() -> int:
     return int(heyoka().recommended_simd_size())
 
 
-def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
+def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
     """Runs of all `scenes`, which have the same number of blades and samples and the same outputs, loads not among
     them.
 
@@ -118,7 +89,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> Block:
     return block
 
 
-def _solve_alone(block: Block, i: int, scene: Scene, tolerance: float) -> None:
+def _solve_alone(block: RunBlock, i: int, scene: Scene, tolerance: float) -> None:
     """A load that changes is integrated segment by segment, which runs side by side would do at different times."""
     run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
     n = len(run.trajectory.time)
@@ -254,7 +225,7 @@ class _Group:
         return states, found[half:], integrations
 
     def put(
-        self, block: Block, columns: Sequence[int], states: Array, found: Array, integrations: Sequence[Integration]
+        self, block: RunBlock, columns: Sequence[int], states: Array, found: Array, integrations: Sequence[Integration]
     ) -> None:
         """The runs of the first len(integrations) columns into the block; states, found: as of `solve`."""
         runs, count = len(integrations), len(self.moving)
@@ -281,7 +252,7 @@ class _Group:
             block.end(i, integration, n)
 
 
-def _propagate(block: Block, group: _Group) -> None:
+def _propagate(block: RunBlock, group: _Group) -> None:
     """All its runs into the block."""
     width = group.integrator.state.shape[1]
     runs = len(group.scenes)
