@@ -54,14 +54,11 @@ class LinearModes(ModeSet):
     @property
     def whirl(self) -> tuple[Array, Array]:
         """(speeds, n) rad/s backward and forward whirl, NaN for modes that are no cosine and no sine of the blades."""
-        frequencies, speeds = self.damped_frequencies, self.speeds[:, None]
-        backward, forward = np.full_like(frequencies, np.nan), np.full_like(frequencies, np.nan)
+        harmonics = np.full(len(self.names), np.nan)
         for k, name in enumerate(self.names):
-            if name.startswith(("cosine", "sine")):
-                harmonic = int(name.split()[1]) if name.split()[1].isdigit() else 1
-                found = whirl_frequencies(frequencies[:, k : k + 1], speeds, harmonic)
-                backward[:, k], forward[:, k] = found[0][:, 0], found[1][:, 0]
-        return backward, forward
+            if name.startswith(("cosine", "sine")):  # "cosine pitch", "cosine 2 pitch"
+                harmonics[k] = int(name.split()[1]) if name.split()[1].isdigit() else 1
+        return whirl_frequencies(self.damped_frequencies, self.speeds[:, None], harmonics)
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
     return out
 
 
-def whirl_frequencies(frequency: Array, speed: Array, harmonic: int = 1) -> tuple[Array, Array]:
+def whirl_frequencies(frequency: Array, speed: Array, harmonic: Array | int = 1) -> tuple[Array, Array]:
     """Backward and forward whirl in rad/s, as the base sees a cosine and sine mode of `frequency` in the rotor."""
     return np.abs(frequency - harmonic * speed), frequency + harmonic * speed
 

@@ -38,10 +38,10 @@ def reference_or_corrected_run(scene: StoredScene) -> StoredRun | None:
     return next((run for run in candidates if run is not None and has_samples(run)), None)
 
 
-def sides(scene: StoredScene) -> list[StoredRun]:
-    """The printed run and the one that stands for the corrected model, those that there are."""
-    found = (printed_run(scene), reference_or_corrected_run(scene))
-    return [run for run in found if run is not None]
+def sides(scene: StoredScene) -> dict[str, StoredRun]:
+    """The "printed" run and the one that stands for the "corrected" model, those that there are."""
+    found = {"printed": printed_run(scene), "corrected": reference_or_corrected_run(scene)}
+    return {side: run for side, run in found.items() if run is not None}
 
 
 def in_order(scene: StoredScene) -> dict[str, StoredRun]:

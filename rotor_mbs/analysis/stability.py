@@ -156,11 +156,9 @@ def _not_compared(reference: StoredRun | None) -> str:
 
 def unreached(found: Iterable[SuiteRun]) -> list[str]:
     """Stiff and light scenes with a reference on which no method reaches 1e-6 rad."""
-    by_scene: dict[str, bool] = {}
-    for cell in found:
-        if cell.is_stiff_or_light and cell.has_reference:
-            by_scene[cell.scene] = by_scene.get(cell.scene, False) or cell.reaches_target
-    return [scene for scene, reached in by_scene.items() if not reached]
+    asked = [cell for cell in found if cell.is_stiff_or_light and cell.has_reference]
+    reached = {cell.scene for cell in asked if cell.reaches_target}
+    return [scene for scene in dict.fromkeys(cell.scene for cell in asked) if scene not in reached]
 
 
 def reached_by(found: Iterable[SuiteRun], scene: str) -> str | None:

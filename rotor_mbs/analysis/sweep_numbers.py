@@ -99,10 +99,6 @@ class StabilityMap:
     """x, y: (columns,), (rows,) values of the second and the first axis; growth: (rows, columns) the largest pitch of
     the run, of the largest at its start; NaN where the run left nothing."""
 
-    x_key: str
-    y_key: str
-    x_unit: str
-    y_unit: str
     x: Array
     y: Array
     growth: Array
@@ -121,10 +117,6 @@ def stability_map(sweep: StoredSweep, start: float) -> StabilityMap:
     if not start > 0.0:
         raise InputError("map: every pitch starts at zero and nothing could grow; allowed: a small pitch at the start")
     rows, columns = shape
-    names = [parameter_name(key) for key in sweep.keys]
-    y, x = (sweep.column(name)[: rows * columns].reshape(rows, columns) for name in names)
+    y, x = (sweep.column(parameter_name(key))[: rows * columns].reshape(rows, columns) for key in sweep.keys)
     largest = sweep.column("pitch_max")[: rows * columns].reshape(rows, columns)
-    return StabilityMap(
-        sweep.keys[1], sweep.keys[0], sweep.columns[names[1]].units, sweep.columns[names[0]].units,
-        x[0], y[:, 0], largest / start,
-    )  # fmt: skip
+    return StabilityMap(x[0], y[:, 0], largest / start)

@@ -84,22 +84,11 @@ def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
     return float(np.exp(np.interp(-math.log(target), -e, t)))
 
 
-def reaches(curves: Sequence[Record]) -> dict[str, dict[float, Reach | None]]:
-    """By curve and target."""
-    found: dict[str, dict[float, Reach | None]] = {curve.name: {} for curve in curves}
-    for target in TARGETS_RAD:
-        times = {curve.name: time_to_reach(*points(curve), target) for curve in curves}
-        fastest = min((time for time in times.values() if time is not None), default=math.inf)
-        for name, time in times.items():
-            found[name][target] = None if time is None else Reach(time, time / fastest)
-    return found
-
-
 def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach]]:
     """Those that reach the target, the fastest first."""
-    found = reaches(curves)
-    able = [(curve, reach) for curve in curves if (reach := found[curve.name][target]) is not None]
-    return sorted(able, key=lambda pair: pair[1].seconds)
+    times = [(curve, time_to_reach(*points(curve), target)) for curve in curves]
+    able = sorted(((curve, time) for curve, time in times if time is not None), key=lambda pair: pair[1])
+    return [(curve, Reach(time, time / able[0][1])) for curve, time in able]
 
 
 def fitted_order(steps: Array, errors: Array) -> float | None:

@@ -66,7 +66,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
     """The pictures. Raises InputError where nothing can be drawn."""
     scene = scene_of(stored)
-    runs = {label_of(run.method): run for run in run_selection.sides(stored) if "angles" in run}
+    runs = {label_of(run.method): run for run in run_selection.sides(stored).values() if "angles" in run}
     if scene is None or not runs:
         raise InputError(f"{stored.name}: nothing to draw: no angles, or its scene file is not known")
     end = max(float(run.array("time")[-1]) for run in runs.values())

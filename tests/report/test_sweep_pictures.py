@@ -123,7 +123,7 @@ def test_the_figures_show_what_was_found() -> None:
     slope = np.diff(np.log(growth.get_ydata())) / np.diff(growth.get_xdata())
     np.testing.assert_allclose(slope, 1.234, rtol=1e-9)
     for rows, crosses in (([[1.0, 100.0], [1.0, np.nan]], True), ([[1.0, 9.0], [1.0, np.nan]], False)):
-        found = StabilityMap("kx", "ky", "rad", "N", np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array(rows))
+        found = StabilityMap(np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array(rows))
         panels, has_line = map_panels(found, "kx (rad)", "ky (N)")
         assert (panels.axes[0].get_xlabel(), panels.axes[0].get_ylabel(), has_line) == ("kx (rad)", "ky (N)", crosses)
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis.work_precision import (
     cost_exponent,
     failed,
+    fastest,
     fitted_order,
     pareto,
-    reaches,
     succeeded,
     time_to_reach,
 )
@@ -99,22 +99,18 @@ def test_a_dear_point_that_is_less_accurate_does_not_bend_the_curve() -> None:
 
 def test_ratios_are_to_the_fastest() -> None:
     """1e-3 lies a quarter of the way from 1e-2 to 1e-6, and half way from 1e-2 to 1e-4."""
-    found = reaches([FAST, SLOW])
-    fast, slow = found["lagrange/taylor"][1e-3], found["exudyn_tree/rk67"][1e-3]
-    assert fast is not None
-    assert slow is not None
+    (first, fast), (second, slow) = fastest([SLOW, FAST], 1e-3)
+    assert (first.name, second.name) == ("lagrange/taylor", "exudyn_tree/rk67")
     assert fast.seconds == pytest.approx(1e-3 * 2**0.25)
     assert slow.seconds == pytest.approx(1e-2 * 10**0.5)
     assert (fast.ratio, slow.ratio) == (1.0, pytest.approx(slow.seconds / fast.seconds))
-    assert found["exudyn_tree/rk67"][1e-6] is None
+    assert [one.name for one, _ in fastest([SLOW, FAST], 1e-6)] == ["lagrange/taylor"]
 
 
 def test_a_method_made_twice_slower_moves_up_and_nowhere_else() -> None:
     slower = curve("lagrange/taylor", [1e-2, 1e-6, 1e-10], [2e-3, 4e-3, 8e-3])
     for target in (1e-3, 1e-6, 1e-9):
-        before, after = (reaches([one])["lagrange/taylor"][target] for one in (FAST, slower))
-        assert before is not None
-        assert after is not None
+        ((_, before),), ((_, after),) = (fastest([one], target) for one in (FAST, slower))
         assert after.seconds == pytest.approx(2.0 * before.seconds)
 
 

@@ -256,10 +256,11 @@ def csv_text(curves: Sequence[Record]) -> str:
 
 def reach_table(curves: Sequence[Record]) -> PageTable:
     """A row per curve: time and ratio for each target."""
-    found = work_precision.reaches(curves)
-    head = ["method", *map(_target_text, work_precision.TARGETS_RAD)]
+    targets = work_precision.TARGETS_RAD
+    found = [{one.name: reach for one, reach in work_precision.fastest(curves, target)} for target in targets]
+    head = ["method", *map(_target_text, targets)]
     rows: list[Row] = [
-        [method_cell(curve.name), *(_reach_cell(curve, reach) for reach in found[curve.name].values())]
+        [method_cell(curve.name), *(_reach_cell(curve, reaches.get(curve.name)) for reaches in found)]
         for curve in curves
     ]
     caption = (

@@ -29,17 +29,12 @@ def comparison_page(record: Record) -> dict[str, object]:
     verdict = verdict_of(record)
     legend = [*(LegendEntry(one.name, _look(one)) for one in _drawn(verdict)), line_entry("tolerance", GREY, ":")]
     return {
-        "scene": verdict.scene,
+        "verdict": verdict,
         "title": record.attributes["title"],
         "source": Path(verdict.source).name,
-        "agrees": verdict.agrees,
-        "status": verdict.status,
         "lead": _lead(verdict),
         "errors": Section([*_motion(record, verdict), *_errors(record, verdict)], legend),
         "channels": Section(tables=[_table(verdict)]),
-        "read": verdict.read,
-        "unused": verdict.unused,
-        "notes": verdict.notes,
     }
 
 

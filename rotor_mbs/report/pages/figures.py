@@ -85,14 +85,9 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
         run for name, run in run_selection.corrected_runs(scene).items()
         if (method := look_up(name)) and "exudyn" in method.distributions and run_selection.has_samples(run)
     ]  # fmt: skip
-    runs = {
-        "printed": run_selection.printed_run(scene),
-        "corrected": run_selection.reference_or_corrected_run(scene),
-        "exudyn": next(iter(exudyn), None),
-    }
     found: dict[str, StoredRun] = {}
-    for key, run in runs.items():
-        if run is not None and run not in found.values() and "angles" in run and "rates" in run:
+    for key, run in [*run_selection.sides(scene).items(), *(("exudyn", run) for run in exudyn[:1])]:
+        if run not in found.values() and "angles" in run and "rates" in run:
             found[key] = run
     return found
 

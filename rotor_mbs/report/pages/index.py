@@ -52,7 +52,7 @@ def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
 def _glance(scenes: Scenes, context: Context) -> dict[str, object]:
     """What the index opens with; what the file has no data for is None."""
     name = _shown_scene(scenes, context.claims)
-    sides = run_selection.sides(scenes[name])
+    sides = list(run_selection.sides(scenes[name]).values())
     benched = next((one for one in context.curves if one in scenes), "")
     tips = next((run for run in reversed(sides) if "tip" in run), None)
     own = [claim for claim in context.claims if name in claim.published.scenes]

@@ -42,10 +42,7 @@ class DrawnRuns(NamedTuple):
 
 
 def _drawn_runs(scene: StoredScene) -> DrawnRuns:
-    sides = {
-        HEADINGS["corrected" if run.method != run_selection.PRINTED else "printed"]: run
-        for run in run_selection.sides(scene)
-    }
+    sides = {HEADINGS[side]: run for side, run in run_selection.sides(scene).items()}
     good = {n: run for n, run in run_selection.corrected_runs(scene).items() if run_selection.has_samples(run)}
     return DrawnRuns(scene, sides, {run.method: run for run in sides.values()} | good, scene_tables.horizon(scene))
 
