@@ -63,7 +63,12 @@ def show(arguments: argparse.Namespace) -> int:
 
     method = look_up(arguments.scene)
     if method is not None:
-        print(f"{method.name}: {method.label}\n", *_settings_lines(method), sep="\n")
+        if arguments.json:
+            allowed = {name: {"allowed": str(one), "doc": one.doc} for name, one in method.settings.allowed().items()}
+            facts = {"name": method.name, "label": method.label, "settings": method.defaults, "allowed": allowed}
+            print(json.dumps(facts, ensure_ascii=False, indent=1))
+        else:
+            print(f"{method.name}: {method.label}\n", *_settings_lines(method), sep="\n")
         return 0
     found = find_scenes([arguments.scene])
     if len(found) != 1:

@@ -171,9 +171,6 @@ def _units_and_zeros(search: CauseSearch, time: Array, values: Array, states: Ar
 
 def _corrections(kind: str, values: Array, expected: Array) -> Iterator[tuple[str, Array]]:
     """(what is wrong, values so corrected), the simplest first."""
-    yield "", values
-    if kind == "angle":
-        yield "wrapped, taken as unwrapped", values + _TURN * np.round((expected - values) / _TURN)
     factors = [(1.0, ""), *_FACTORS[kind]]
     signed = [(sign * factor, text) for sign in (1.0, -1.0) for factor, text in factors]
     for shifted in (False, True):
@@ -181,7 +178,11 @@ def _corrections(kind: str, values: Array, expected: Array) -> Iterator[tuple[st
             corrected = factor * values
             zero = float(corrected[0] - expected[0]) if shifted else 0.0
             said = [text] * bool(text) + ["sign reversed"] * (factor < 0.0) + [f"zero off by {zero:.6g}"] * shifted
-            yield ", ".join(said), corrected - zero
+            corrected = corrected - zero
+            yield ", ".join(said), corrected
+            if kind == "angle":
+                turns = np.round((expected - corrected) / _TURN)
+                yield ", ".join([*said, "wrapped, taken as unwrapped"]), corrected + _TURN * turns
 
 
 def factors(search: CauseSearch) -> list[str]:

@@ -87,8 +87,9 @@ def test_what_show_prints_fits_a_screen(scene: str, tmp_path: Path) -> None:
 
 def test_show_tells_the_settings_of_a_method(tmp_path: Path) -> None:
     text = rotor_mbs("show", "exudyn_tree/rk67", cwd=tmp_path).stdout
-    assert "step" in text
-    assert "a number above 0, in s" in text
+    found = json.loads(rotor_mbs("show", "exudyn_tree/rk67", "--json", cwd=tmp_path).stdout)
+    assert f"{found['settings']['step']}  a number above 0, in s" in text
+    assert found["allowed"]["step"]["allowed"] == "a number above 0, in s"
 
 
 def test_every_help_has_an_example(tmp_path: Path) -> None:

@@ -175,6 +175,9 @@ PLANTS = {
     "time in ms": Plant("time in ms taken as s", spoilt=lambda t, q, w: (1e3 * t, q, w)),
     "numbers of rows": Plant("row numbers taken as s", spoilt=lambda t, q, w: (np.arange(1.0 * len(t)), q, w)),
     "wrapped": Plant("wrapped, taken as unwrapped", "paper/fig12", spoilt=lambda t, q, w: (t, wrapped(q), w)),
+    "wrapped, from another zero": Plant(
+        "pitch 3: zero off by 1.5, wrapped", "paper/fig12", spoilt=lambda t, q, w: (t, wrapped(q + 1.5), w)
+    ),
     "rates as angles": Plant(
         "rotor is rotor rate, pitch 1 is pitch 1 rate", with_rates=False, spoilt=lambda t, q, w: (t, w, q)
     ),
