@@ -101,8 +101,8 @@ def modes(arguments: argparse.Namespace) -> int:
 
 def claims(arguments: argparse.Namespace) -> int:
     """The paper's claims in words tested on many runs. Always 0: the verdicts are what is found out."""
+    from rotor_mbs.analysis.claim_records import count_of_rows
     from rotor_mbs.analysis.claim_shares import RULE
-    from rotor_mbs.analysis.number_trials import count_of_rows
     from rotor_mbs.studies.claims import study_claims
 
     with ProgressLine() as progress:

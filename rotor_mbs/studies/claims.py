@@ -14,10 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
+from rotor_mbs.analysis.claim_records import (
+    ClaimStudy,
+    Conditions,
+    NumberTrial,
+    NumberTrials,
+    records_of,
+    shipped_claims,
+    stored_claims,
+)
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
 from rotor_mbs.analysis.claims import rounds_to
-from rotor_mbs.analysis.number_trials import Conditions, NumberTrial, NumberTrials
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.trajectory_numbers import measure

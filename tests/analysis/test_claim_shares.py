@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor_mbs.analysis.claim_records import ClaimStudy, records_of, shipped_claims, stored_claims
+from rotor_mbs.analysis.claim_records import ClaimStudy, count_of_rows, records_of, shipped_claims, stored_claims
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
-from rotor_mbs.analysis.number_trials import count_of_rows
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.read import open_results

@@ -484,3 +484,11 @@ def test_the_report_is_built_without_any_engine(tmp_path: Path) -> None:
 )
 def test_numbers_read_well(shown: str, wanted: str) -> None:
     assert shown.replace(numbers.SPACE, " ") == wanted
+
+
+@pytest.mark.parametrize("value", [0.0, 1e17])
+def test_a_constant_has_a_range_that_holds_it(value: float) -> None:
+    axes = panels((1.0,), "").axes[0]
+    figures.set_range(axes, np.full((3, 1), value))
+    low, high = axes.get_ylim()
+    assert low < value < high

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor_mbs.analysis.claim_records import ClaimStudy, stored_claims
-from rotor_mbs.analysis.number_trials import NumberTrial
+from rotor_mbs.analysis.claim_records import ClaimStudy, NumberTrial, stored_claims
 from rotor_mbs.analysis.published import published
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.claims import SPREAD, claim_shares, moved_starts, number_trials

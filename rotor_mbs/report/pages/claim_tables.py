@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
+from rotor_mbs.analysis.claim_records import Conditions, NumberTrials, count_of_rows
 from rotor_mbs.analysis.claim_shares import FAILS, HOLDS, RULE, UNDECIDED, ClaimShares
 from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
-from rotor_mbs.analysis.number_trials import Conditions, NumberTrials, count_of_rows
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell

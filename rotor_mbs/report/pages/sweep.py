@@ -82,7 +82,7 @@ def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEnt
         return _spread(sweep)
     start = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"])).initial_angles
     found = stability_map(sweep, max(map(abs, start[1:]), default=0.0))
-    y_label, x_label = (f"{field_name(key)} ({sweep.columns[parameter_name(key)].units})" for key in sweep.keys)
+    y_label, x_label = (_axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys)
     panels, has_line = map_panels(found, x_label, y_label)
     line = f"The pitches grow {GROWN:g}-fold in {found.unstable.sum()} of {found.growth.size} runs."
     caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"

@@ -73,7 +73,8 @@ def set_range(axes: Any, values: Array) -> None:
         axes.set_ylim(-2.0 * usual, 2.0 * usual)
     elif values.max() - values.min() < _ROUNDING:
         middle = 0.5 * float(values.max() + values.min())
-        axes.set_ylim(middle - 0.1, middle + 0.1)
+        margin = 0.1 if middle + 0.1 > middle else 0.05 * abs(middle)  # to 1e16 a tenth adds nothing
+        axes.set_ylim(middle - margin, middle + margin)
 
 
 def lines(rows: Sequence[tuple[str, Sequence[Series]]], horizon: float | None = None, height: float = 2.3) -> Panels:
