@@ -212,7 +212,7 @@ class Comparison:
 
 
 def compare(
-    scene: Scene, methods: Sequence[str] = (), *, workers: int = 0, timeout: float = 60.0, **settings: object
+    scene: Scene, methods: str | Sequence[str] = (), *, workers: int = 0, timeout: float = 60.0, **settings: object
 ) -> Comparison:
     """One scene by several methods, each judged against the scene's reference (shipped, or computed).
 
@@ -260,7 +260,7 @@ def sweep(
     scene: Scene,
     parameters: Mapping[str, object],
     *,
-    methods: Sequence[str] = ("lagrange/taylor",),
+    methods: str | Sequence[str] = ("lagrange/taylor",),
     output: str | os.PathLike[str] | None = None,
     workers: int = 0,
     timeout: float = 60.0,
@@ -297,7 +297,7 @@ def sweep(
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import run_sweep
 
-    study = sweep_of(scene, parameters, methods=list(methods), **options)
+    study = sweep_of(scene, parameters, methods=list(check_names(methods)), **options)
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
     run_sweep(study, path, workers=workers, timeout_s=timeout)
     data = SweepData(path)

@@ -145,7 +145,7 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
     scene = rm.scene("paper/fig08").replace(**SHORT)
     values = [0.0, 1e3, 1e4]
     data = rm.sweep(
-        scene, {"bearing.stiffness": values}, methods=["lagrange/dop853"], samples=11, output=tmp_path / "stiffness.h5"
+        scene, {"bearing.stiffness": values}, methods="lagrange/dop853", samples=11, output=tmp_path / "stiffness.h5"
     )
     table = data.to_xarray()
     assert table.bearing_stiffness.values.tolist() == values

@@ -59,8 +59,9 @@ def find_method(name: str) -> Method:
     return method
 
 
-def check_names(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, once each, in order. Raises InputError with a line for every unknown one."""
+def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
+    """The names, or the one name, once each, in order. Raises InputError with a line for every unknown one."""
+    names = (names,) if isinstance(names, str) else names
     known = method_names() if names else ()
     unknown = [name for name in names if name not in known]
     if unknown:
