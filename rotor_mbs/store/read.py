@@ -7,7 +7,6 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -200,12 +199,11 @@ def damages_of(group: Any) -> list[str]:
     if not known:
         return [digests.DIGESTS]
     unfilled = digests.unfilled_in(known)
-    found = {digests.ATTRIBUTES: _proved(lambda: digests.attributes_digest(group.attrs))}
+    found = {digests.ATTRIBUTES: _digest(group, attributes_alone=True)}
     for name in group:
-        item = _member(group, name)
+        item, is_unfilled = _member(group, name), name in unfilled
         if not hdf5.is_group(item):
-            part = digests.unfilled(name) if name in unfilled else name
-            found[part] = "" if item is None else _proved(partial(_digest, item, name in unfilled))
+            found[digests.unfilled(name) if is_unfilled else name] = _digest(item, attributes_alone=is_unfilled)
     return [name for name in {**known, **found} if known.get(name) != found.get(name)]
 
 
@@ -216,16 +214,12 @@ def _member(group: Any, name: str) -> Any:
     return None
 
 
-def _digest(dataset: Any, is_unfilled: bool) -> str:
-    if is_unfilled:
-        return digests.attributes_digest(dataset.attrs)
-    return digests.dataset_digest(hdf5.values_of(dataset), dataset.attrs)
-
-
-def _proved(digest: Callable[[], str]) -> str:
-    """ "" where the content cannot be read."""
+def _digest(item: Any, *, attributes_alone: bool) -> str:
+    """ "" where there is none, or its content cannot be read."""
     with suppress(StoreError), hdf5.reading(""):
-        return digest()
+        if attributes_alone:
+            return digests.attributes_digest(item.attrs)
+        return digests.dataset_digest(hdf5.values_of(item), item.attrs)
     return ""
 
 

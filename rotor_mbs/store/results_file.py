@@ -20,7 +20,7 @@ from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.digests import DIGESTS
-from rotor_mbs.store.layout import KEYWORDS, LIMIT, SWEEP_IDENTITY, TOGETHER, Column, key_of
+from rotor_mbs.store.layout import KEYWORDS, LIMIT, TOGETHER, Column, key_of
 from rotor_mbs.store.read import OpenResults, StoredRun, all_damages, is_sweep, open_results
 from rotor_mbs.store.records import COLUMNS, records_in
 
@@ -95,8 +95,9 @@ def merge(
     Raises
     ------
     StoreError
-        Where a file cannot be read or written, or is the dataset of a sweep.
+        Where a file cannot be read or written, or `path` is the dataset of a sweep.
     """
+    refuse_other_kinds(path)
     plan = _plan(sources, without)
     with hdf5.new_file(path) as file:
         created = datetime.now(UTC).isoformat(timespec="seconds")
@@ -114,11 +115,7 @@ def merge(
 def refuse_other_kinds(path: Path) -> None:
     """Raises StoreError where `path` has what a merge would not carry over: a sweep's dataset."""
     if path.exists() and is_sweep(path):
-        raise _is_of_another_kind(path)
-
-
-def _is_of_another_kind(path: Path) -> StoreError:
-    return StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
+        raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
 
 
 def _members(results: OpenResults) -> Iterator[tuple[str, str, str, str]]:
@@ -138,8 +135,6 @@ def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[s
     latest: dict[str, tuple[str, dict[str, Path]]] = {}
     for source in sources:
         with open_results(source, verify=False) as results, hdf5.reading(source):
-            if SWEEP_IDENTITY in results.attributes:
-                raise _is_of_another_kind(source)
             for above, owner, name, key in _members(results):
                 if key not in without or not key:
                     known, groups = latest.get(above, (owner, {}))
