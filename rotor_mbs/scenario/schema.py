@@ -1,7 +1,7 @@
 """The scene file and the bounds file as pydantic models: which keys there are, and what each may be.
 
 Fields are validated in the order in which they stand here. Later ones are checked against what earlier ones left in
-the validation's context (blades, wants_tip, bare_pitches), so that one pass finds every error. Must not know files.
+the validation's context (blades, outputs, bare_pitches), so that one pass finds every error. Must not know files.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ class BladeTable(Table):
     @field_validator("tip", mode="before")
     @classmethod
     def _is_there_where_wanted(cls, tip: object, info: ValidationInfo) -> object:
-        if tip is None and _context(info).get("wants_tip"):
+        if tip is None and "tip" in _context(info).get("outputs", ()):
             raise invalid("is missing")
         return tip
 
@@ -272,17 +272,11 @@ class SceneTable(Table):
     settings: dict[str, Number | Text] = Field({}, description="a table of methods' settings, such as step = 1e-3")
     initial: InitialTable = Field(description="a table with angles, rates")
 
-    @field_validator("blades")
+    @field_validator("blades", "outputs")
     @classmethod
-    def _note_blades(cls, blades: int, info: ValidationInfo) -> int:
-        _context(info)["blades"] = blades
-        return blades
-
-    @field_validator("outputs")
-    @classmethod
-    def _note_outputs(cls, outputs: list[str], info: ValidationInfo) -> list[str]:
-        _context(info)["wants_tip"] = "tip" in outputs
-        return outputs
+    def _note(cls, value: object, info: ValidationInfo) -> object:
+        _context(info)[str(info.field_name)] = value
+        return value
 
     @field_validator("samples")
     @classmethod
