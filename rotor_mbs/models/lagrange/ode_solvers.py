@@ -16,11 +16,11 @@ from rotor_mbs.models.lagrange import closed_form, samples
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.parameters import Number, changing_loads, load_segments, rotor_form, work_is_integrated
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, loads_at_start, over_segments
+from rotor_mbs.models.ode45 import RightHandSide
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
-RightHandSide = Callable[[float, Sequence[float]], list[float]]
 # As closed_form.accelerations
 Accelerations = Callable[..., list[Number]]
 # (right-hand side, start, end, state at the start, sample times inside) -> Advance

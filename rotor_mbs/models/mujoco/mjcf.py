@@ -21,7 +21,7 @@ round-off for the paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
@@ -110,18 +110,13 @@ def text(root: ET.Element) -> str:
 
 def items(scene: Scene) -> list[BuiltItem]:
     """What is built for the scene, in order."""
-    return list(_items(model(scene, "rk4", 1.0)))
+    elements = model(scene, "rk4", 1.0).iter()
+    return [BuiltItem(_KINDS[one.tag], one.get("name", one.tag), _detail(one)) for one in elements if one.tag in _KINDS]
 
 
-def _items(root: ET.Element) -> Iterator[BuiltItem]:
-    for element in root.iter():
-        kind = _KINDS.get(element.tag)
-        if kind:
-            shown = (f"{key} {value}" for key, value in element.attrib.items() if key not in ("name", "type"))
-            detail = (
-                f"{element.get('type', element.tag)}: {', '.join(shown)}" if len(element.attrib) > 1 else element.tag
-            )
-            yield BuiltItem(kind, element.get("name", element.tag), detail)
+def _detail(element: ET.Element) -> str:
+    shown = (f"{key} {value}" for key, value in element.attrib.items() if key not in ("name", "type"))
+    return f"{element.get('type', element.tag)}: {', '.join(shown)}" if len(element.attrib) > 1 else element.tag
 
 
 _KINDS = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
