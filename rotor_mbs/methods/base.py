@@ -63,7 +63,7 @@ class Method:
     cost_scaling    settings of the cost scaling study; None: not part of it
     relative_cost   run time as a multiple of the fastest method's, roughly: expensive methods are started first
     bounds          accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml
-    solve_many      (scenes, settings) -> block of runs: a vectorized path for sweeps that ask for angles, rates, tips
+    solve_many      (scenes, settings) -> RunBlock: a vectorized path for sweeps that ask for angles, rates, tips
                     and energies alone, or None
     linearize       (scene, steady angles, rotor speed, rotor torque) -> the model linearized there, or None; one method
                     of a model has it. Raises MethodRefusal for a state that the model cannot be linearized about

@@ -89,14 +89,12 @@ class Settings:
     """
 
     @classmethod
-    def of(cls, method: str, given: Mapping[str, object] | Settings) -> Self:
+    def of(cls, method: str, given: Mapping[str, object]) -> Self:
         """The settings of `method` with the `given` values in place of defaults.
 
         Raises InputError, in one line that lists all settings, for an unknown name, a wrong type, a number that is
         not finite, or one out of range.
         """
-        if isinstance(given, Settings):
-            given = given.as_dict()
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
             if name not in known:

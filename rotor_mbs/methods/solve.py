@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rotor_mbs.methods.base import Method, Settings
+from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import time_limit
 from rotor_mbs.scenario.scene import Scene
@@ -18,7 +18,7 @@ from rotor_mbs.solution.solution import Solution
 def solve(
     method: Method | str,
     scene: Scene,
-    settings: Mapping[str, object] | Settings,
+    settings: Mapping[str, object],
     repeats: int = 1,
     budget_s: float = float("inf"),
     time_limit_s: float = float("inf"),

@@ -41,10 +41,6 @@ class Bound:
     known_fault: str = ""
     scenes: str = "*"
 
-    def is_for(self, scene: str) -> bool:
-        """Whether it counts for a shipped scene, or for one that is not ("")."""
-        return any(fnmatchcase(scene, pattern) for pattern in self.scenes.split("|"))
-
 
 @dataclass(frozen=True)
 class Bounds:
@@ -70,7 +66,8 @@ class Bounds:
     def find(self, check: str, method: str) -> Bound | None:
         """The first that fits, or None."""
         fitting = (one for one in self.entries if one.check == check and fnmatchcase(method, one.method))
-        return next((one for one in fitting if one.is_for(self.scene)), None)
+        of_scene = (one for one in fitting if any(fnmatchcase(self.scene, each) for each in one.scenes.split("|")))
+        return next(of_scene, None)
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
         """Bounds that try `entries` first, then these.
