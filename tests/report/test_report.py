@@ -22,7 +22,7 @@ from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core import canvas, numbers, svg
 from rotor_mbs.report.core.canvas import panels
-from rotor_mbs.report.core.elements import LegendEntry
+from rotor_mbs.report.core.elements import MARKS
 from rotor_mbs.report.core.files import page_names
 from rotor_mbs.report.core.looks import (
     COLOURS,
@@ -317,7 +317,7 @@ def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None
         a, b = looks[one], looks[other]
         assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (one, other)
     for look in looks.values():
-        assert LegendEntry("", look).mark  # the legend can draw it
+        assert look.marker in MARKS  # the legend can draw it
         assert look.colour in (*COLOURS, GREY)
     assert look_of("mine/own").colour == GREY
     assert label_of("mine/own") == "mine/own"

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from rotor_mbs.report.core.looks import GREY, Look, class_of
+from rotor_mbs.report.core.looks import GREY, Look
 
-_BESIDE = 14  # rows of tables beside a picture
-_DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
+DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
 # Paths of markers around a point, in relative steps: several can stand in one path.
 MARKS = {
     "o": "m3 0c0 4-6 4-6 0c0-4 6-4 6 0z",
@@ -74,21 +73,6 @@ class LegendEntry:
     look: Look
     width: float = 2.0
 
-    @property
-    def dashes(self) -> str:
-        """Value of `stroke-dasharray`."""
-        return _DASHES.get(self.look.line, "")
-
-    @property
-    def colour_class(self) -> str:
-        """The class of its colour in the style sheet."""
-        return class_of(self.look.colour) or class_of(GREY)
-
-    @property
-    def mark(self) -> str:
-        """The marker's path in SVG."""
-        return MARKS.get(self.look.marker, "")
-
 
 @dataclass(frozen=True)
 class Picture:
@@ -102,27 +86,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """Pictures side by side with one legend, then tables and notes. A section with neither is left out of the page."""
+    """Pictures side by side with one legend, then tables and notes. A section without picture and row is left out."""
 
     pictures: Sequence[Picture] = ()
     legend: Sequence[LegendEntry] = ()
     tables: Sequence[PageTable] = ()
     notes: Sequence[str] = ()
-
-    @property
-    def tables_beside(self) -> bool:
-        """Whether the tables stand in the free place beside the last picture, and are no longer than it is high."""
-        return 0 < sum(len(table.rows) for table in self.tables) <= _BESIDE and len(self.pictures) % 2 == 1
-
-    @property
-    def is_single(self) -> bool:
-        """Whether the legend stands in the free place beside the only picture."""
-        return len(self.pictures) == 1 and not self.tables
-
-    @property
-    def has_content(self) -> bool:
-        """Whether there is a picture or a row of a table."""
-        return bool(self.pictures or any(table.rows for table in self.tables))
 
 
 def line_entry(label: str, colour: str = GREY, line: str = "-", width: float = 2.0) -> LegendEntry:

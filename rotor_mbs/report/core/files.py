@@ -18,7 +18,8 @@ from markupsafe import Markup, escape
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import numbers
-from rotor_mbs.report.core.looks import palette_css, with_light_palette
+from rotor_mbs.report.core.elements import DASHES, MARKS
+from rotor_mbs.report.core.looks import GREY, class_of, palette_css, with_light_palette
 from rotor_mbs.store.hdf5 import replace_file
 
 GENERATOR = "rotor_mbs report"
@@ -109,9 +110,15 @@ def _environment() -> jinja2.Environment:
         style=Markup(palette_css() + style + picture.strip()),
         scripts=scripts,
         hashes=hashes,
+        marks=MARKS,
+        dashes=DASHES,
     )
     environment.filters.update(
-        number=numbers.number, with_unit=numbers.with_unit, typeset=numbers.typeset, breakable=_breakable
+        number=numbers.number,
+        with_unit=numbers.with_unit,
+        typeset=numbers.typeset,
+        breakable=_breakable,
+        ink=lambda colour: class_of(colour) or class_of(GREY),
     )
     return environment
 
