@@ -6,7 +6,7 @@ Extremes are read at an integrator's own output points where the run has them, a
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def measure(run: RunArrays, asked: TrajectoryNumber) -> float | None:
     series = _series(run, _DATASETS[asked.quantity], asked.coordinate)
     if series is None:
         return None
-    return STATISTICS[asked.statistic](*series)
+    return STATISTICS[asked.statistic].of(*series)
 
 
 def _series(run: RunArrays, name: str, coordinate: int) -> tuple[Array, Array] | None:
@@ -60,14 +60,22 @@ def _swing_ratio(x: Array) -> float | None:
     return float(swings.max() / swings.min()) if len(swings) >= 2 else None
 
 
-STATISTICS: dict[str, Callable[[Array, Array], float | None]] = {
-    "min": lambda _, x: float(x.min()),
-    "max": lambda _, x: float(x.max()),
-    "max_abs": lambda _, x: float(np.abs(x).max()),
-    "range": lambda _, x: float(np.ptp(x)),
-    "max_abs_change": lambda _, x: float(np.abs(x - x[0]).max()),
-    "net_change": lambda _, x: float(x[-1] - x[0]),
-    "reversals": lambda _, x: _reversals(x),
-    "growth": _growth,
-    "swing_ratio": lambda _, x: _swing_ratio(x),
+class Statistic(NamedTuple):
+    """of: from times (n,) s and values (n,) to the number; text: before the name of what it is of; without a unit?"""
+
+    of: Callable[[Array, Array], float | None]
+    text: str
+    has_unit: bool = True
+
+
+STATISTICS = {
+    "min": Statistic(lambda _, x: float(x.min()), "smallest"),
+    "max": Statistic(lambda _, x: float(x.max()), "largest"),
+    "max_abs": Statistic(lambda _, x: float(np.abs(x).max()), "largest magnitude of"),
+    "range": Statistic(lambda _, x: float(np.ptp(x)), "range of"),
+    "max_abs_change": Statistic(lambda _, x: float(np.abs(x - x[0]).max()), "largest change of"),
+    "net_change": Statistic(lambda _, x: float(x[-1] - x[0]), "change from start to end of"),
+    "reversals": Statistic(lambda _, x: _reversals(x), "changes of sign of", has_unit=False),
+    "growth": Statistic(_growth, "growth (later by earlier departure) of", has_unit=False),
+    "swing_ratio": Statistic(lambda _, x: _swing_ratio(x), "largest by smallest swing of", has_unit=False),
 }

@@ -162,12 +162,8 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
     return picture
 
 
-def _has_visible_uncertainty(curves: Sequence[Record]) -> bool:
-    """Whether the reference's uncertainty lies within the diagram: in quad precision it is far beyond its edge."""
-    return _uncertainty(curves) > _LOWEST_ERROR
-
-
 def _uncertainty(curves: Sequence[Record]) -> float:
+    """rad, of the reference: in quad precision far beyond the edge of the diagram, where it is not drawn."""
     return max((float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0)
 
 
@@ -194,7 +190,7 @@ def _rail(axes: Any, curve: Record, style: Look, with_setup: bool) -> None:
 
 
 def _axes(axes: Any, drawn: Sequence[tuple[Any, Any]], curves: Sequence[Record]) -> None:
-    if _has_visible_uncertainty(curves):
+    if _uncertainty(curves) > _LOWEST_ERROR:
         axes.axvspan(_LOWEST_ERROR / 10.0, _uncertainty(curves), color=GREY, alpha=0.2, linewidth=0)
     axes.axvspan(_RAIL_START, _RAIL_END, color="#f2e3de", linewidth=0, zorder=0)
     axes.set_xscale("log")
@@ -218,7 +214,7 @@ def cost_legend(curves: Sequence[Record]) -> list[LegendEntry]:
     entries.append(line_entry("best of all (Pareto front)", _FRONT_COLOUR, width=6.0))
     if any(not work_precision.succeeded(curve).all() for curve in curves):
         entries.append(LegendEntry("failed: drawn at its time", Look(GREY, "", "x")))
-    if _has_visible_uncertainty(curves):
+    if _uncertainty(curves) > _LOWEST_ERROR:
         entries.append(line_entry("uncertainty of the reference", width=8.0))
     return entries
 

@@ -9,24 +9,13 @@ from rotor_mbs.analysis.claim_records import Conditions, NumberTrials, count_of_
 from rotor_mbs.analysis.claim_shares import FAILS, HOLDS, RULE, UNDECIDED, ClaimShares
 from rotor_mbs.analysis.claims import Claim, ClaimResult, Reading
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
+from rotor_mbs.analysis.trajectory_numbers import STATISTICS
 from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import fixed, number, power, with_unit
 from rotor_mbs.solution.text_table import listed
 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
-_STATISTICS = {
-    "min": "smallest",
-    "max": "largest",
-    "max_abs": "largest magnitude of",
-    "range": "range of",
-    "max_abs_change": "largest change of",
-    "net_change": "change from start to end of",
-    "reversals": "changes of sign of",
-    "growth": "growth (later by earlier departure) of",
-    "swing_ratio": "largest by smallest swing of",
-}
-_WITHOUT_UNIT = ("reversals", "growth", "swing_ratio")
 _UNITS = {"angle": "rad", "rate": "rad/s"}
 _TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
 _VERBS = {HOLDS: "hold whatever the rounding and the duration", FAILS: "fail", UNDECIDED: "are undecided"}
@@ -48,12 +37,12 @@ def claim_table(claims: Iterable[Claim], shares: ClaimShares | None = None) -> P
 def description_of(asked: TrajectoryNumber) -> str:
     """What is read off a trajectory: "largest pitch 1 rate"."""
     body = "rotor" if asked.coordinate == 0 else f"pitch {asked.coordinate}"
-    return f"{_STATISTICS.get(asked.statistic, asked.statistic)} {body} {asked.quantity}"
+    return f"{STATISTICS[asked.statistic].text} {body} {asked.quantity}"
 
 
 def unit_of(asked: TrajectoryNumber) -> str:
     """The unit of the number, "" where it has none."""
-    return "" if asked.statistic in _WITHOUT_UNIT else _UNITS[asked.quantity]
+    return _UNITS[asked.quantity] if STATISTICS[asked.statistic].has_unit else ""
 
 
 def _number_row(claim: Claim) -> Row:
