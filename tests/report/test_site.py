@@ -13,8 +13,11 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
+from rotor_mbs.analysis.published import errata
 from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.core.elements import PageTable, Section
+from rotor_mbs.report.core.files import render
 from rotor_mbs.report.pages.errata import matrices
 from rotor_mbs.report.pages.sweep import distribution, field_name
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
@@ -93,12 +96,12 @@ def test_a_distribution_rises_from_none_to_all_runs() -> None:
 def test_formulas_are_typeset() -> None:
     texts = ("c² m c3²", "what <is> this?")
     entries = [CheckedEntry("(8)", f"row 1 column {i + 1}", text, "", 0.0, True, "") for i, text in enumerate(texts)]
-    ((_, typeset),) = matrices(entries, ("(8)",))
-    assert (
-        '<mtd><mrow><msup><mi>c</mi><mn>2</mn></msup><mspace width="0.2em"/><mi>m</mi><mspace width="0.2em"/>'
-        "<msup><msub><mi>c</mi><mn>3</mn></msub><mn>2</mn></msup></mrow></mtd>"
-    ) in typeset
-    assert "<mtd><mtext>what &lt;is&gt; this?</mtext></mtd>" in typeset
+    ((_, (((formula, _), (text, _)),)),) = matrices(entries, ("(8)",))
+    assert formula == (
+        '<mrow><msup><mi>c</mi><mn>2</mn></msup><mspace width="0.2em"/><mi>m</mi><mspace width="0.2em"/>'
+        "<msup><msub><mi>c</mi><mn>3</mn></msub><mn>2</mn></msup></mrow>"
+    )
+    assert text == "<mtext>what &lt;is&gt; this?</mtext>"
 
 
 def test_the_faulty_entry_of_a_matrix_is_marked_and_corrected() -> None:
@@ -107,8 +110,10 @@ def test_the_faulty_entry_of_a_matrix_is_marked_and_corrected() -> None:
         CheckedEntry("(8)", "row 1 column 2", "c c3", "0", 1.0, False, "E1"),
         CheckedEntry("(25)", "D(1,1)", "c", "d", 1.0, False, "E1"),
     ]
-    ((equation, text),) = matrices(entries, ("(8)", "(25)"))
-    assert equation == "(8)"
+    found = matrices(entries, ("(8)", "(25)"))
+    assert [equation for equation, _ in found] == ["(8)"]
+    others = {"differing": Section(), "effects": Section(), "agreeing": PageTable("", (), ())}
+    text = render("errata", {"errata": [(errata()[0], found)], **others})
     assert text.count("<mtd") == 2
     assert text.count('<mtd class="fault">') == 1
     fault = text[text.index('class="fault"') :]

@@ -26,6 +26,7 @@ _TOKEN = re.compile(
 )
 _POWERS = {"²": "2", "³": "3"}
 _PLACE = re.compile(r"row (\d) column (\d)")
+Cell = tuple[Markup, Markup | None]  # an entry as printed, in MathML; the correct one where it is faulty
 
 
 def errata_page(opened: OpenResults, context: Context) -> dict[str, object]:
@@ -83,8 +84,8 @@ def _effect_cells(run: StoredRun | None) -> Row:
     ]
 
 
-def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, Markup]]:
-    """(equation, its matrix as printed) of those of `equations` that are matrices; entries that differ are marked."""
+def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, list[list[Cell]]]]:
+    """(equation, rows of its matrix) of those of `equations` that are matrices."""
     found = []
     for equation in equations:
         places = {}
@@ -93,28 +94,16 @@ def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[
             if entry.equation == equation and place is not None:
                 places[int(place[1]), int(place[2])] = entry
         if places:
-            found.append((equation, _matrix(places)))
+            rows, columns = (range(1, 1 + max(place[axis] for place in places)) for axis in (0, 1))
+            found.append((equation, [[_cell(places.get((row, column))) for column in columns] for row in rows]))
     return found
 
 
-def _matrix(places: dict[tuple[int, int], CheckedEntry]) -> Markup:
-    rows, columns = (max(place[axis] for place in places) for axis in (0, 1))
-    lines = []
-    for row in range(1, rows + 1):
-        cells = [_cell(places.get((row, column))) for column in range(1, columns + 1)]
-        lines.append(f"<mtr>{''.join(cells)}</mtr>")
-    return Markup(f"<math display='block'><mtable>{''.join(lines)}</mtable></math>")
-
-
-def _cell(entry: CheckedEntry | None) -> str:
-    """The entry as printed; a faulty one is struck out, with the correct one beside it."""
+def _cell(entry: CheckedEntry | None) -> Cell:
     if entry is None:
-        return "<mtd></mtd>"
-    printed, right = (_row(text) or f"<mtext>{escape(text)}</mtext>" for text in (entry.printed, entry.right))
-    if entry.agrees:
-        return f"<mtd>{printed}</mtd>"
-    marked = f'<mrow class="printed">{printed}</mrow><mspace width="0.6em"/><mrow class="right">{right}</mrow>'
-    return f'<mtd class="fault">{marked}</mtd>'
+        return Markup(), None
+    printed, right = (Markup(_row(text) or f"<mtext>{escape(text)}</mtext>") for text in (entry.printed, entry.right))
+    return printed, None if entry.agrees else right
 
 
 def _row(text: str) -> str | None:
