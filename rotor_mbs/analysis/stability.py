@@ -75,20 +75,16 @@ class SuiteRun:
         return self.family in ("stiff", "light")
 
 
-_FAMILIES = {
-    "feather": "light",
-    "passage": "singular",
-    "spin": "fast",
-    "tumbling": "fast",
-    "rate": "fast",
-    "rates": "fast",
-    "torque": "fast",
-    "hour": "long",
-    "pendulum": "long",
-    "toy": "scale",
-    "giant": "scale",
-    "zero": "scale",
-    "gravity": "scale",
+_FAMILIES = {  # of scenes whose names do not begin with that of their family
+    part: family
+    for family, parts in {
+        "light": ("feather",),
+        "singular": ("passage",),
+        "fast": ("spin", "tumbling", "rate", "rates", "torque"),
+        "long": ("hour", "pendulum"),
+        "scale": ("toy", "giant", "zero", "gravity"),
+    }.items()
+    for part in parts
 }
 
 

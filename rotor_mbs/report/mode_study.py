@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,7 @@ def modes(scene: Scene, speeds: Sequence[float] = (), stiffnesses: Sequence[floa
     ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
     """
     found = compute_modes(scene, speeds, stiffnesses)
-    return Modes(**{one.name: getattr(found, one.name) for one in fields(SceneModes)}, hash=scene_hash(scene))
+    return Modes(**vars(found), hash=scene_hash(scene))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -130,18 +130,11 @@ def _turning(modes: SceneModes, name: str) -> Section:
     if modes.chart is not None:
         caption = "Stability chart: growth over a turn under gravity, over rotor speed and bearing stiffness"
         drawn.append(picture(chart(modes.chart), f"{name}-chart", caption, caption))
-    rows: list[Row] = [
-        [
-            number(float(table.speeds[i]), 4),
-            TableCell(
-                _shown(float(table.largest[i]), 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i]
-            ),
-            _shown(float(table.growth_rates[i]), 4),
-            _shown(float(table.product_error[i]), 2),
-            _shown(float(table.torque[i]), 4),
-        ]
-        for i in range(len(table.speeds))
-    ]
+    rows: list[Row] = []
+    for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
+        cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
+        numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
+        rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
     head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
     return Section(drawn, (), [PageTable(f"{modes.scene}: multipliers", head, rows, (0, 1, 2, 3, 4))])
 
