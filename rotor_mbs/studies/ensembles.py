@@ -55,15 +55,24 @@ def compare_ensembles(
 
 
 def compare_samples(one: Mapping[str, Array], other: Mapping[str, Array]) -> Iterator[ChannelDistance]:
-    """The distances of all channels; one, other: arrays (runs,) by the channel's name."""
+    """The distances of all channels; one, other: arrays (runs,) by the channel's name. NaN where a value is.
+
+    Critical is what samples of one distribution exceed with the probability `SIGNIFICANCE` in any channel: of the
+    distance by Smirnov's limit for many values (Ann. Math. Stat. 19, 1948), of the means in standard errors.
+    """
+    from scipy.stats import ks_2samp  # late: it takes a second to load
+
     significance = SIGNIFICANCE / (2 * len(one))
     for channel, values in one.items():
-        others = other[channel]
+        others, n, m = other[channel], len(values), len(other[channel])
+        critical = math.sqrt(0.5 * math.log(2.0 / significance) * (n + m) / (n * m))
+        error = math.sqrt(float(values.var(ddof=1)) / n + float(others.var(ddof=1)) / m)
+        means = float(abs(values.mean() - others.mean())) / error if error else 0.0
         quantiles = np.abs(np.quantile(values, _SHARES) - np.quantile(others, _SHARES))
         yield ChannelDistance(
             channel,
-            largest_distance(values, others) / critical_distance(len(values), len(others), significance),
-            mean_difference(values, others) / critical_mean_difference(significance),
+            float(ks_2samp(values, others, method="asymp").statistic) / critical,
+            means / NormalDist().inv_cdf(1.0 - 0.5 * significance),
             quantiles / (values.std() or 1.0),
         )
 
@@ -96,36 +105,3 @@ def _at_the_end(run: Trajectory, *, complete: bool) -> Array:
     """Angles, rate of the rotor, kinetic energy, offset of every tip along the shaft."""
     row = np.array([*run.angles[-1], run.rates[-1, 0], run.kinetic_energy[-1], *run.tip[-1, :, 1]])
     return row if complete else np.full_like(row, np.nan)
-
-
-def largest_distance(one: Array, other: Array) -> float:
-    """Largest difference of the two empirical distribution functions, of (n,) and (m,) values; NaN where a value is."""
-    from scipy.stats import ks_2samp  # late: it takes a second to load
-
-    return float(ks_2samp(one, other, method="asymp").statistic)
-
-
-def critical_distance(n: int, m: int, significance: float) -> float:
-    """The distance that samples of n and m values from one distribution exceed with that probability.
-
-    Smirnov's limit for large samples, of smaller ones a little too large: N. Smirnov, Ann. Math. Stat. 19 (1948).
-
-    >>> round(critical_distance(100, 100, 0.05), 3)
-    0.192
-    """
-    return math.sqrt(0.5 * math.log(2.0 / significance) * (n + m) / (n * m))
-
-
-def mean_difference(one: Array, other: Array) -> float:
-    """Difference of the means of (n,) and (m,) values, in its standard errors."""
-    error = math.sqrt(float(one.var(ddof=1)) / len(one) + float(other.var(ddof=1)) / len(other))
-    return float(abs(one.mean() - other.mean())) / error if error else 0.0
-
-
-def critical_mean_difference(significance: float) -> float:
-    """In standard errors: what is exceeded with that probability, to either side, by means of many values.
-
-    >>> round(critical_mean_difference(0.05), 2)
-    1.96
-    """
-    return NormalDist().inv_cdf(1.0 - 0.5 * significance)

@@ -11,15 +11,12 @@ from support.references import TAYLOR
 from support.scenes import paper
 
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.studies import ensembles
 from rotor_mbs.studies.ensembles import (
     ChannelDistance,
     compare_ensembles,
     compare_samples,
-    critical_distance,
-    critical_mean_difference,
     ensemble,
-    largest_distance,
-    mean_difference,
 )
 
 TREE = "exudyn_tree/rk67"
@@ -75,16 +72,18 @@ def test_tree_and_closed_form_on_every_chaotic_scene(name: str) -> None:
     assert largest(found) < 1.0
 
 
-def test_critical_values_are_exceeded_as_often_as_they_say() -> None:
+def test_critical_values_are_exceeded_as_often_as_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """1000 comparisons of equal distributions at 5 %: 50 ± 21, three standard deviations; Smirnov's limit errs low."""
     random = np.random.default_rng(4)
+    monkeypatch.setattr(ensembles, "SIGNIFICANCE", 2 * 0.05)  # of two comparisons of one channel
     pairs = [(random.normal(size=120), random.normal(size=80)) for _ in range(1000)]
-    distant = sum(largest_distance(*pair) > critical_distance(120, 80, 0.05) for pair in pairs)
-    unlike = sum(mean_difference(*pair) > critical_mean_difference(0.05) for pair in pairs)
-    assert 20 <= distant <= 71
-    assert 29 <= unlike <= 71
+    found = [one for pair in pairs for one in compare_samples(*({"x": values} for values in pair))]
+    assert 20 <= sum(one.distance > 1.0 for one in found) <= 71
+    assert 29 <= sum(one.mean > 1.0 for one in found) <= 71
 
 
 def test_a_run_that_broke_off_is_no_agreement() -> None:
-    assert math.isnan(largest_distance(np.array([1.0, math.nan]), np.array([1.0, 2.0])))
-    assert mean_difference(np.ones(3), np.ones(4)) == 0.0
+    (found,) = compare_samples({"x": np.array([1.0, math.nan])}, {"x": np.array([1.0, 2.0])})
+    assert math.isnan(found.distance)
+    (found,) = compare_samples({"x": np.ones(3)}, {"x": np.ones(4)})
+    assert found.mean == 0.0
