@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeAlias
 
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.output_lock import RESULTS, writing
+from rotor_mbs.execution.output_lock import writing
 from rotor_mbs.execution.pool import TaskPool, Workers, pool_of, run_in
 
 # Statuses of a case of which there is no record: the same call tries it again.
@@ -104,7 +104,7 @@ def execute(
 
     Raises InputError where another process is writing the output, StoreError, and what `run_jobs` raises of RotorError.
     """
-    with writing(store.path, RESULTS) as parts:
+    with writing(store.path) as parts:
         _merge(store, parts)
         stored = store.stored_keys()
         cases = list(cases)

@@ -1,7 +1,7 @@
 """How every command writes an output: locked against other processes, with one folder beside it for unfinished work.
 
-The folder `<output>.parts` has the lock, the kind of the output, and what is finished but not yet in the output. It
-goes when nothing is left in it. Only files of known names are ever removed from it. Knows nothing of their contents.
+The folder `<output>.parts` has the lock, who holds it, and what is finished but not yet in the output. It goes when
+nothing is left in it. Only files of known names are ever removed from it. Knows nothing of their contents.
 """
 
 from __future__ import annotations
@@ -16,20 +16,16 @@ from pathlib import Path
 
 from rotor_mbs.errors import InputError, StoreError
 
-RESULTS, SWEEP = "results", "sweep"
-_LOCK, _KIND = "lock", "kind"
-_OWN = re.compile(r"lock|kind|[0-9a-f]{64}\.h5|\.[0-9a-f]{64}\.h5\.[0-9]+\.tmp")
-_COMMANDS = {RESULTS: "rotor-mbs run", SWEEP: "rotor-mbs sweep"}
+_LOCK, _OWNER = "lock", "owner"
+_OWN = re.compile(r"lock|owner|[0-9a-f]{64}\.h5|\.[0-9a-f]{64}\.h5\.[0-9]+\.tmp")
 
 # Outputs that this process is writing, by thread: a study takes the lock, and so does what it calls.
-_held: dict[tuple[Path, int], str] = {}
+_held: set[tuple[Path, int]] = set()
 
 
 @contextmanager
-def writing(output: Path, kind: str) -> Iterator[Path]:
+def writing(output: Path) -> Iterator[Path]:
     """The folder of unfinished work of `output`, which no other process writes in the block; it may be entered again.
-
-    kind   RESULTS or SWEEP: unfinished work of the other kind is refused
 
     Raises InputError where another process is writing it or the folder has something else, StoreError.
     """
@@ -42,22 +38,25 @@ def writing(output: Path, kind: str) -> Iterator[Path]:
 
     lock = FileLock(parts / _LOCK, timeout=0)
     try:
-        _prepare(parts, kind)
+        parts.mkdir(parents=True, exist_ok=True)
+        _refuse_foreign_files(parts)
         lock.acquire()
     except Timeout:
-        owner = _noted(parts, 1)
+        owner = ""
+        with suppress(OSError, UnicodeDecodeError):
+            owner = (parts / _OWNER).read_text()
         writer = f"another process is writing it now{f' ({owner})' if owner else ''}"
         raise InputError(f"{output}: {writer}; allowed: wait for its end, or another output") from None
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
-    _held[own] = kind
+    _held.add(own)
     try:
         _remove_temporaries(place, parts)
         with suppress(OSError):  # a full disk is reported by what is written to the output
-            (parts / _KIND).write_text(f"{kind}\nprocess {os.getpid()} on {socket.gethostname()}\n")
+            (parts / _OWNER).write_text(f"process {os.getpid()} on {socket.gethostname()}")
         yield parts
     finally:
-        del _held[own]
+        _held.remove(own)
         _leave(parts)
         lock.release()
 
@@ -81,26 +80,20 @@ def _resolved(output: Path) -> Path:
         raise StoreError(f"{output}: cannot be written: {reason}") from exc
 
 
-def _prepare(parts: Path, kind: str) -> None:
-    """Makes the folder. Raises InputError where it has unfinished work of another kind, or a foreign file."""
-    parts.mkdir(parents=True, exist_ok=True)
+def refuse_finished_runs(parts: Path) -> None:
+    """Raises InputError where a batch of runs was interrupted, whose output would be another file than this."""
+    if any(path.suffix == ".h5" for path in parts.iterdir()):
+        raise InputError(
+            f"{parts}: has unfinished work of `rotor-mbs run`; allowed: to finish that, another output, or remove this "
+            "folder"
+        )
+
+
+def _refuse_foreign_files(parts: Path) -> None:
     names = {path.name: path.is_file() and not path.is_symlink() for path in parts.iterdir()}
     foreign = sorted(name for name, is_plain in names.items() if not (is_plain and _OWN.fullmatch(name)))
     if foreign:
         raise InputError(f"{parts}: has {foreign[0]}, a foreign file; allowed: another output, or remove it")
-    found = _noted(parts, 0)
-    if found not in ("", kind) and any(name.endswith(".h5") for name in names):
-        raise InputError(
-            f"{parts}: has unfinished work of `{_COMMANDS.get(found, found)}`; allowed: to finish that, "
-            "another output, or remove this folder"
-        )
-
-
-def _noted(parts: Path, line: int) -> str:
-    """A line of what the writer of the output notes: its kind, its process; "" where there is none."""
-    with suppress(OSError, UnicodeDecodeError, IndexError):
-        return (parts / _KIND).read_text().splitlines()[line]
-    return ""
 
 
 def _remove_temporaries(place: Path, parts: Path) -> None:
@@ -116,7 +109,7 @@ def _remove_temporaries(place: Path, parts: Path) -> None:
 def _leave(parts: Path) -> None:
     """The folder goes where no finished part is left in it; what is not this program's stays."""
     if not any(path.suffix == ".h5" for path in parts.iterdir()):
-        for name in (_KIND, _LOCK):
+        for name in (_OWNER, _LOCK):
             with suppress(OSError):
                 (parts / name).unlink()
         with suppress(OSError):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.execution.output_lock import RESULTS, writing
+from rotor_mbs.execution.output_lock import writing
 from rotor_mbs.execution.provenance import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.solution.status import STATUSES, code_of
@@ -52,7 +52,7 @@ class ResultsStore:
 
     def merge(self, parts: Sequence[Path], without: Collection[str] = frozenset()) -> None:
         """The records of `parts` into the file, atomically, and those of these keys out of it. Raises StoreError."""
-        with writing(self.path, RESULTS):
+        with writing(self.path):
             sources = [self.path, *parts] if self.path.exists() else parts
             merge(self.path, sources, {**versions(), **machine()}, without)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.output_lock import SWEEP, writing
+from rotor_mbs.execution.output_lock import refuse_finished_runs, writing
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
 from rotor_mbs.solution.quantities import scale_values
@@ -50,7 +50,8 @@ def open_sweep(
     Raises InputError where the output is another file, or another process is writing it; StoreError where it cannot be
     read or written, or the disk has no room for all runs.
     """
-    with writing(output, SWEEP):
+    with writing(output) as parts:
+        refuse_finished_runs(parts)
         path = output.resolve() if output.is_symlink() else output  # a link stays one
         if not path.exists():
             _lay_out(path, sweep, methods, numbers, attributes)

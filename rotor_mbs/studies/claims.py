@@ -30,7 +30,7 @@ from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.errors import RotorError, StoreError
 from rotor_mbs.execution.dask_cluster import open_task_pool
-from rotor_mbs.execution.output_lock import RESULTS, writing
+from rotor_mbs.execution.output_lock import writing
 from rotor_mbs.execution.pool import local_pool, run_in
 from rotor_mbs.execution.provenance import versions
 from rotor_mbs.methods.catalogue import find_method
@@ -102,7 +102,7 @@ def study_claims(
     InputError and StoreError as `claim_shares`, and where `output` is a sweep's, or another process is writing it.
     """
     folder = output.with_name(f"{output.name}.sweeps")
-    with writing(output, RESULTS) as parts:
+    with writing(output) as parts:
         refuse_other_kinds(output)
         shares = claim_shares(folder, runs=runs, seed=seed, workers=workers, on_sweep=on_sweep)
         study = ClaimStudy(shares, number_trials(workers=workers))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.execution.execute import OnProgress, ignore_progress
-from rotor_mbs.execution.output_lock import RESULTS, writing
+from rotor_mbs.execution.output_lock import writing
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.store.freeze import freeze
 from rotor_mbs.store.read import open_results
@@ -30,7 +30,7 @@ def compute_references(
     """
     full = output.with_name(f"{output.name}.full.h5")
     none: dict[str, Sequence[str]] = {scene.name: () for scene in scenes}
-    with writing(output, RESULTS):
+    with writing(output):
         _refuse_other_contents(output, {scene.name for scene in scenes})
         report = run_scenes(
             scenes, none, full, workers=workers, timeout_s=timeout_s, use_frozen=False, on_progress=on_progress

@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.execution.case import RUN, Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.execution.output_lock import RESULTS, writing
+from rotor_mbs.execution.output_lock import writing
 from rotor_mbs.execution.pool import OF_THE_MACHINE, Workers, one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
@@ -112,7 +112,7 @@ def run_scenes(
     cases = [*beside, *cases]
     cases.sort(key=lambda case: -find_method(case.method).relative_cost)
     run = in_pool(perform or perform_run, workers, timeout_s, store_time_out)
-    with writing(output, RESULTS):
+    with writing(output):
         refuse_losses(output, cases)
         made = execute(cases, run, ResultsStore(output, timeout_s), on_progress)
         made = [one for one in made if one.case.key in runs]

@@ -12,7 +12,7 @@ import pytest
 from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.output_lock import RESULTS, writing
+from rotor_mbs.execution.output_lock import writing
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.store.read import open_results
 from rotor_mbs.studies import claims
@@ -73,6 +73,17 @@ def test_a_reference_that_starts_in_a_singular_state_says_so(
     assert "every pitch at ±π/2 leaves the rotor no inertia" in capsys.readouterr().err.splitlines()[-1]
 
 
+def test_a_sweep_does_not_take_the_place_of_an_interrupted_batch(
+    dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    finished = tmp_path / "r.h5.parts" / f"{'0' * 64}.h5"
+    finished.parent.mkdir()
+    finished.touch()
+    assert main(["sweep", str(dataset.with_name("two.toml")), "-o", str(tmp_path / "r.h5"), "-j", "1"]) == 2
+    assert "r.h5.parts: has unfinished work of `rotor-mbs run`; allowed: " in capsys.readouterr().err
+    assert finished.exists()
+
+
 def test_a_sweeps_link_stays_one(dataset: Path, tmp_path: Path) -> None:
     target, link = tmp_path / "far" / "two.h5", tmp_path / "two.h5"
     target.parent.mkdir()
@@ -96,7 +107,7 @@ def test_no_command_writes_what_another_process_is_writing(
 ) -> None:
     """The lock of a process that has begun with an output which is not there yet."""
     output = tmp_path / "results.h5"
-    with ThreadPoolExecutor(1) as other, writing(output, RESULTS):
+    with ThreadPoolExecutor(1) as other, writing(output):
         given = tmp_path if command == ["reproduce"] else output
         assert other.submit(main, [*command, "-o", str(given)]).result() == 2
     assert "another process is writing it now" in capsys.readouterr().err.splitlines()[-1]
@@ -120,7 +131,7 @@ def test_claims_are_added_to_what_is_there(results: Path, tmp_path: Path, monkey
     assert kept.exists()
 
 
-@pytest.mark.parametrize("place", ["kind", "lock"])
+@pytest.mark.parametrize("place", ["owner", "lock"])
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to(path.parents[1] / "another")])
 def test_what_is_no_file_of_ours_in_the_folder_of_parts_is_refused(
     make: Callable[[Path], object], place: str, tmp_path: Path
@@ -130,7 +141,7 @@ def test_what_is_no_file_of_ours_in_the_folder_of_parts_is_refused(
     another.write_text("kept")
     parts.mkdir()
     make(parts / place)
-    with pytest.raises(InputError, match=f"has {place}, a foreign file"), writing(tmp_path / "r.h5", RESULTS):
+    with pytest.raises(InputError, match=f"has {place}, a foreign file"), writing(tmp_path / "r.h5"):
         pass
     assert another.read_text() == "kept"
 
