@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 from rotor_mbs.errors import RotorError
 from rotor_mbs.execution.case import Case
@@ -46,7 +46,6 @@ class Result:
     status: str
     message: str = ""
     seconds: float = 0.0
-    value: Any = None
     is_read: bool = False
 
 
@@ -111,12 +110,10 @@ def execute(
         lacking = {case.key for case in cases if case.key not in stored}
         missing = [case for case in cases if case.key in lacking or case.reference in lacking]
         made: list[Outcome] = []
-        work = sum(case.work for case in missing)
-        jobs = [Job(case, parts / f"{case.key}.h5", _place(case, parts, store, stored)) for case in missing]
-        waves = [[job for job in jobs if bool(job.case.reference) is refers] for refers in (False, True)]
-        for outcome in _outcomes(waves, run_jobs) if jobs else ():
-            done = outcome.case.work + sum(one.case.work for one in made)
-            made.append(replace(outcome, share=done / work))
+        work, done = sum(case.work for case in missing), 0.0
+        for case, result in _results(missing, run_jobs, parts, store.path, stored) if missing else ():
+            done += case.work
+            made.append(Outcome(case, result, done / work))
             on_progress(len(made), len(missing), made[-1])
         _merge(store, parts, even_none=not store.path.exists())
     return made
@@ -164,24 +161,21 @@ def in_pool(perform: Perform, workers: Workers, timeout_s: float, on_time_out: O
     return run_jobs
 
 
-def _outcomes(waves: Iterable[Sequence[Job]], run_jobs: JobRunner) -> Iterator[Outcome]:
-    lost: list[Job] = []
+def _results(
+    cases: Sequence[Case], run_jobs: JobRunner, parts: Path, output: Path, stored: AbstractSet[str]
+) -> Iterator[tuple[Case, Result]]:
+    lost: list[Case] = []
 
-    def ready() -> Iterator[Sequence[Job]]:
-        for jobs in waves:
-            there: list[Job] = []
-            for job in jobs:
-                (there if job.reference is None or job.reference.exists() else lost).append(job)
-            yield there
+    def waves() -> Iterator[list[Job]]:
+        yield [Job(case, parts / f"{case.key}.h5") for case in cases if not case.reference]
+        jobs: list[Job] = []
+        for case in filter(lambda case: case.reference, cases):
+            reference = output if case.reference in stored else parts / f"{case.reference}.h5"
+            if reference.exists():
+                jobs.append(Job(case, parts / f"{case.key}.h5", reference))
+            else:
+                lost.append(case)
+        yield jobs
 
-    for job, result in run_jobs(ready()):
-        yield Outcome(job.case, result)
-    for job in lost:
-        yield Outcome(job.case, Result("no_reference", "its reference was not computed"))
-
-
-def _place(case: Case, parts: Path, store: Store, stored: AbstractSet[str]) -> Path | None:
-    """The file with the record of the case's reference."""
-    if not case.reference:
-        return None
-    return store.path if case.reference in stored else parts / f"{case.reference}.h5"
+    yield from ((job.case, result) for job, result in run_jobs(waves()))
+    yield from ((case, Result("no_reference", "its reference was not computed")) for case in lost)

@@ -12,9 +12,10 @@ from pathlib import Path
 
 from rotor_mbs.analysis.run_integrity import defaults_faults
 from rotor_mbs.analysis.verdicts import Verdict, judged, verdicts
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import RotorError, StoreError
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Result, ignore_progress, in_pool
+from rotor_mbs.execution.execute import OnProgress, ignore_progress
+from rotor_mbs.execution.pool import local_pool, run_in
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
 from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -23,13 +24,13 @@ from rotor_mbs.store.freeze import changed_arrays
 from rotor_mbs.store.read import is_sweep, open_results
 from rotor_mbs.store.sweep_columns import MISSING
 from rotor_mbs.store.sweep_dataset import StoredSweep
-from rotor_mbs.studies.check_probes import SPEED_RATIOS, measured, perform_probe, probe, probes
+from rotor_mbs.studies.check_probes import SPEED_RATIOS, measure, measured, probe, probes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_files
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
-_TIMEOUT_S = 60.0
+_TIMEOUT_S, _PROBE_S = 60.0, 90.0
 _OF_EVERY_RUN = "status"  # a check that each run has one verdict of
 # A value below a few units in the last place of a double is rounding: its change says nothing.
 _ROUNDING = 2.0**-50
@@ -165,15 +166,13 @@ def judge_frozen(bounds: Bounds, paths: Sequence[Path] = ()) -> list[Verdict]:
 def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Verdict]:
     """Verdicts on measurements, in the order of `cases`; a measurement that was lost fails."""
     available = [case for case in cases if case.method == "*" or find_method(case.method).is_installed]
-    ends = in_pool(perform_probe, workers, _TIMEOUT_S)([[Job(case, Path()) for case in available]])
-    results = {job.case: result for job, result in ends}
-    return [judge_measured(one, bounds) for case in available for one in measurements(case, results[case])]
-
-
-def measurements(case: Case, result: Result) -> list[Verdict]:
-    """What a probe found; where it was lost, one measurement that is not a number."""
-    found: list[Verdict] | None = result.value
-    return found if found is not None else [measured(case, "all", math.nan, "", result.message)]
+    found: dict[Case, list[Verdict]] = {}
+    with local_pool(workers) as pool:
+        for end in run_in(pool, measure, available, _PROBE_S):
+            if isinstance(end.error, RotorError):
+                raise end.error
+            found[end.task] = end.value or [measured(end.task, "all", math.nan, "", end.message)]
+    return [judge_measured(one, bounds) for case in available for one in found[case]]
 
 
 def judge_measured(one: Verdict, bounds: Bounds) -> Verdict:

@@ -13,7 +13,6 @@ import numpy as np
 from rotor_mbs.analysis.exact import mirrored, relabelled
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, Result
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
@@ -67,14 +66,9 @@ _QUOTIENTS = 0.02
 _ORDER_STEPS = (0.002, 0.001, 0.0005, 0.00025)  # s
 
 
-def measure(case: Case) -> Iterable[Verdict]:
-    """The measurements of a probe, one by one, not yet with a bound; NaN where a run did not get to its end."""
-    return _KINDS[case.study](case)
-
-
-def perform_probe(job: Job) -> Result:
-    """All measurements of a probe, in a worker process."""
-    return Result("ok", value=list(measure(job.case)))
+def measure(case: Case) -> list[Verdict]:
+    """The measurements of a probe, not yet with a bound; NaN where a run did not get to its end."""
+    return list(_KINDS[case.study](case))
 
 
 def measured(case: Case, channel: str, value: float, unit: str = "", look_at: str = "") -> Verdict:

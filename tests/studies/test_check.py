@@ -29,7 +29,7 @@ from support.checking import (
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli import main
 from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Result
+from rotor_mbs.execution.pool import Finished
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report.pages import check as verdict_formats
@@ -647,10 +647,11 @@ def test_json_on_standard_output_is_alone_there(good: Path, capsys: pytest.Captu
 # Without heyoka, and from the command line to the end
 
 
-def test_a_measurement_that_is_lost_fails() -> None:
+def test_a_measurement_that_is_lost_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     case = probe("order", "paper/fig11", METHOD)
-    (found,) = check.measurements(case, Result("worker_died", "its process died"))
-    verdict = check.judge_measured(found, load_bounds())
+    lost = Finished(case, None, "worker_died", "its process died")
+    monkeypatch.setattr(check, "run_in", lambda *_: [lost])
+    (verdict,) = check.judge_probes([case], load_bounds(), 0)
     assert not verdict.passed
     assert verdict.look_at == "its process died"
     assert not check.judge_measured(Verdict("tip", "s", METHOD, "c", math.nan, 0.0, "", ""), load_bounds()).passed
