@@ -294,12 +294,15 @@ def sweep(
     >>> data.to_xarray().angles.dims
     ('run', 'time', 'coordinate')
     """
+    from rotor_mbs.execution.dask_cluster import open_task_pool
     from rotor_mbs.scenario.sweep import sweep_of
-    from rotor_mbs.studies.sweep import run_sweep
+    from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
     study = sweep_of(scene, parameters, methods=list(check_names(methods)), **options)
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
-    run_sweep(study, path, workers=workers, timeout_s=timeout)
+    plan = plan_sweep(study, time_limit_s=timeout)
+    with open_task_pool("local", workers) as pool:
+        run_sweep(plan, path, pool)
     data = SweepData(path)
     if output is None:
         weakref.finalize(data, shutil.rmtree, path.parent, ignore_errors=True)

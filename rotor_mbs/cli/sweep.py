@@ -6,7 +6,6 @@ import argparse
 import json
 import sys
 from collections import Counter
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,6 @@ from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.pool import TaskPool
 
 if TYPE_CHECKING:
-    from rotor_mbs.scenario.sweep import Sweep
     from rotor_mbs.studies.sweep import SweepPlan, SweepResult
 
 _MANY = 1_000_000  # runs that are not started without --yes
@@ -25,41 +23,32 @@ _MANY = 1_000_000  # runs that are not started without --yes
 
 def sweep(arguments: argparse.Namespace) -> int:
     """1 where a run did not succeed, or the disk is full. Raises InputError, StoreError."""
-    with closing(open_task_pool(arguments.engine, arguments.jobs)) as pool:
+    with open_task_pool(arguments.engine, arguments.jobs) as pool:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import plan_sweep
 
-        study = load_sweep(arguments.file)
-        plan = plan_sweep(study, arguments.method or (), arguments.part, arguments.timeout)
+        plan = plan_sweep(load_sweep(arguments.file), arguments.method or (), arguments.part, arguments.timeout)
         if arguments.dry_run:
             return _show_estimate(plan, pool, arguments)
         if plan.runs > _MANY and not arguments.yes:
             raise InputError(f"{arguments.file}: {plan.runs:,} runs; allowed without --yes: at most {_MANY:,}")
-        return _run(study, pool, arguments)
+        return _run(plan, pool, arguments)
 
 
-def _run(study: Sweep, pool: TaskPool, arguments: argparse.Namespace) -> int:
+def _run(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies.sweep import run_sweep
 
-    output = arguments.output or Path(f"{study.name}.{arguments.format}")
+    output = arguments.output or Path(f"{plan.sweep.name}.{arguments.format}")
     try:
         with SweepProgress(as_json=arguments.json) as progress:
-            result = run_sweep(
-                study,
-                output,
-                methods=arguments.method or (),
-                engine=pool,
-                part=arguments.part,
-                timeout_s=arguments.timeout,
-                on_progress=progress,
-            )
+            result = run_sweep(plan, output, pool, progress)
     except StoreError as exc:  # the disk, not the input: what is stored stays, the same command continues
         show(str(exc), sys.stderr)
         return 1
     _summarize(result, as_json=arguments.json)
     for line in result.lost:
         show(f"{line}; not computed, the same command tries again", sys.stderr)
-    if study.table.picture and arguments.part == (1, 1):
+    if plan.sweep.table.picture and arguments.part == (1, 1):
         from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
         from rotor_mbs.store.sweep_dataset import StoredSweep
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, suppress
-from dataclasses import asdict, dataclass, replace
+from contextlib import suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +42,7 @@ from rotor_mbs.scenario.sweep import Sweep, sweep_of
 from rotor_mbs.store.records import write_records
 from rotor_mbs.store.results_file import ResultsStore, refuse_other_kinds
 from rotor_mbs.store.sweep_dataset import StoredSweep
-from rotor_mbs.studies.sweep import run_sweep
+from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
 METHODS = (PRINTED, "lagrange/taylor")
 DURATIONS = (8.0, 10.0, 12.0)  # s, of the shares; of the numbers:
@@ -145,14 +145,14 @@ def claim_shares(
     shares: list[ClaimShare] = []
     done, total = 0, len(scenes) * len(durations)
     folder.mkdir(parents=True, exist_ok=True)
-    with closing(open_task_pool("local", workers)) as pool:
+    with open_task_pool("local", workers) as pool:
         for duration in durations:
             read: dict[str, list[dict[TrajectoryNumber, float | None]]]
             read = {method: [{} for _ in range(runs + 1)] for method in METHODS}
             for scene in scenes:
-                sweep = moved_starts(scene, duration, runs, seed)
+                plan = plan_sweep(moved_starts(scene, duration, runs, seed), time_limit_s=_TIMEOUT_S)
                 file = folder / f"{scene.name.replace('/', '-')}-{duration:g}s.h5"
-                result = run_sweep(sweep, file, engine=pool, timeout_s=_TIMEOUT_S)
+                result = run_sweep(plan, file, pool)
                 own = [number for number in asked if number.scene == scene.name]
                 for method, found in _by_method(StoredSweep(file), runs + 1):
                     for values, more in zip(read[method], found.values(own), strict=True):
@@ -184,16 +184,6 @@ def _by_method(sweep: StoredSweep, rows: int) -> Iterator[tuple[str, SampledRuns
         yield method, SampledRuns(sweep.column("time"), *(values[runs] for values in columns.values()))
 
 
-@dataclass(frozen=True)
-class Trial:
-    """A scene under conditions, for the numbers that are read off it."""
-
-    scene: Scene
-    conditions: Conditions
-    items: tuple[Published, ...]
-    remainder: float
-
-
 def number_trials(
     rows: Sequence[str] = tuple(GRAVITY_ROWS),
     durations: Sequence[float] = TRIED_DURATIONS,
@@ -219,32 +209,29 @@ def number_trials(
     )
     tried = [replace(usual, gravity_row=row, duration=duration) for row in rows for duration in durations]
     tried += [replace(usual, relative_tolerance=pair[0], absolute_tolerance=pair[1]) for pair in tolerances]
-    remainders = {row: _remainder(scenes[_AT_REST], row) for row in rows}
-    tasks = [
-        Trial(scene, one, tuple(item for item in items if name in item.scenes), remainders[one.gravity_row])
-        for one in dict.fromkeys(tried)
-        for name, scene in scenes.items()
-    ]
-    found: dict[tuple[Conditions, str], NumberTrial] = {}
+    read: dict[tuple[Conditions, str], float] = {}
     with local_pool(workers) as pool:
-        for end in run_in(pool, perform, tasks, _TIMEOUT_S):
+        tasks = [(scene, one) for one in dict.fromkeys(tried) for scene in scenes.values()]
+        for end in run_in(pool, numbers_of_run, tasks, _TIMEOUT_S):
             if end.value is None:
-                raise end.error or RotorError(f"{end.task.scene.name}: {end.message}")
-            found |= {(end.task.conditions, one.number): one for one in end.value}
-    in_order = (found[conditions, item.id] for conditions in dict.fromkeys(tried) for item in items)
-    return NumberTrials(tuple(in_order), usual, tuple(rows))
+                raise end.error or RotorError(f"{end.task[0].name}: {end.message}")
+            read |= {(end.task[1], number): value for number, value in end.value.items()}
+    remainders = {row: _remainder(scenes[_AT_REST], row) for row in rows}
+    trials = [
+        NumberTrial(item.id, one, value, rounds_to(value, item.value, item.decimals), remainders[one.gravity_row])
+        for one in dict.fromkeys(tried)
+        for item in items
+        for value in [read[one, item.id]]
+    ]
+    return NumberTrials(tuple(trials), usual, tuple(rows))
 
 
-def perform(task: Trial) -> list[NumberTrial]:
-    """The numbers of one run."""
-    settings = asdict(task.conditions)
-    run = solve(PRINTED, replace(task.scene, duration=settings.pop("duration")), settings).trajectory
-    found = []
-    for item in task.items:
-        value = math.nan if item.of is None or (read := measure(run, item.of)) is None else read
-        is_reproduced = rounds_to(value, item.value, item.decimals)  # NaN has no printed digits
-        found.append(NumberTrial(item.id, task.conditions, value, is_reproduced, task.remainder))
-    return found
+def numbers_of_run(task: tuple[Scene, Conditions]) -> dict[str, float]:
+    """By its id, every published number that is read off a scene; NaN, which has no printed digits, where it is not."""
+    scene, settings = task[0], asdict(task[1])
+    run = solve(PRINTED, replace(scene, duration=settings.pop("duration")), settings).trajectory
+    found = {item.id: item.of and measure(run, item.of) for item in published() if scene.name in item.scenes}
+    return {number: math.nan if value is None else value for number, value in found.items()}
 
 
 def _remainder(scene: Scene, row: str) -> float:

@@ -7,7 +7,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.execution import cores
-from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.execution.pool import Finished, T, TaskPool, run_in
 from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
@@ -138,8 +136,10 @@ class SweepPlan:
         }
 
 
-def plan_sweep(sweep: Sweep, methods: Sequence[str], part: tuple[int, int], time_limit_s: float) -> SweepPlan:
-    """The runs of part k of n (1, 1 for all) by `methods`, else by those of the file.
+def plan_sweep(
+    sweep: Sweep, methods: Sequence[str] = (), part: tuple[int, int] = (1, 1), time_limit_s: float = 60.0
+) -> SweepPlan:
+    """The runs of part k of n by `methods`, else by those of the file, each with a time limit in s.
 
     Raises InputError for a method or a setting that is not there, MethodRefusal where a method cannot do them.
     """
@@ -181,34 +181,23 @@ class SweepResult:
 
 
 def run_sweep(
-    sweep: Sweep,
+    plan: SweepPlan,
     output: Path,
-    *,
-    methods: Sequence[str] = (),
-    workers: int | None = None,
-    engine: str | TaskPool = "local",
-    part: tuple[int, int] = (1, 1),
-    timeout_s: float = 60.0,
+    pool: TaskPool,
     on_progress: OnProgress = lambda *_: None,
     work: Callable[[Chunk], Rows | NDArray[np.int8]] = perform,
 ) -> SweepResult:
     """Computes the runs that `output` misses. However it is interrupted, the same call continues from there.
 
-    methods       instead of those of the sweep
-    workers       number of processes, for the engine "local"; 0: all in this process; default: one per core
-    engine        "local", "dask:tcp://host:port", or a pool that is open
-    part          (k, n): part k of n alone, counted from 1
-    timeout_s     time limit of a run in s
+    pool          what runs the chunks; it stays open
     on_progress   called when runs have been stored, first with those that were there
     work          what is done with a chunk of runs in a worker
 
     Raises InputError, MethodRefusal where the sweep cannot be done, or the output is another file; StoreError where the
     output cannot be written: what was stored stays.
     """
-    plan = plan_sweep(sweep, methods, part, timeout_s)
     start = time.monotonic()
-    pool = open_task_pool(engine, cores() if workers is None else workers) if isinstance(engine, str) else engine
-    with nullcontext() if pool is engine else closing(pool), plan.opened(output) as (dataset, statuses):
+    with plan.opened(output) as (dataset, statuses):
         missing, lost = int((statuses == MISSING).sum()), list[str]()
         done = plan.runs - missing
         on_progress(done, plan.runs, Counter())

@@ -24,7 +24,7 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.store.sweep_columns import MISSING
 from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.run import able_methods, perform_run, selected_methods
-from rotor_mbs.studies.sweep import run_sweep
+from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
 METHODS = ("lagrange/dop853", "lagrange/radau", "exudyn_tree/rk44", "exudyn_tree/dopri5", "printed/ode45", "mujoco/rk4")
 METHODS += ("exudyn_chain/generalized_alpha", "lagrange/ode45")
@@ -81,7 +81,7 @@ def test_sweeps(tmp_path: Path, first: int, count: int) -> None:
         for seed in range(first, first + count):
             path = write(tmp_path / "sweep.toml", sweep_text(seed, "base.toml"))
             try:
-                result = run_sweep(load_sweep(path), tmp_path / f"{seed}.h5", engine=pool, timeout_s=_LIMIT_S)
+                result = run_sweep(plan_sweep(load_sweep(path), time_limit_s=_LIMIT_S), tmp_path / f"{seed}.h5", pool)
                 found = StoredSweep(result.path).column("status")
                 statuses.update(STATUSES[code] for code in found.tolist())
                 if result.lost or (found == MISSING).any():

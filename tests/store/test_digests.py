@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from support.checking import failed, judged, results_file
+from support.sweeps import run_local
 
 import rotor_mbs as rm
 from rotor_mbs.analysis.claim_records import shipped_claims
@@ -21,7 +22,6 @@ from rotor_mbs.store.digests import seal
 from rotor_mbs.store.read import open_results
 from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.store.sweep_dataset import StoredSweep
-from rotor_mbs.studies.sweep import run_sweep
 
 METHOD = "lagrange/dop853"
 RUN = f"check/held/{METHOD}"
@@ -222,7 +222,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         'samples = 3\noutputs = ["angles", "rates"]\n[change]\nduration = 0.2\n'
         '[[axis]]\nkey = "gravity"\nvalues = [9.7, 9.8, 9.9]\n'
     )
-    run_sweep(load_sweep(folder / "s.toml"), folder / "s.h5", workers=1)
+    run_local(load_sweep(folder / "s.toml"), folder / "s.h5", workers=1)
     return folder / "s.h5"
 
 

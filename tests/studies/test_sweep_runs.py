@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.sweeps import command, stored_runs, wait_for_runs, workers_of
+from support.sweeps import command, run_local, stored_runs, wait_for_runs, workers_of
 
 from rotor_mbs.cli import main
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -24,7 +24,6 @@ from rotor_mbs.scenario.sweep import load_sweep, sweep_of
 from rotor_mbs.store import hdf5
 from rotor_mbs.store.sweep_columns import MISSING, Rows
 from rotor_mbs.store.sweep_dataset import StoredSweep
-from rotor_mbs.studies.sweep import run_sweep
 from rotor_mbs.studies.sweep_work import Chunk, perform
 
 _SWEEP = """
@@ -117,7 +116,7 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     marks, output = tmp_path / "marks", tmp_path / "o.h5"
     monkeypatch.setenv("ROTOR_TEST_MARKS", str(marks))
     sweep = load_sweep(_file(tmp_path, draws=16))
-    result = run_sweep(sweep, output, methods=[method], workers=2, work=_killing)
+    result = run_local(sweep, output, methods=[method], workers=2, work=_killing)
     assert (result.made, result.statuses, result.is_ok) == (31, {"ok": 31}, False)
     (line,) = result.lost
     assert line.startswith("run 5: its process died")
@@ -128,7 +127,7 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     assert stored.column("status")[5] == MISSING
     assert np.isfinite(np.delete(stored.column("angles"), 5, axis=0)).all()
     # The same sweep tries it again; nothing of the machine's trouble stays in the file.
-    again = run_sweep(sweep, output, methods=[method], workers=1)
+    again = run_local(sweep, output, methods=[method], workers=1)
     assert (again.made, again.statuses, again.is_ok, again.lost) == (1, {"ok": 32}, True, ())
 
 
@@ -139,7 +138,7 @@ def _own_process(chunk: Chunk) -> Rows | NDArray[np.int8]:
 
 def test_no_workers_are_this_process_as_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROTOR_TEST_PARENT", str(os.getpid()))
-    result = run_sweep(load_sweep(_file(tmp_path)), tmp_path / "o.h5", workers=0, work=_own_process)
+    result = run_local(load_sweep(_file(tmp_path)), tmp_path / "o.h5", workers=0, work=_own_process)
     assert result.statuses == {"ok": 8}
 
 
@@ -151,12 +150,12 @@ def _hanging(chunk: Chunk) -> Rows | NDArray[np.int8]:
 
 def test_a_run_that_hangs_is_ended_and_the_others_go_on(tmp_path: Path) -> None:
     output = tmp_path / "o.h5"
-    result = run_sweep(load_sweep(_file(tmp_path)), output, workers=2, timeout_s=6.0, work=_hanging)
+    result = run_local(load_sweep(_file(tmp_path)), output, workers=2, timeout_s=6.0, work=_hanging)
     assert result.statuses == {"ok": 7, "timed_out": 1}
     assert StoredSweep(output).column("message")[2].tobytes().rstrip(b"\0") == b"ended after 11 s"
     assert StoredSweep(output).column("time_limit_s")[2] == 6.0
     for limit, made in ((5.0, 0), (6.0, 0), (7.0, 1)):  # a longer limit tries it again
-        again = run_sweep(load_sweep(_file(tmp_path)), output, workers=1, timeout_s=limit)
+        again = run_local(load_sweep(_file(tmp_path)), output, workers=1, timeout_s=limit)
         assert again.made == made
     assert again.statuses == {"ok": 8}
 
@@ -170,7 +169,7 @@ def test_progress_counts_what_was_there_and_what_is_made(tmp_path: Path) -> None
 
     for made in (8, 0):
         reports.clear()
-        result = run_sweep(sweep, output, workers=1, on_progress=report)
+        result = run_local(sweep, output, workers=1, on_progress=report)
         assert (result.runs, result.made, result.statuses, result.is_ok) == (8, made, {"ok": 8}, True)
         assert reports[0] == (8 - made, 8, 0)
         assert reports[-1][:2] == (8, 8)
@@ -390,6 +389,6 @@ def test_a_quantity_of_another_package_is_stored(tmp_path: Path, monkeypatch: py
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]))
     scene = find_scenes(["paper/fig11"])[0].replace(duration=0.2)
     sweep = sweep_of(scene, {"gravity": [9.0, 10.0]}, samples=5, outputs=["angles", "squares"], methods=[method])
-    run_sweep(sweep, tmp_path / "o.h5", workers=1)
+    run_local(sweep, tmp_path / "o.h5", workers=1)
     stored = StoredSweep(tmp_path / "o.h5")
     np.testing.assert_array_equal(stored.column("pitch_squares"), stored.column("angles")[:, :, 1:] ** 2)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
-from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep import plan_sweep
+from rotor_mbs.execution.dask_cluster import open_task_pool
+from rotor_mbs.scenario.sweep import Sweep, load_sweep
+from rotor_mbs.studies.sweep import SweepResult, plan_sweep, run_sweep
 from rotor_mbs.studies.sweep_work import rows_of
 
 MAP = """title = "Speed & stiffness"
@@ -34,11 +37,20 @@ linear = {start = 0.25, end = 20, count = 4}
 def made_sweep(folder: Path, text: str = MAP) -> Path:
     """The dataset of the sweep file `text`, complete, made in this process."""
     (folder / "s.toml").write_text(text)
-    plan = plan_sweep(load_sweep(folder / "s.toml"), (), (1, 1), 60.0)
+    plan = plan_sweep(load_sweep(folder / "s.toml"))
     with plan.opened(folder / "s.h5") as (runs, statuses):
         for chunk in plan.chunks([(0, plan.runs)]):
             statuses[chunk.first : chunk.last] = runs.write(chunk.first, rows_of(chunk))
     return folder / "s.h5"
+
+
+def run_local(
+    sweep: Sweep, output: Path, workers: int, methods: Sequence[str] = (), timeout_s: float = 60.0, **options: Any
+) -> SweepResult:
+    """The sweep by workers of this machine; options: of `run_sweep`."""
+    plan = plan_sweep(sweep, methods, time_limit_s=timeout_s)
+    with open_task_pool("local", workers) as pool:
+        return run_sweep(plan, output, pool, **options)
 
 
 def command(path: Path, output: Path, *more: str) -> list[str]:
