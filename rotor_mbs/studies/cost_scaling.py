@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -35,24 +35,15 @@ _DURATIONS = (1.0, 10.0, 60.0, 600.0, 3600.0)  # s
 _BUDGETS = 3.0
 
 
-@dataclass(frozen=True)
-class CostStudy:
-    """kind: what grows; base: the scene that is varied; scenes: by size."""
+def cost_studies() -> dict[str, tuple[Scene, dict[float, Scene]]]:
+    """By what grows, the scene that is varied, and the scenes by size.
 
-    kind: str
-    base: Scene
-    scenes: Mapping[float, Scene]
-
-
-def cost_studies() -> tuple[CostStudy, CostStudy]:
-    """Blades: like the paper's Fig. 8, every blade pitched a little, for the second in which no error has grown much.
-    Duration: one blade with its pitch at rest, a plain pendulum, whose motion stays regular (Fig. 3)."""
+    Blades: like the paper's Fig. 8, every blade pitched a little, for the second in which no error has grown much.
+    Duration: one blade with its pitch at rest, a plain pendulum, whose motion stays regular (Fig. 3).
+    """
     many, one = find_scenes(["paper/fig08"])[0], find_scenes(["paper/fig03"])[0]
     by_duration = {t: replace(one, duration=t, samples=round(10 * t) + 1) for t in _DURATIONS}
-    return (
-        CostStudy("blades", many, {float(n): with_blades(many, n) for n in _BLADES}),
-        CostStudy("duration", one, by_duration),
-    )
+    return {"blades": (many, {float(n): with_blades(many, n) for n in _BLADES}), "duration": (one, by_duration)}
 
 
 def with_blades(scene: Scene, count: int) -> Scene:
@@ -88,10 +79,10 @@ def run_cost_scaling(
     chosen = [m for m in all_methods() if m.cost_scaling is not None and (not methods or m.name in methods)]
     cases = [
         Case(
-            study.base, method.name, method.cost_scaling or {}, f"cost with {study.kind}",
-            {**options, "kind": study.kind, "sizes": list(study.scenes)}, sources=(*SOURCES, "studies/cost_scaling.py"),
+            base, method.name, method.cost_scaling or {}, f"cost with {kind}",
+            {**options, "kind": kind, "sizes": list(scenes)}, sources=(*SOURCES, "studies/cost_scaling.py"),
         )
-        for study in cost_studies()
+        for kind, (base, scenes) in cost_studies().items()
         for method in chosen
     ]  # fmt: skip
     return execute(cases, _time_by_study, ResultsStore(output), on_progress)
@@ -99,29 +90,26 @@ def run_cost_scaling(
 
 def _time_by_study(waves: Iterable[Sequence[Job]]) -> Iterator[tuple[Job, Result]]:
     jobs = list(chain.from_iterable(waves))
-    for study in cost_studies():
-        points = {
-            job: [
-                Point(job.case.method, job.case.method, size, tuple(sorted(job.case.settings.items())))
-                for size in study.scenes
-            ]
-            for job in jobs
-            if job.case.options["kind"] == study.kind
-        }
-        scenes = {point: (study.scenes[point.setting], None) for curve in points.values() for point in curve}
+    for kind, (_, scenes) in cost_studies().items():
+        points = {job: _points(job.case, scenes) for job in jobs if job.case.options["kind"] == kind}
+        scene_of = {point: (scenes[point.setting], None) for curve in points.values() for point in curve}
         if points:
-            measured = measure_points(scenes, list(points.values()), jobs[0].case.options)
+            measured = measure_points(scene_of, list(points.values()), jobs[0].case.options)
             started = time.strftime("%Y-%m-%dT%H:%M:%S")
             for job, own in points.items():
-                yield measured.finished(job, own, partial(_curve, study, job.case, started))
+                yield measured.finished(job, own, partial(_curve, scenes, job.case, started))
 
 
-def _curve(study: CostStudy, case: Case, started: str, rows: Sequence[Mapping[str, Any]]) -> Record:
-    arrays = arrays_of(rows)
-    arrays["simulated_s"] = np.array([study.scenes[size].duration for size in arrays["setting"]])
+def _points(case: Case, sizes: Iterable[float]) -> list[Point]:
+    return [Point(case.method, case.method, size, tuple(sorted(case.settings.items()))) for size in sizes]
+
+
+def _curve(scenes: Mapping[float, Scene], case: Case, started: str, rows: Sequence[Mapping[str, Any]]) -> Record:
+    arrays, kind = arrays_of(rows), case.options["kind"]
+    arrays["simulated_s"] = np.array([scenes[size].duration for size in arrays["setting"]])
     attributes: dict[str, Any] = {
         "method": case.method,
-        "setting_kind": study.kind,
+        "setting_kind": kind,
         "settings": str(dict(case.settings)),
         "messages": [str(row["message"]) for row in rows],
         "started": started,
@@ -132,4 +120,4 @@ def _curve(study: CostStudy, case: Case, started: str, rows: Sequence[Mapping[st
     rate = arrays["run_time_s"] / arrays["simulated_s"]
     if (exponent := cost_exponent(arrays["setting"][ok], rate[ok])) is not None:
         attributes["exponent"] = exponent
-    return Record(BENCH, f"{COST_SCALING}/{study.kind}", case.method, attributes, arrays)
+    return Record(BENCH, f"{COST_SCALING}/{kind}", case.method, attributes, arrays)
