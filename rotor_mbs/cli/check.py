@@ -29,7 +29,7 @@ def check(arguments: argparse.Namespace) -> int:
         found = study.check_file(arguments.file, bounds, required)
     else:
         with ProgressLine() as progress:
-            found = study.check_default_set(study.default_set(), bounds, arguments.jobs, progress)
+            found = study.check_default_set(bounds, arguments.jobs, progress)
     if arguments.speed:
         found += study.check_speed(bounds)
     if found and earlier is not None:

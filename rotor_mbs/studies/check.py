@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from rotor_mbs.analysis.run_integrity import defaults_faults
@@ -36,25 +36,19 @@ _OF_EVERY_RUN = "status"  # a check that each run has one verdict of
 _ROUNDING = 2.0**-50
 
 
-@dataclass(frozen=True)
-class DefaultSet:
-    """What is computed where no file is given: methods by scene name, and measurements beside them."""
+def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
+    """Scenes, and methods by scene name, that are computed where no file is given.
 
-    scenes: Sequence[Scene]
-    methods: Mapping[str, Sequence[str]]
-    probes: Sequence[Case]
-
-
-def default_set() -> DefaultSet:
-    """Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method."""
+    Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method.
+    """
     paper, own = find_scenes(["paper"]), find_scenes(["check"])
     corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
-    methods = {
+    methods: dict[str, Sequence[str]] = {
         scene.name: [name for name in default_methods() if name != _CHAIN or scene.name in _CHAIN_SCENES]
         for scene in paper
     }
     methods |= {scene.name: corrected for scene in own}
-    return DefaultSet([*paper, *own], methods, probes())
+    return [*paper, *own], methods
 
 
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Verdict]:
@@ -69,19 +63,15 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
     return [*found, *(_required(*one, "not in the file", is_missing=one not in there) for one in wanted)]
 
 
-def check_default_set(
-    chosen: DefaultSet, bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress
-) -> list[Verdict]:
+def check_default_set(bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress) -> list[Verdict]:
     """Computes the set and judges it, and the frozen references and bounds that it is judged by."""
     found = [*judge_bounds(bounds), *judge_frozen(bounds), *judge_defaults(bounds)]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
-        report = run_scenes(
-            chosen.scenes, chosen.methods, path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress
-        )
+        report = run_scenes(*default_set(), path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
         found += [_required(one.case.scene.name, one.case.method, one.result.message) for one in report.not_computed]
         found += judge_file(path, bounds)
-    return found + judge_probes(chosen.probes, bounds, workers)
+    return found + judge_probes(probes(), bounds, workers)
 
 
 def check_speed(bounds: Bounds) -> list[Verdict]:

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 _DONE, _FAILED = Integration(True), Integration(False, "gave up")
 _OUT_OF_TIME = Integration(False, "ended", 0.5, out_of_time=True)
+_METHOD = "lagrange/taylor"
 _GRAVITY, _STIFFNESS, _SPRUNG = 0.5, 2e4, 0.5
 _LONG = Blade(1000.0, (0.1, 0.0, 10.0), (0.0,) * 6, (0.1, 0.0, 20.0))
 _SHORT = Blade(1000.0, (0.1, 0.0, 5.0), (0.0,) * 6, (0.1, 0.0, 20.0))
@@ -44,12 +46,12 @@ class KnownRun:
     """A run whose status is known."""
 
     name: str
-    method: str
     status: str
     trajectory: Trajectory
     engine: Integration = field(default_factory=lambda: _DONE)
     reference: Trajectory | None = None
     is_false_success: bool | None = False  # None: not asked
+    method: str = _METHOD
 
     def faults(self) -> str:
         """What the judgement says against what is known; "" where it is right."""
@@ -151,83 +153,76 @@ def _at_the_bounds(method: str, bounds: Bounds) -> Iterator[KnownRun]:
     exact = _moving()
     energy, angle = bounds.of("energy", method).value, bounds.of("agreement", method).value
     for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "inaccurate"), (math.nan, "inaccurate")):
-        asked = None if math.isnan(side) else False
-        drifting, wrong = _with_drift(exact, side * energy), _with_error(exact, side * angle)
-        yield KnownRun(f"energy drift of {side:g} bounds", method, status, drifting, is_false_success=asked)
-        yield KnownRun(
-            f"angle error of {side:g} bounds", method, status, wrong, reference=exact, is_false_success=asked
-        )
+        known = partial(KnownRun, method=method, is_false_success=None if math.isnan(side) else False)
+        yield known(f"energy drift of {side:g} bounds", status, _with_drift(exact, side * energy))
+        yield known(f"angle error of {side:g} bounds", status, _with_error(exact, side * angle), reference=exact)
         if bounds.find("gap", method):
             gap = np.full(11, side * bounds.of("gap", method).value * math.hypot(0.1, 10.0))
-            opened = exact.replace(constraint_error=gap)
-            yield KnownRun(f"gap of {side:g} bounds", method, status, opened, is_false_success=asked)
+            yield known(f"gap of {side:g} bounds", status, exact.replace(constraint_error=gap))
     if not bounds.find("gap", method):
-        gap = np.full(11, 1e-15)
-        yield KnownRun("a gap without a joint", method, "inaccurate", exact.replace(constraint_error=gap))
+        opened = exact.replace(constraint_error=np.full(11, 1e-15))
+        yield KnownRun("a gap without a joint", "inaccurate", opened, method=method)
 
 
 def _broken_off() -> Iterator[KnownRun]:
-    exact, method = _moving(), "lagrange/taylor"
+    exact = _moving()
     nothing = Trajectory(np.empty(0), np.empty((0, 4)), np.empty((0, 4)))  # with no sample there are no energies
-    yield KnownRun("complete, the engine reports success", method, "ok", exact)
+    yield KnownRun("complete, the engine reports success", "ok", exact)
     silent = exact.replace(kinetic_energy=None, potential_energy=None, work=None)
-    yield KnownRun("complete, nothing to judge it by", method, "unchecked", silent)
-    yield KnownRun("complete, judged by its angles alone", method, "ok", silent, reference=exact)
+    yield KnownRun("complete, nothing to judge it by", "unchecked", silent)
+    yield KnownRun("complete, judged by its angles alone", "ok", silent, reference=exact)
     at_once = exact.replace(error_growth=np.where(np.arange(11) < 1, 1.0, 2e5))
-    yield KnownRun("energies missing, past the horizon at once", method, "unchecked", silent, reference=at_once)
+    yield KnownRun("energies missing, past the horizon at once", "unchecked", silent, reference=at_once)
     for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "unchecked")):
         far = exact.replace(angles=exact.angles.copy())
         far.angles[5, 0] = -side * ANGLE_LIMIT
-        yield KnownRun(f"a rotor angle of {side:g} times the limit", method, status, far)
-    yield KnownRun("complete, the engine reports failure", method, "solver_failed", exact, _FAILED)
+        yield KnownRun(f"a rotor angle of {side:g} times the limit", status, far)
+    yield KnownRun("complete, the engine reports failure", "solver_failed", exact, _FAILED)
     short = _cut(exact, 10)
-    yield KnownRun("one sample short of the end, a claim of success", method, "diverged", short, is_false_success=True)
-    yield KnownRun("one sample short of the end, a failure", method, "solver_failed", _cut(exact, 10), _FAILED)
-    yield KnownRun("short of the end, out of time", method, "timed_out", _cut(exact, 5), _OUT_OF_TIME)
-    yield KnownRun("no sample, a claim of success", method, "diverged", nothing, is_false_success=True)
-    yield KnownRun("no sample, a failure", method, "solver_failed", nothing, _FAILED)
+    yield KnownRun("one sample short of the end, a claim of success", "diverged", short, is_false_success=True)
+    yield KnownRun("one sample short of the end, a failure", "solver_failed", _cut(exact, 10), _FAILED)
+    yield KnownRun("short of the end, out of time", "timed_out", _cut(exact, 5), _OUT_OF_TIME)
+    yield KnownRun("no sample, a claim of success", "diverged", nothing, is_false_success=True)
+    yield KnownRun("no sample, a failure", "solver_failed", nothing, _FAILED)
 
 
 def _singular() -> Iterator[KnownRun]:
     """Every pitch at ±π/2 leaves the rotor cos²θ of its inertia."""
-    method, exact = "lagrange/taylor", _moving()
+    exact = _moving()
     near, far = (_moving(math.acos(math.sqrt(share))) for share in (0.8e-3, 1.2e-3))
-    yield KnownRun("broken off near the singularity", method, "singular", _cut(near, 5), _FAILED)
-    yield KnownRun("broken off away from the singularity", method, "solver_failed", _cut(far, 5), _FAILED)
+    yield KnownRun("broken off near the singularity", "singular", _cut(near, 5), _FAILED)
+    yield KnownRun("broken off away from the singularity", "solver_failed", _cut(far, 5), _FAILED)
     rim = math.acos(math.sqrt(1e-3))  # the pitch at which "near" begins; a sample's interval is 0.1 s
     for beyond, status in ((0.001, "singular"), (-0.001, "solver_failed")):
         on_the_way = _cut(_moving(rim - 0.1 + beyond), 5)
         on_the_way.rates[-1, 1:] = 1.0
-        yield KnownRun(f"broken off {0.1 - beyond:g} s before it", method, status, on_the_way, _FAILED)
-    yield KnownRun(
-        "from a singular start to the end", method, "singular", _moving(0.5 * math.pi), is_false_success=True
-    )
+        yield KnownRun(f"broken off {0.1 - beyond:g} s before it", status, on_the_way, _FAILED)
+    yield KnownRun("from a singular start to the end", "singular", _moving(0.5 * math.pi), is_false_success=True)
     # Four and five doubles below π/2: shares of 9.0e-31 and 1.4e-30.
     four, five = (0.5 * math.pi - math.ulp(1.0) * count for count in (4, 5))
-    yield KnownRun("from the last singular start to the end", method, "singular", _moving(four), is_false_success=True)
-    yield KnownRun("from the first regular start to the end", method, "ok", _moving(five))
+    yield KnownRun("from the last singular start to the end", "singular", _moving(four), is_false_success=True)
+    yield KnownRun("from the first regular start to the end", "ok", _moving(five))
     ended = _cut(near, 5)
-    yield KnownRun("past the end of the motion", method, "singular", exact, reference=ended, is_false_success=True)
-    yield KnownRun("past the end of a reference that merely stops", method, "ok", far, reference=_cut(far, 5))
+    yield KnownRun("past the end of the motion", "singular", exact, reference=ended, is_false_success=True)
+    yield KnownRun("past the end of a reference that merely stops", "ok", far, reference=_cut(far, 5))
 
 
 def _conditioned(bounds: Bounds) -> Iterator[KnownRun]:
     """Near ±π/2 the energy magnifies round-off, 1e-14 of it, by √(1e-3/share): at a sample and between two."""
-    method = "lagrange/taylor"
-    allowed = bounds.of("energy", method).value
+    allowed = bounds.of("energy", _METHOD).value
     near = _moving(math.acos(math.sqrt(1e-13)))  # 1e5-fold: 1e-9 more than without
     for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "inaccurate")):
         drift = allowed + side * (1e5 - 1.0) * 1e-14
-        yield KnownRun(f"drift of {side:g} of what a small share allows", method, status, _with_drift(near, drift))
+        yield KnownRun(f"drift of {side:g} of what a small share allows", status, _with_drift(near, drift))
     apart = _with_drift(_one_by_one(), 2.0 * allowed)
-    yield KnownRun("drift, one after the other through π/2", method, "inaccurate", apart)
+    yield KnownRun("drift, one after the other through π/2", "inaccurate", apart)
     for sign in (1.0, -1.0):
         through = _through(sign * 0.5, 1.5)
-        yield KnownRun("drift, between samples through ±π/2", method, "ok", _with_drift(through, 1e3 * allowed))
+        yield KnownRun("drift, between samples through ±π/2", "ok", _with_drift(through, 1e3 * allowed))
         beside = _through(sign * 0.5, 0.1, others=0.5)
-        yield KnownRun("drift, one of three through ±π/2", method, "inaccurate", _with_drift(beside, 2.0 * allowed))
+        yield KnownRun("drift, one of three through ±π/2", "inaccurate", _with_drift(beside, 2.0 * allowed))
         leap = _through(sign * 0.5, 1.65)
-        yield KnownRun("drift, in leaps over ±π/2", method, "inaccurate", _with_drift(leap, 2.0 * allowed))
+        yield KnownRun("drift, in leaps over ±π/2", "inaccurate", _with_drift(leap, 2.0 * allowed))
 
 
 def _one_by_one() -> Trajectory:
@@ -254,8 +249,7 @@ def _through(quarter: float, step: float, others: float | None = None) -> Trajec
 
 def _carried(bounds: Bounds) -> Iterator[KnownRun]:
     """A scene's own error growth, and the size of its angles, are not the method's fault; past the horizon none is."""
-    method = "lagrange/taylor"
-    allowed = bounds.of("agreement", method).value
+    allowed = bounds.of("agreement", _METHOD).value
     cases = (
         # growth; the rotor's start, its way from there to the error, a pitch; coordinate of the error; what is allowed
         (100.0, 0.0, 0.0, 0.0, 0, 100.0),
@@ -273,14 +267,14 @@ def _carried(bounds: Bounds) -> Iterator[KnownRun]:
         for side, status in ((1.0 - _JUST, "ok"), (1.0 + _JUST, "inaccurate")):
             name = f"error of {side:g} bounds in {column}: growth {growth:g}, start {start:g}, {way:g}, pitch {pitch:g}"
             wrong = _with_error(exact, side * allowed * factor, column=column)
-            yield KnownRun(name, method, status, wrong, reference=exact)
+            yield KnownRun(name, status, wrong, reference=exact)
     for growth, status in ((0.9e5, "inaccurate"), (1.1e5, "ok")):
         exact = _moving().replace(error_growth=_growth(growth))
-        yield KnownRun(f"error at growth {growth:g}", method, status, _with_error(exact, 0.1, 8), reference=exact)
+        yield KnownRun(f"error at growth {growth:g}", status, _with_error(exact, 0.1, 8), reference=exact)
     early = _moving().replace(error_growth=_growth(1.0))
     early.error_growth[2] = 200.0
     wrong = _with_error(early, 100.0 * allowed, 8)
-    yield KnownRun("error after a growth that has gone back", method, "ok", wrong, reference=early)
+    yield KnownRun("error after a growth that has gone back", "ok", wrong, reference=early)
 
 
 def _growth(value: float) -> Array:
@@ -290,18 +284,16 @@ def _growth(value: float) -> Array:
 
 def _gross() -> Iterator[KnownRun]:
     """A hundredth of the scale or of the angle parts a coarse run from one that is another motion."""
-    exact, method = _moving(), "lagrange/taylor"
+    exact = _moving()
     for side, lie in ((1.0 - _JUST, False), (1.0 + _JUST, True)):
         drifting, wrong = _with_drift(exact, side * 1e-2), _with_error(exact, side * 1e-2)
-        yield KnownRun(f"a drift of {side:g} %", method, "inaccurate", drifting, is_false_success=lie)
-        yield KnownRun(f"an error of {side:g} %", method, "inaccurate", wrong, reference=exact, is_false_success=lie)
+        yield KnownRun(f"a drift of {side:g} %", "inaccurate", drifting, is_false_success=lie)
+        yield KnownRun(f"an error of {side:g} %", "inaccurate", wrong, reference=exact, is_false_success=lie)
 
 
 def _unbounded() -> Iterator[KnownRun]:
     """The printed equations have no bounds for energy and error: they must reach the end, no more."""
-    exact = _moving()
-    yield KnownRun(
-        "printed, far off", "printed/ode45", "ok", _with_drift(_with_error(exact, 1.0), 1.0), reference=exact
-    )
-    yield KnownRun("printed, broken off", "printed/ode45", "solver_failed", _cut(exact, 5), _FAILED)
-    yield KnownRun("printed, past the motion's end", "printed/ode45", "ok", exact, reference=_cut(_moving(1.5707), 5))
+    exact, known = _moving(), partial(KnownRun, method="printed/ode45")
+    yield known("printed, far off", "ok", _with_drift(_with_error(exact, 1.0), 1.0), reference=exact)
+    yield known("printed, broken off", "solver_failed", _cut(exact, 5), _FAILED)
+    yield known("printed, past the motion's end", "ok", exact, reference=_cut(_moving(1.5707), 5))

@@ -74,7 +74,7 @@ def test_without_mujoco_the_other_methods_are_as_before() -> None:
     code = """
 from rotor_mbs.methods.catalogue import default_methods, find_method
 from rotor_mbs.studies.check import default_set
-assert not any(name.startswith("mujoco") for names in default_set().methods.values() for name in names)
+assert not any(name.startswith("mujoco") for names in default_set()[1].values() for name in names)
 assert not any(name.startswith("mujoco") for name in default_methods())
 assert not find_method("mujoco/rk4").is_installed and find_method("mujoco/rk4").label == "MuJoCo, RK4"
 sys.exit(main(["show", "paper/fig03"]))
