@@ -7,16 +7,18 @@ how far from steady it is there.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis.campbell import REST, ROTATION, FloquetTable, LinearModes, SceneModes, StabilityChart
 from rotor_mbs.analysis.mode_records import to_records
-from rotor_mbs.analysis.modes import GROWTH, Complex, ModeSet, floquet, isotropic_modes, modes_of, track
+from rotor_mbs.analysis.modes import GROWTH, Complex, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
@@ -122,49 +124,50 @@ def is_isotropic(scene: Scene, pitches: Array) -> bool:
 
 def _linear(scene: Scene, kind: str, speeds: Array, notes: list[str]) -> dict[str, LinearModes]:
     """By model; a model that cannot do any of the speeds is left out, with a note."""
-    points, messages = _steady_states(scene, kind, speeds)
-    if not any(points):
-        notes.append(messages[0])
+    points = _steady_states(scene, kind, speeds)
+    steady = [point for point in points if not isinstance(point, str)]
+    if not steady:
+        notes.append(str(points[0]))
         return {}
-    symmetric = all(is_isotropic(at, angles[1:]) for at, angles, _, _ in filter(None, points))
+    symmetric = all(is_isotropic(at, angles[1:]) for at, angles, _, _ in steady)
     found = {}
     for model, method in linearizing_methods().items():
-        assert method.linearize is not None  # linearizing_methods says so
         try:
-            made = [None if point is None else _checked(method.linearize, model, point) for point in points]
+            made = [_linearized(method, point) for point in steady]
         except MethodRefusal as exc:
             if kind == REST:
                 notes.append(str(exc))
             continue
-        found[model] = _modes_over_speed(scene, kind, method, speeds, points, made, messages, symmetric)
+        found[model] = _modes_over_speed(scene, kind, method, speeds, points, made, symmetric)
     return found
 
 
-def _steady_states(scene: Scene, kind: str, speeds: Array) -> tuple[list[_Point | None], list[str]]:
-    """(scene as it is linearized, angles, speed, torque) at each speed; None and the reason where there is no such."""
+def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]:
+    """(scene as it is linearized, angles, speed, torque) at each speed; the reason where there is no such."""
     from rotor_mbs.models.lagrange.linearization import equilibrium, holding_torque, steady_rotation
 
     at = scene if kind == REST else replace(scene, gravity=0.0)
     start = scene  # of each slower speed: the pitches before, so that one branch is followed down to rest
-    found: list[tuple[_Point | None, str]] = []
+    found: list[_Point | str] = []
     for speed in map(float, speeds[::-1]):
         try:
             angles = equilibrium(start) if kind == REST else steady_rotation(start, speed)
         except InputError as exc:
-            found.append((None, str(exc)))
+            found.append(str(exc))
         except ZeroDivisionError:
-            found.append((None, f"{scene.name}: singular at {speed:g} rad/s"))
+            found.append(f"{scene.name}: singular at {speed:g} rad/s")
         else:
             start = replace(start, initial_angles=tuple(angles.tolist()))
-            found.append(((replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed)), ""))
-    return [point for point, _ in found[::-1]], [message for _, message in found[::-1]]
+            found.append((replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed)))
+    return found[::-1]
 
 
-def _checked(linearize: Callable[..., Linearization], model: str, point: _Point) -> Linearization:
-    made = linearize(*point)
+def _linearized(method: Method, point: _Point) -> Linearization:
+    assert method.linearize is not None  # linearizing_methods says so
+    made = method.linearize(*point)
     left = np.abs(made.residual).max(initial=0.0)
     if left > _STEADY * max(np.abs(made.stiffness).max(), 1e-12):
-        raise MethodRefusal(f"{model}: accelerates by {left:.1e} rad/s^2 where the closed form is steady")
+        raise MethodRefusal(f"{method.model}: accelerates by {left:.1e} rad/s^2 where the closed form is steady")
     return made
 
 
@@ -173,29 +176,25 @@ def _modes_over_speed(
     kind: str,
     method: Method,
     speeds: Array,
-    points: Sequence[_Point | None],
-    made: Sequence[Linearization | None],
-    messages: Sequence[str],
+    points: Sequence[_Point | str],
+    made: Sequence[Linearization],
     symmetric: bool,
 ) -> LinearModes:
-    columns = scene.moving_coordinates
-    n = len(columns)
-    unknown = np.full((n, n), np.nan)
-    sets = []
-    for point, one in zip(points, made, strict=True):
-        if one is None or point is None:
-            continue
-        if symmetric:
-            sets.append(isotropic_modes(one.stiffness, one.damping))
-        else:
-            sets.append(modes_of(one.stiffness, one.damping, is_cyclic=point[0].gravity == 0.0))
-    tracked = iter(track(sets))
-    nothing = ModeSet(np.full((n, 2), complex(np.nan, np.nan)), unknown.astype(complex))
-    at_speeds = [nothing if one is None else next(tracked) for one in made]
+    """made: at the points that are no reason why there is none; NaN at the others."""
+    columns, n = scene.moving_coordinates, len(scene.moving_coordinates)
+    there = [not isinstance(point, str) for point in points]
+
+    def over_speed(values: Sequence[NDArray[Any]], nothing: complex = np.nan) -> NDArray[Any]:
+        whole = np.full((len(points), *values[0].shape), nothing, values[0].dtype)
+        whole[there] = values
+        return whole
+
+    modes = isotropic_modes if symmetric else partial(modes_of, is_cyclic=kind == ROTATION or scene.gravity == 0.0)
+    sets = track([modes(one.stiffness, one.damping) for one in made])
     names = (name if name == "rotor" else f"{name} pitch" for name in sets[0].names)
     return LinearModes(
-        eigenvalues=np.array([each.eigenvalues for each in at_speeds]),
-        shapes=np.array([each.shapes for each in at_speeds]),
+        eigenvalues=over_speed([each.eigenvalues for each in sets], complex(np.nan, np.nan)),
+        shapes=over_speed([each.shapes for each in sets]),
         names=tuple(names) or tuple(f"mode {k + 1}" for k in range(n)),
         source=method.model,
         label=method.model_label,
@@ -203,10 +202,10 @@ def _modes_over_speed(
         blades=len(scene.blades),
         speeds=speeds,
         coordinates=tuple(scene.coordinate_labels[column] for column in columns),
-        angles=np.array([np.full(n, np.nan) if point is None else point[1][columns] for point in points]),
-        stiffness=np.array([unknown if one is None else one.stiffness for one in made]),
-        damping=np.array([unknown if one is None else one.damping for one in made]),
-        messages=tuple(messages),
+        angles=over_speed([point[1][columns] for point in points if not isinstance(point, str)]),
+        stiffness=over_speed([one.stiffness for one in made]),
+        damping=over_speed([one.damping for one in made]),
+        messages=tuple(point if isinstance(point, str) else "" for point in points),
     )
 
 
