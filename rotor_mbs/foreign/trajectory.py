@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import Channel
+from rotor_mbs.foreign.channels import Channel, Source, read_mapping, sources
 from rotor_mbs.foreign.files import read_table
-from rotor_mbs.foreign.mapping import Source, read_mapping, sources
 from rotor_mbs.foreign.table import DataTable, table_of
 from rotor_mbs.scenario.scene import Scene
 
