@@ -13,7 +13,7 @@ import warnings
 import weakref
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -119,7 +119,7 @@ def run(
     True
     """
     found, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
-    return _with_reference(found, exact)
+    return Run(**vars(found), reference=exact)
 
 
 @dataclass(repr=False)
@@ -417,15 +417,9 @@ def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
     if found.run is None:
         raise StoreError(f"{scene.name}/{stored.method}: {'; '.join(found.faults)}")
     facts = stored.attributes
-    run = _with_reference(found.run, None if stored.method == REFERENCE else found.reference)
+    run = Run(**vars(found.run), reference=None if stored.method == REFERENCE else found.reference)
     run.status, run.message = stored.status, str(facts.get("message", ""))
     run.metrics = metrics_of(run.scene, run.trajectory, run.reference)
-    run.setup_time_s, seconds, run.output_time_s = (
-        float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output")
-    )
-    run.run_times_s = [seconds]
+    setup, seconds, output = (float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output"))
+    run.setup_time_s, run.run_times_s, run.output_time_s = setup, [seconds], output
     return run
-
-
-def _with_reference(solution: Solution, reference: Trajectory | None) -> Run:
-    return Run(**{one.name: getattr(solution, one.name) for one in fields(Solution)}, reference=reference)

@@ -145,17 +145,7 @@ def solve_judged(
 ) -> tuple[Solution, Trajectory | None]:
     """One run in this process, with status, message and metrics, and the reference it was judged by; stores nothing.
 
-    It is judged against the shipped reference of the scene. Where there is none, one is computed with
-    `compute_reference`, which can take much longer than the run; else energy and constraints alone decide.
-
-    Raises InputError for an unknown method or setting, MethodRefusal where the method cannot represent the scene.
-
-    Examples
-    --------
-    >>> from rotor_mbs.scenario.catalogue import find_scenes
-    >>> run, reference = solve_judged(find_scenes(["paper/fig03"])[0], "lagrange/dop853")
-    >>> run.status, run.metrics["angle_error_max"] < 1e-9
-    ('ok', True)
+    Arguments, errors raised and an example: `rotor_mbs.run`.
     """
     reference = None
     scene_key = scene_hash(scene)
@@ -231,10 +221,8 @@ def perform_run(job: Job) -> Result:
             raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return store_failure("timed_out", job, str(exc))
-        except RotorError as exc:
-            return store_failure("solver_failed", job, str(exc))
         except Exception as exc:
-            return store_failure("solver_failed", job, one_line(exc))
+            return store_failure("solver_failed", job, str(exc) if isinstance(exc, RotorError) else one_line(exc))
     if case.method == REFERENCE:
         reference: Trajectory | None = run.trajectory
     else:
