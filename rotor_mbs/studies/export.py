@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,12 +25,11 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import scene_toml
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.metrics import HORIZON_GROWTH, horizon
-from rotor_mbs.solution.quantities import Array, Quantity
+from rotor_mbs.solution.quantities import Array
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
 
-_AXES = "xyz"
 _ACCEPTED = 1e-6  # rad per unit of error amplification: the largest error that a benchmark problem accepts
 
 
@@ -97,28 +97,18 @@ def trajectory_csv(scene: Scene, trajectory: Trajectory) -> str:
 
 
 def _columns(scene: Scene, trajectory: Trajectory) -> Iterator[tuple[str, Array]]:
+    """Name and values of every component, the last dimension fastest."""
+    blades = [f"{blade}" for blade in range(1, 1 + len(scene.blades))]
+    labels = {"coordinate": scene.coordinate_labels, "blade": blades, "axis": "xyz"}
     yield "time [s]", trajectory.time
     for quantity in quantities.quantities(scene.outputs):
         values = quantities.array_of(quantity, scene, trajectory) if quantity.is_over_time else None
         if values is not None:
-            flat = values.reshape(len(values), -1)
-            for number, name in enumerate(_names(quantity, scene)):
-                yield f"{name} [{quantity.units}]", flat[:, number]
-
-
-def _names(quantity: Quantity, scene: Scene) -> list[str]:
-    """Names of a quantity's components, last dimension fastest: the coordinate's label, then the quantity."""
-    labels = {
-        "coordinate": scene.coordinate_labels,
-        "blade": [f"{blade}" for blade in range(1, 1 + len(scene.blades))],
-        "axis": list(_AXES),
-    }
-    names = [quantity.name.replace("_", " ")]
-    for dimension in quantity.dimensions[1:]:
-        names = [f"{name} {label}" for name in names for label in labels[dimension]]
-    if quantity.name == "angles":
-        return list(scene.coordinate_labels)
-    return [f"{label} rate" for label in scene.coordinate_labels] if quantity.name == "rates" else names
+            parts = itertools.product(*(labels[dimension] for dimension in quantity.dimensions[1:]))
+            for part, column in zip(map(" ".join, parts), values.reshape(len(values), -1).T, strict=True):
+                plain = f"{quantity.name.replace('_', ' ')} {part}".rstrip()
+                name = {"angles": part, "rates": f"{part} rate"}.get(quantity.name, plain)
+                yield f"{name} [{quantity.units}]", column
 
 
 def _benchmark(scene: Scene) -> dict[str, str]:
