@@ -55,23 +55,24 @@ def stability(arguments: argparse.Namespace) -> int:
 
     1 where a claim of the suite fails, see `unreached`, or a case was not computed.
     """
-    from rotor_mbs.analysis.stability import advice_lines, unreached
-    from rotor_mbs.studies.stability import run_suite
+    from rotor_mbs.analysis.stability import advice_lines, suite_runs, unreached
+    from rotor_mbs.studies.stability import SUITE, run_suite
 
-    start = time.monotonic()
+    start, scenes = time.monotonic(), find_scenes(arguments.scenes or SUITE)
     with ProgressLine() as progress:
-        report = run_suite(
-            arguments.scenes, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
+        made = run_suite(
+            scenes, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
             methods=check_names(arguments.method or ()), settings=dict(arguments.set or ()), on_progress=progress,
         )  # fmt: skip
-    print(*advice_lines(report.runs), sep="\n")
+    runs = suite_runs(arguments.output)
+    print(*advice_lines(runs), sep="\n")
     seconds = time.monotonic() - start
-    print(f"{arguments.output}: {report.scenes} scenes, {len(report.runs)} runs, {seconds:.0f} s in all")
+    print(f"{arguments.output}: {len(scenes)} scenes, {len(runs)} runs, {seconds:.0f} s in all")
     _write_pages(arguments.output, arguments.report)
-    missing = unreached(report.runs)
+    missing = unreached(runs)
     for scene in missing:
         print(f"{scene}: no method reaches 1e-6 rad", file=sys.stderr)
-    return int(print_not_computed(report.made) or bool(missing))
+    return int(print_not_computed(made) or bool(missing))
 
 
 def modes(arguments: argparse.Namespace) -> int:

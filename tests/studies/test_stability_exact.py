@@ -16,7 +16,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import horizon_samples, metrics_of
-from rotor_mbs.studies.stability_records import (
+from rotor_mbs.studies.stability import (
     LIMIT,
     STEPS,
     SYMMETRY,
