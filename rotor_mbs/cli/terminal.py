@@ -31,13 +31,10 @@ _BAD = "31"
 _STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
 
 
-def has_colour(stream: TextIO) -> bool:
-    """Whether to colour what is printed there: on a terminal, unless the user asks for none (https://no-color.org)."""
-    return stream.isatty() and "NO_COLOR" not in os.environ
-
-
-def coloured(text: str) -> str:
-    """The statuses in a text, each in its colour."""
+def coloured(text: str, stream: TextIO) -> str:
+    """The statuses in a text each in its colour: on a terminal, unless the user asks for none (https://no-color.org)."""
+    if not stream.isatty() or "NO_COLOR" in os.environ:
+        return text
     return _STATUS.sub(lambda found: f"\x1b[{_COLOURS.get(found[0], _BAD)}m{found[0]}\x1b[0m", text)
 
 
@@ -50,7 +47,7 @@ def print_table(table: TextTable) -> None:
 def print_text(text: str) -> None:
     """On standard output, after an empty line, with its statuses coloured on a terminal."""
     text, stream = printable(text), getattr(sys.stdout, "unfiltered", sys.stdout)
-    print("", coloured(text) if has_colour(stream) else text, sep="\n", file=stream)
+    print("", coloured(text, stream), sep="\n", file=stream)
 
 
 class _RenewedLine:
@@ -93,7 +90,7 @@ class _RenewedLine:
             if not self._is_terminal:
                 self._print(text)
             elif keep:
-                self._print(f"\r\x1b[K{coloured(text) if has_colour(self._stream) else text}")
+                self._print(f"\r\x1b[K{coloured(text, self._stream)}")
             else:
                 self._print_over(text)
 

@@ -120,11 +120,9 @@ def store_curve(job: Job, record: Record) -> Result:
 
 def _time_by_scene(waves: Iterable[Sequence[Job]]) -> Iterator[tuple[Job, Result]]:
     """Times, judges and collects every point of the curves of one scene, then of the next."""
-    by_scene: dict[str, list[Job]] = {}
-    for job in chain.from_iterable(waves):
-        by_scene.setdefault(job.case.scene.name, []).append(job)
-    for own in by_scene.values():
-        yield from _measure_scene(own)
+    jobs = list(chain.from_iterable(waves))
+    for name in dict.fromkeys(job.case.scene.name for job in jobs):
+        yield from _measure_scene([job for job in jobs if job.case.scene.name == name])
 
 
 def _measure_scene(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:

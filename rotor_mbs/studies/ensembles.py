@@ -15,7 +15,7 @@ import numpy as np
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Array, Trajectory
+from rotor_mbs.solution.trajectory import Array
 
 # rad: half the width of the uniform distribution of every angle at the start.
 SPREAD = 1e-3
@@ -95,13 +95,8 @@ def ensemble(
     for offset in random.uniform(-SPREAD, SPREAD, (count, len(scene.initial_angles))):
         angles = tuple(float(angle) for angle in np.array(scene.initial_angles) + offset)
         run = solve(method, replace(base, initial_angles=angles), settings or {})
-        rows.append(_at_the_end(run.trajectory, complete=len(run.time) == samples))
+        end = np.array([*run.angles[-1], run.rates[-1, 0], run.kinetic_energy[-1], *run.tip[-1, :, 1]])
+        rows.append(end if len(run.time) == samples else np.full_like(end, np.nan))
     tips = [f"tip {blade + 1} along the shaft" for blade in range(len(scene.blades))]
     names = [*scene.coordinate_labels, "rotor rate", "kinetic energy", *tips]
     return dict(zip(names, np.array(rows).T, strict=True))
-
-
-def _at_the_end(run: Trajectory, *, complete: bool) -> Array:
-    """Angles, rate of the rotor, kinetic energy, offset of every tip along the shaft."""
-    row = np.array([*run.angles[-1], run.rates[-1, 0], run.kinetic_energy[-1], *run.tip[-1, :, 1]])
-    return row if complete else np.full_like(row, np.nan)

@@ -98,7 +98,9 @@ def compute_modes(
     if scene.gravity and len(turning):
         try:
             table = floquet_table(scene, turning)
-            chart = stability_chart(scene, turning, stiffnesses) if len(stiffnesses) else None
+            charted = [replace(scene, bearing_stiffness=(float(k),) * len(scene.blades)) for k in stiffnesses]
+            rows = [floquet_table(one, turning).largest for one in charted]
+            chart = StabilityChart(turning, stiffnesses, np.array(rows)) if rows else None
         except MethodRefusal as exc:
             notes.append(f"no Floquet multipliers: {exc}")
     title, blades = scene.title, len(scene.blades)
@@ -240,15 +242,6 @@ def _product_error(multipliers: Complex, turn: Turn) -> float:
     if turn.message or not rounding < 1e-6 * sizes.min():
         return float("nan")
     return float(np.log(sizes).sum() - turn.trace_integral)
-
-
-def stability_chart(scene: Scene, speeds: Array, stiffnesses: Array) -> StabilityChart:
-    """The largest multiplier over speed, for every stiffness of all bearings. Raises MethodRefusal as above."""
-    rows = []
-    for stiffness in map(float, stiffnesses):
-        changed = replace(scene, bearing_stiffness=(stiffness,) * len(scene.blades))
-        rows.append(floquet_table(changed, speeds).largest)
-    return StabilityChart(speeds, stiffnesses, np.array(rows))
 
 
 def _increasing(values: Sequence[float] | Array, name: str) -> list[float]:

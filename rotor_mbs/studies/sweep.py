@@ -213,8 +213,9 @@ def run_sweep(
             statuses[end.task.first - plan.first : end.task.last - plan.first] = stored
             done += len(stored)
             on_progress(done, plan.runs, _counted(stored))
-        seconds, is_ok = time.monotonic() - start, _is_ok(plan, statuses)
-        made = missing - len(lost)
+        seconds, made = time.monotonic() - start, missing - len(lost)
+        failed = np.unique((np.flatnonzero(statuses != code_of("ok")) + plan.first) // plan.rows)
+        is_ok = not any(is_corrected(plan.methods[number]) for number in failed)
         return SweepResult(dataset.path, plan.runs, made, _counted(statuses), seconds, is_ok, tuple(lost))
 
 
@@ -243,12 +244,6 @@ def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.i
 def _hard_limit(chunk: Chunk) -> float:
     """When a worker is ended: a method that computes many runs side by side may do so one after the other."""
     return chunk.time_limit_s * len(chunk.values) + _GRACE_S
-
-
-def _is_ok(plan: SweepPlan, statuses: NDArray[np.int8]) -> bool:
-    is_corrected_by_number = [is_corrected(method) for method in plan.methods]
-    failed = np.flatnonzero(statuses != code_of("ok")) + plan.first
-    return not any(is_corrected_by_number[number] for number in set((failed // plan.rows).tolist()))
 
 
 def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:

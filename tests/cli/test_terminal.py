@@ -8,7 +8,7 @@ import time
 import pytest
 
 from rotor_mbs.cli import main
-from rotor_mbs.cli.terminal import ProgressLine, coloured, has_colour
+from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.execution.case import Case
 from rotor_mbs.execution.execute import Outcome, Result
@@ -57,12 +57,11 @@ def test_a_terminal_shows_the_share_of_the_work_and_renews_itself_without_news(
 
 def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
-    assert has_colour(Terminal())
-    assert not has_colour(io.StringIO())
+    assert coloured("largest error (rad)", Terminal()) == "largest error (rad)"
+    assert coloured("17 of 17 ok", Terminal()) == "17 of 17 \x1b[32mok\x1b[0m"
+    assert coloured("17 of 17 ok", io.StringIO()) == "17 of 17 ok"
     monkeypatch.setenv("NO_COLOR", "1")
-    assert not has_colour(Terminal())
-    assert coloured("largest error (rad)") == "largest error (rad)"
-    assert coloured("17 of 17 ok") == "17 of 17 \x1b[32mok\x1b[0m"
+    assert coloured("17 of 17 ok", Terminal()) == "17 of 17 ok"
 
 
 def test_an_estimate_counts_what_comes_after_the_cases() -> None:
