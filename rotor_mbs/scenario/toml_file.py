@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from rotor_mbs.errors import InputError
 
+T = TypeVar("T")
 KeyPath = tuple[str | int, ...]
 
 MAX_BYTES = 1 << 20
@@ -221,3 +222,12 @@ def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict
 def line_of(lines: Mapping[KeyPath, int], path: KeyPath) -> int:
     """The line of `path`, else of the nearest key that encloses it, else 1."""
     return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), 1)
+
+
+def of_file(source: str, text: str, key: str, read: Callable[..., T], *values: object) -> T:
+    """What `read` makes of values that stand at `key` of a file; its InputError names source, line and key."""
+    try:
+        return read(*values)
+    except InputError as exc:
+        line = line_of(find_lines(text), (key,))
+        raise InputError(f"{source}:{line}: {key}: {problem}" for problem in exc.problems) from exc

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.scenario.toml_file import find_lines, line_of
+from rotor_mbs.scenario.toml_file import of_file
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
@@ -41,8 +41,6 @@ from rotor_mbs.studies.stored_references import digest, frozen_file, frozen_solu
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -194,18 +192,9 @@ def own_settings(scene: Scene, method: str, given: Mapping[str, object]) -> dict
     """
     of_scene: dict[str, dict[str, object]] = {}
     if scene.settings:
-        of_scene = _of_the_file(scene, "settings", settings_for, method_names(), dict(scene.settings))
+        of_scene = of_file(scene.name, scene.text, "settings", settings_for, method_names(), dict(scene.settings))
     allowed = find_method(method).settings.allowed()
     return of_scene.get(method, {}) | {name: value for name, value in given.items() if name in allowed}
-
-
-def _of_the_file(scene: Scene, key: str, read: Callable[..., T], *values: object) -> T:
-    """What `read` makes of values of the scene's file; its errors name the line of `key`."""
-    try:
-        return read(*values)
-    except InputError as exc:
-        line = line_of(find_lines(scene.text), (key,))
-        raise InputError(f"{scene.name}:{line}: {key}: {problem}" for problem in exc.problems) from exc
 
 
 def perform_run(job: Job) -> Result:
@@ -290,7 +279,7 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
     reasons: list[str] = []
     for scene in scenes:
         if scene.methods:
-            methods |= asked_methods([scene], _of_the_file(scene, "methods", check_names, scene.methods))
+            methods |= asked_methods([scene], of_file(scene.name, scene.text, "methods", check_names, scene.methods))
             continue
         try:
             chosen, reason = choose(scene, default_methods())

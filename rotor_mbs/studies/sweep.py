@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.execution.pool import Finished, T, TaskPool, run_in
+from rotor_mbs.execution.pool import Finished, TaskPool, run_in
 from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
+from rotor_mbs.scenario.toml_file import of_file, shown_path
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.store.layout import KEYWORDS, SWEEP_IDENTITY
 from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns, row_type
@@ -143,21 +144,14 @@ def plan_sweep(
 
     Raises InputError for a method or a setting that is not there, MethodRefusal where a method cannot do them.
     """
-    chosen = check_names(methods) if methods else _of_the_file(sweep, "methods", check_names, sweep.table.methods)
-    settings = _of_the_file(sweep, "settings", settings_for, chosen, sweep.table.settings)
+    file = shown_path(sweep.path), sweep.text
+    chosen = check_names(methods) if methods else of_file(*file, "methods", check_names, sweep.table.methods)
+    settings = of_file(*file, "settings", settings_for, chosen, sweep.table.settings)
     for method in chosen:
         find_method(method).items(sweep.base)
     total = sweep.design.count * len(chosen)
     number, parts = part
     return SweepPlan(sweep, chosen, settings, (number - 1) * total // parts, number * total // parts, time_limit_s)
-
-
-def _of_the_file(sweep: Sweep, key: str, read: Callable[..., T], *values: object) -> T:
-    """What `read` makes of values of the sweep's file; its errors name the line of `key`."""
-    try:
-        return read(*values)
-    except InputError as exc:
-        raise InputError([sweep.problem((key,), f"{key}: {words}") for words in exc.problems]) from exc
 
 
 @dataclass(frozen=True)
