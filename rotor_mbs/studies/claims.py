@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -154,7 +154,11 @@ def claim_shares(
                 file = folder / f"{scene.name.replace('/', '-')}-{duration:g}s.h5"
                 result = run_sweep(plan, file, pool)
                 own = [number for number in asked if number.scene == scene.name]
-                for method, found in _by_method(StoredSweep(file), runs + 1):
+                stored = StoredSweep(file)
+                columns = [stored.column(name) for name in ("angles", "rates", "status", "energy_drift_max")]
+                for i, method in enumerate(METHODS):
+                    rows = slice(i * (runs + 1), (i + 1) * (runs + 1))
+                    found = SampledRuns(stored.column("time"), *(column[rows] for column in columns))
                     for values, more in zip(read[method], found.values(own), strict=True):
                         values |= more
                 done += 1
@@ -175,13 +179,6 @@ def moved_starts(scene: Scene, duration: float, runs: int, seed: int) -> Sweep:
         axes[f"initial.angles[{i}]"] = [angle, *(angle + moves).tolist()]
     base = scene.replace(duration=duration, samples=round(_SAMPLES_PER_SECOND * duration) + 1)
     return sweep_of(base, axes, combine="zip", methods=list(METHODS), outputs=["angles", "rates"])
-
-
-def _by_method(sweep: StoredSweep, rows: int) -> Iterator[tuple[str, SampledRuns]]:
-    columns = {name: sweep.column(name) for name in ("angles", "rates", "status", "energy_drift_max")}
-    for number, method in enumerate(METHODS):
-        runs = slice(number * rows, (number + 1) * rows)
-        yield method, SampledRuns(sweep.column("time"), *(values[runs] for values in columns.values()))
 
 
 def number_trials(

@@ -189,16 +189,12 @@ def _as_run(scene: Scene, data: ForeignData, reference: Trajectory, tolerance: f
         moving = scene.moving_coordinates
         columns = [*moving, *(count + i for i in moving)]
         scene = with_energy
-        energies = samples.trajectory(scene, data.time, states[:, columns])
-        trajectory.quantities |= {name: energies.quantities[name] for name in _ENERGIES}
+        trajectory.quantities |= samples.trajectory(scene, data.time, states[:, columns]).quantities
     bounds = (
         Bound("agreement", METHOD, tolerance, "as asked for"),
         Bound("energy", METHOD, _ENERGY_PER_ANGLE * tolerance, "what an error of the tolerance does to the energy"),
     )
     return Solution(scene, METHOD, trajectory, Integration(True), bounds=bounds)
-
-
-_ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 
 def _uncovered(scene: Scene, data: ForeignData, exact: TimedReference, until: int) -> tuple[str, str] | None:
