@@ -157,10 +157,10 @@ def test_a_reference_has_loads_where_they_are_asked_for() -> None:
 @pytest.mark.parametrize("is_available", [True, False])
 @pytest.mark.parametrize("shorter", [0, 1])
 @pytest.mark.parametrize("rows", [1, 3])
-def test_a_reference_of_which_one_run_ends_early_ends_there(
+def test_a_reference_of_which_one_run_ends_early(
     is_available: bool, shorter: int, rows: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In quad precision and without heyoka: past that nothing bounds the error."""
+    """It ends there, in quad precision and without heyoka: past that nothing bounds the error."""
     pytest.importorskip("heyoka")
     monkeypatch.setattr(reference_module, "is_available", lambda: is_available)
     scene = paper("fig03", duration=0.1, samples=4, outputs=("angles", "rates"))
