@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+MESSAGE = "ended by its time limit"  # of a run that was
 _LONGEST_S = 1e9  # the system's timers take no more than the seconds of its clock
 
 
@@ -51,7 +52,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 def _interrupt(_number: int, _frame: object) -> None:
     was_known, _State.is_over = _State.is_over, True
     if not (_State.polled or was_known):
-        raise OutOfTimeError(message())
+        raise OutOfTimeError(MESSAGE)
 
 
 @contextmanager
@@ -81,8 +82,3 @@ def is_over() -> bool:
     """Whether the limit is reached; once that is known, a late signal interrupts no more."""
     _State.is_over = _State.is_over or time.monotonic() > _State.end
     return _State.is_over
-
-
-def message() -> str:
-    """The message of a run that was ended so."""
-    return "ended by its time limit"

@@ -48,7 +48,7 @@ def test_a_run_ends_in_the_segment_that_fails() -> None:
     states, found = advanced("no step is short enough")
     assert (found.success, found.out_of_time, found.time_reached, found.steps) == (False, False, 1.5, 4)
     assert len(states) == 4
-    assert advanced(time_limit.message())[1].out_of_time
+    assert advanced(time_limit.MESSAGE)[1].out_of_time
 
 
 INTEGRATORS = {
@@ -91,7 +91,7 @@ def test_a_start_that_is_no_number_is_a_run_without_steps() -> None:
 def test_a_time_limit_ends_a_run_between_two_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time_limit, "is_over", lambda: True)
     found = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.ones(1), np.array([1.0]))
-    assert found.message == time_limit.message()
+    assert found.message == time_limit.MESSAGE
 
 
 @pytest.mark.parametrize("engine", ["scipy", "heyoka"])

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.time_limit import OutOfTimeError
-from rotor_mbs.methods.time_limit import message as out_of_time
+from rotor_mbs.methods.time_limit import MESSAGE, OutOfTimeError
 from rotor_mbs.models.exudyn.blueprint import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, steps_and_rows
@@ -41,10 +40,6 @@ class Linearized(NamedTuple):
     K: Array
     D: Array
     C: Array
-
-
-class _StuckError(Exception):
-    """The engine makes no progress."""
 
 
 class System:
@@ -171,11 +166,11 @@ class System:
             if solver.SolveSystem(self._mbs, settings):
                 return ""
             reason = ""
-        except (_engine.ExudynError, RuntimeError, SystemError, _StuckError) as exc:
+        except (_engine.ExudynError, RuntimeError, SystemError) as exc:
             if _caused_by(exc, KeyboardInterrupt):
                 raise KeyboardInterrupt from exc
             if _caused_by(exc, OutOfTimeError):
-                return out_of_time()
+                return MESSAGE
             reason = _one_line(str(exc))
         return reason or _one_line(solver.GetErrorString()) or "the engine gave no reason"
 
@@ -185,7 +180,7 @@ class System:
         def before_trial(_system: object, time: float) -> bool:
             trials.append(time)
             if len(trials) > scheme.trial_steps:
-                raise _StuckError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
+                raise RuntimeError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
             return True
 
         self._mbs.SetPreStepUserFunction(before_trial)
@@ -246,7 +241,7 @@ def _count(total: Integration, scheme: Scheme, interval: Interval, it: Any, fail
     evaluations = tried * scheme.stages if scheme.stages else it.newtonStepsCount + steps
     total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
     total.success, total.message = not failure, failure
-    total.out_of_time = failure == out_of_time()
+    total.out_of_time = failure == MESSAGE
     total.time_reached = max(interval.start, it.currentTime - it.currentStepSize) if failure else interval.end
 
 

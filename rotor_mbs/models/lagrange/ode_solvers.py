@@ -132,7 +132,7 @@ def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: f
                         rows.append(solver.dense_output()(times[done:reached]).T)
                         done = reached
             except OutOfTimeError:
-                message = deadline.message()
+                message = deadline.MESSAGE
             except (ValueError, np.linalg.LinAlgError) as exc:  # of its linear algebra, on what is not finite
                 message = f"SciPy: {exc}"
         last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)

@@ -58,7 +58,7 @@ def over_segments(
     states = np.concatenate(rows)
     states = states[: finite_rows(states.astype(float, copy=False))]
     reached = float(times[max(len(states) - 1, 0)])
-    return states, Integration(not message, message, reached, steps, evaluations, message == deadline.message())
+    return states, Integration(not message, message, reached, steps, evaluations, message == deadline.MESSAGE)
 
 
 def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:

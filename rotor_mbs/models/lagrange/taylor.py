@@ -151,7 +151,7 @@ class Propagation:
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with deadline.polled():
             outcome, _, _, steps, _, states = integrator.propagate_grid(grid, callback=deadline.step_callback())
-        message = deadline.message() if deadline.is_over() else failure(outcome)
+        message = deadline.MESSAGE if deadline.is_over() else failure(outcome)
         return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
 
     def observe(self) -> Trajectory:

@@ -80,7 +80,7 @@ class Engine:
         taken = 0
         while taken < steps:
             if time_limit.is_over():
-                return taken, time_limit.message()
+                return taken, time_limit.MESSAGE
             portion = min(steps - taken, _PORTION)
             _engine.mj_step(model, data, nstep=portion)
             taken += portion

@@ -71,7 +71,7 @@ class MujocoSolver:
                 steps += taken
                 if message:
                     break
-        out_of_time = message == time_limit.message()
+        out_of_time = message == time_limit.MESSAGE
         return Integration(not message, message, self._rows[-1].time, steps, steps * self._stages, out_of_time)
 
     def _advance(self, interval: Interval) -> tuple[int, str]:

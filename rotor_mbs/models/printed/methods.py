@@ -51,7 +51,7 @@ class PrintedSolver:
         self._initial = [*scene.initial_angles[:moving], *scene.initial_rates[:moving]]
         self._right_hand_side = right_hand_side(scene, accelerations, moving)
         self._tolerances = settings.relative_tolerance, settings.absolute_tolerance
-        self._result: Ode45Result | None = None
+        self._result: Ode45Result  # of the last integration
 
     def integrate(self) -> Integration:
         result = ode45(self._right_hand_side, self._scene.duration, self._initial, *self._tolerances)
@@ -62,8 +62,6 @@ class PrintedSolver:
 
     def observe(self) -> Trajectory:
         scene, rotor, result = self._scene, self._rotor, self._result
-        if result is None:
-            raise RuntimeError("observe comes after integrate")
         time = sample_times(scene)
         time = time[time <= result.time[-1]]
         angles, rates = self._coordinates(result.at(time))
