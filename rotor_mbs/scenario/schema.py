@@ -6,7 +6,7 @@ the validation's context (blades, outputs, bare_pitches), so that one pass finds
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, TypeVar
 
@@ -164,8 +164,11 @@ def _as_rows(value: object) -> object:
     return value if isinstance(value, list) else [[0.0, value]]
 
 
-def _goes_forward(rows: list[list[float]]) -> list[list[float]]:
-    """Raises where the times (s) of rows (t, value) go back; two rows with one time are a jump."""
+def _checked_rows(rows: list[list[float]]) -> list[list[float]]:
+    """The rows (t, value), [] where they are zero at all times. Raises where the times (s) go back.
+
+    Two rows with one time are a jump.
+    """
     times = [row[0] for row in rows]
     if times[0] < 0.0:
         raise invalid("the first time is below 0")
@@ -175,7 +178,7 @@ def _goes_forward(rows: list[list[float]]) -> list[list[float]]:
     for time, after_next in zip(times, times[2:], strict=False):
         if time == after_next:
             raise invalid(f"three rows have t = {time:g}")
-    return rows
+    return rows if any(value for _, value in rows) else []
 
 
 def _as_list(value: object) -> object:
@@ -191,19 +194,14 @@ def _as_tables(value: object) -> object:
 
 def _on_pitches_with_inertia(values: list[Any], info: ValidationInfo) -> list[Any]:
     """Raises where a number or a table that is not zero is for a blade without pitch inertia; one may be for all."""
-    acts = [_not_zero(value) if isinstance(value, list) else value != 0.0 for value in values]
-    acted_on = [i for i in _context(info).get("bare_pitches", ()) if acts[i if len(acts) > 1 else 0]]
+    acted_on = [i for i in _context(info).get("bare_pitches", ()) if values[i if len(values) > 1 else 0]]
     if acted_on:
         raise invalid(f"acts on {_blades_named(acted_on)}, whose pitch has no inertia", _PITCH_LEFT_OUT)
     return values
 
 
-def _not_zero(rows: list[list[float]]) -> bool:
-    return any(value != 0.0 for _, value in rows)
-
-
 _Row = Annotated[list[Size], Field(min_length=2, max_length=2)]
-Rows = Annotated[list[_Row], Field(min_length=1), BeforeValidator(_as_rows), AfterValidator(_goes_forward)]
+Rows = Annotated[list[_Row], Field(min_length=1), BeforeValidator(_as_rows), AfterValidator(_checked_rows)]
 # Of validators that come before the type's own, the last one is the first.
 _PITCHES = (
     BeforeValidator(lambda value, info: _one_per_blade(value, info, 0, "in a list for")),
@@ -220,14 +218,14 @@ class BearingTable(Table):
 
     stiffness: PerBlade = Field([0.0], description="a number of at least 0 (N m/rad), or a list with one per blade")
     damping: PerBlade = Field([0.0], description="a number of at least 0 (N m s/rad), or a list with one per blade")
-    rest: Tables = Field([[[0.0, 0.0]]], description=_TABLES.format("rad", "angle"))
+    rest: Tables = Field([[]], description=_TABLES.format("rad", "angle"))
 
 
 class TorqueTable(Table):
     """[torque]"""
 
-    rotor: Rows = Field([[0.0, 0.0]], description=f"a number (N m), or {_ROWS.format('torque')}")
-    pitch: Tables = Field([[[0.0, 0.0]]], description=_TABLES.format("N m", "torque"))
+    rotor: Rows = Field([], description=f"a number (N m), or {_ROWS.format('torque')}")
+    pitch: Tables = Field([[]], description=_TABLES.format("N m", "torque"))
 
 
 class InitialTable(Table):
@@ -332,8 +330,8 @@ class SceneTable(Table):
             bearing_stiffness=_unless_zero(self.bearing.stiffness, self.blades) if self.bearing else (),
             bearing_damping=_unless_zero(self.bearing.damping, self.blades) if self.bearing else (),
             shaft_damping=self.shaft.damping if self.shaft else 0.0,
-            pitch_torque=_tables(self.torque.pitch, self.blades) if self.torque else (),
-            bearing_rest=_tables(self.bearing.rest, self.blades) if self.bearing else (),
+            pitch_torque=_unless_zero(map(_table, self.torque.pitch), self.blades) if self.torque else (),
+            bearing_rest=_unless_zero(map(_table, self.bearing.rest), self.blades) if self.bearing else (),
             methods=tuple(self.methods),
             settings=tuple(self.settings.items()),
             text=text,
@@ -345,19 +343,14 @@ def _for_each(values: list[T], blades: int) -> tuple[T, ...]:
     return tuple(values) if len(values) == blades else tuple(values) * blades
 
 
-def _unless_zero(values: list[float], blades: int) -> tuple[float, ...]:
-    return _for_each(values, blades) if any(values) else ()
+def _unless_zero(values: Iterable[T], blades: int) -> tuple[T, ...]:
+    """As `_for_each`; () where all are zero."""
+    each = _for_each(list(values), blades)
+    return each if any(each) else ()
 
 
 def _table(rows: list[list[float]]) -> TimeTable:
-    """() where it is zero at all times."""
-    return tuple((time, value) for time, value in rows) if _not_zero(rows) else ()
-
-
-def _tables(tables: list[list[list[float]]], blades: int) -> tuple[TimeTable, ...]:
-    """One for every blade, () where all are zero at all times."""
-    each = _for_each([_table(rows) for rows in tables], blades)
-    return each if any(each) else ()
+    return tuple((time, value) for time, value in rows)
 
 
 def _in_order(outputs: Collection[str]) -> tuple[str, ...]:
