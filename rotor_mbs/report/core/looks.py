@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import re
 
-from rotor_mbs.methods.catalogue import label_of, look_of
-from rotor_mbs.methods.ladders import Look
-
-__all__ = [
-    "BLUE", "COLOURS", "COORDINATES", "GREY", "INK", "PALETTE", "PAPER", "VERMILLION", "Look",
-    "class_of", "coordinate_look", "label_of", "look_of", "palette_css", "with_capital", "with_light_palette",
-]  # fmt: skip
+from rotor_mbs.methods.catalogue import label_of as label_of
+from rotor_mbs.methods.catalogue import look_of as look_of
+from rotor_mbs.methods.ladders import Look as Look
 
 # Every colour of a picture, and what stands for it on a dark page. A picture has colours of methods or of coordinates,
 # never of both.
