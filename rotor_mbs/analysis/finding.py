@@ -28,13 +28,12 @@ class Tally:
 class PrintedEnergy:
     """Scenes in which the energy of the printed model rises without work.
 
-    gain, scene   J: the largest gain among runs that reached their end, and where ("" where none did)
+    gain          J: the largest gain of a run that reached its end; None where no such run gained
     ended_early   scenes where the integration ended early, and the gain until then (J)
     """
 
     rises: Tally
-    gain: float
-    scene: str
+    gain: float | None
     ended_early: Mapping[str, float]
 
 
@@ -88,10 +87,9 @@ def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
     if not gains:
         return None
     made = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
-    complete = {name: gains[name] for name in made if runs[name].status == "ok"}
-    largest = max(complete, key=lambda name: complete[name], default="")
+    largest = max((gains[name] for name in made if runs[name].status == "ok"), default=None)
     ended_early = {name: gain for name, gain in gains.items() if runs[name].status not in COMPLETE}
-    return PrintedEnergy(Tally(len(made), len(gains)), complete.get(largest, 0.0), largest, ended_early)
+    return PrintedEnergy(Tally(len(made), len(gains)), largest, ended_early)
 
 
 def agreement(runs: Iterable[StoredRun]) -> tuple[Agreement, ...]:

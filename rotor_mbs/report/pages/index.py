@@ -89,13 +89,10 @@ def short_sentences(facts: Finding) -> list[str]:
         other = "" if corrected is None else f"; with their three errors corrected, {corrected.count or 'none'}"
         found.append(f"The paper's equations as printed give {share} published numbers{other}.")
     if facts.energy is not None and facts.energy.rises.count:
-        most = f", up to {prefixed(facts.energy.gain, 'J')}" if facts.energy.scene else ""
-        broken = [
-            f"; in {name} {prefixed(gain, 'J')} before its run breaks off"
-            for name, gain in facts.energy.ended_early.items()
-        ]
-        most += "".join(broken)
-        rises = facts.energy.rises
+        rises, gain = facts.energy.rises, facts.energy.gain
+        most = "" if gain is None else f", up to {prefixed(gain, 'J')}"
+        for name, until_then in facts.energy.ended_early.items():
+            most += f"; in {name} {prefixed(until_then, 'J')} before its run breaks off"
         found.append(f"As printed they make energy from nothing in {rises.count} of {rises.of} scenes{most}.")
     known = {one.method: one.angle_error for one in facts.agreement if one.angle_error is not None}
     if known:
