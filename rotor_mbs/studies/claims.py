@@ -14,15 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rotor_mbs.analysis.claim_records import (
-    ClaimStudy,
-    Conditions,
-    NumberTrial,
-    NumberTrials,
-    records_of,
-    shipped_claims,
-    stored_claims,
-)
+from rotor_mbs.analysis import claim_records
+from rotor_mbs.analysis.claim_records import ClaimStudy, Conditions, NumberTrial, NumberTrials
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
 from rotor_mbs.analysis.claims import rounds_to
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
@@ -85,9 +78,9 @@ def claims(*, runs: int | None = None, seed: int = SEED, workers: int = 0) -> Cl
     [12.0]
     """
     if runs is None:
-        found = stored_claims()
+        found = claim_records.stored_claims()
         if found is None:
-            raise StoreError(f"{shipped_claims()}: no such file; `rotor-mbs claims` makes one")
+            raise StoreError(f"{claim_records.shipped_claims()}: no such file; `rotor-mbs claims` makes one")
         return found
     with tempfile.TemporaryDirectory(prefix="rotor_mbs-") as folder:
         return study_claims(Path(folder) / "claims.h5", runs=runs, seed=seed, workers=workers)
@@ -106,7 +99,7 @@ def study_claims(
         refuse_other_kinds(output)
         shares = claim_shares(folder, runs=runs, seed=seed, workers=workers, on_sweep=on_sweep)
         study = ClaimStudy(shares, number_trials(workers=workers))
-        records = records_of(study, seed, versions())
+        records = claim_records.records_of(study, seed, versions())
         part = parts / f"{records[0].key}.h5"
         write_records(part, records)
         ResultsStore(output).merge([part])
