@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rotor_mbs.execution.provenance import fingerprint, numerics_fingerprint, versions_with
+from rotor_mbs.execution.provenance import NUMERICS, fingerprint, versions_with
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.scenario.scene import Scene, scene_hash
 
@@ -59,6 +59,6 @@ class Case:
             "method": [self.method, {name: str(value) for name, value in settings.items()}],
             "study": [self.study, dict(self.options)],
             "reference": self.reference,
-            "code": [versions_with(*method.distributions), numerics_fingerprint(), fingerprint(*self.sources)],
+            "code": [versions_with(*method.distributions), fingerprint(*NUMERICS), fingerprint(*self.sources)],
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

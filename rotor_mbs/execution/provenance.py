@@ -13,7 +13,7 @@ from rotor_mbs.execution import cores
 from rotor_mbs.methods.catalogue import methods
 
 _OWN = ("numpy", "h5py")
-_NUMERICS = ("scenario", "solution", "methods", "models")
+NUMERICS = ("scenario", "solution", "methods", "models")  # sources that decide a run's numbers
 
 
 def versions() -> dict[str, str]:
@@ -48,14 +48,10 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def numerics_fingerprint() -> str:
-    """Fingerprint of the sources that decide a run's numbers: a changed model makes stored runs stale."""
-    return fingerprint(*_NUMERICS)
-
-
 @functools.cache
 def fingerprint(*parts: str) -> str:
-    """sha256 over every file of this package in `parts`, which are folders or files.
+    """sha256 over every file of this package in `parts`, which are folders or files: a changed model makes stored runs
+    stale.
 
     Without what Python keeps of them: a process that compiles them has files of passing names there.
     """

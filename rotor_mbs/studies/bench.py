@@ -9,7 +9,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
@@ -141,9 +141,9 @@ def _measure_scene(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
         "load_after": os.getloadavg()[0],
         "pinned_core": -1 if last_core() is None else last_core(),
     }
-    for job, ladder, chosen in zip(jobs, own, points, strict=True):
-        facts = shared | {"repeatable": measured.is_repeatable(chosen)}
-        yield measured.finished(job, chosen, partial(curve_record, job.case, ladder, shared=facts))
+    for job, ladder, curve in zip(jobs, own, points, strict=True):
+        facts = shared | {"repeatable": measured.is_repeatable(curve)}
+        yield job, measured.lost(curve) or store_curve(job, curve_record(job.case, ladder, measured.rows(curve), facts))
 
 
 def facts_of(case: Case, short: Scene, reference: Trajectory) -> dict[str, Any]:
@@ -204,15 +204,13 @@ class Measured:
     answers: dict[Point, dict[str, Any]] = field(default_factory=dict)
     unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
 
-    def finished(
-        self, job: Job, points: Sequence[Point], record: Callable[[list[dict[str, Any]]], Record]
-    ) -> tuple[Job, Result]:
-        """The end of a curve: the part of its record is written, but where one of its points is lost."""
+    def lost(self, points: Sequence[Point]) -> Result | None:
+        """Of a curve that is not stored, as one of its points is lost; None of others."""
         for point in points:
             status, message = self.unanswered.get(point, ("", ""))
             if status == "worker_died":
-                return job, Result(status, f"{point.method} at {point.setting:g}: {message}")
-        return job, store_curve(job, record(self.rows(points)))
+                return Result(status, f"{point.method} at {point.setting:g}: {message}")
+        return None
 
     def is_repeatable(self, points: Sequence[Point]) -> bool:
         """Whether the last run of every point was bit for bit its first one."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,7 @@ from rotor_mbs.solution.status import code_of
 from rotor_mbs.store.layout import KEY_ATTRIBUTE
 from rotor_mbs.store.records import COST_SCALING, Record
 from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.studies.bench import BENCH, SOURCES, arrays_of, measure_points
+from rotor_mbs.studies.bench import BENCH, SOURCES, arrays_of, measure_points, store_curve
 from rotor_mbs.studies.bench_worker import Point
 
 _BLADES = (1, 2, 3, 6, 12, 24, 48, 96)
@@ -97,7 +96,7 @@ def _time_by_study(waves: Iterable[Sequence[Job]]) -> Iterator[tuple[Job, Result
             measured = measure_points(scene_of, list(points.values()), jobs[0].case.options)
             started = time.strftime("%Y-%m-%dT%H:%M:%S")
             for job, own in points.items():
-                yield measured.finished(job, own, partial(_curve, scenes, job.case, started))
+                yield job, measured.lost(own) or store_curve(job, _curve(scenes, job.case, started, measured.rows(own)))
 
 
 def _points(case: Case, sizes: Iterable[float]) -> list[Point]:

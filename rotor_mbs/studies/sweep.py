@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.execution.pool import Finished, TaskPool, run_in
-from rotor_mbs.execution.provenance import machine, numerics_fingerprint, versions
+from rotor_mbs.execution.provenance import NUMERICS, fingerprint, machine, versions
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
@@ -103,7 +103,7 @@ class SweepPlan:
             table.seed,
             [self.first, self.last],
             versions(),
-            numerics_fingerprint(),
+            fingerprint(*NUMERICS),
         ]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
         for values in sweep.design.values:
