@@ -63,12 +63,15 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
 
 def _rotor_inertia(scene: Scene) -> float:
-    arms = (blade.mass * sum(r * r for r in blade.centre_of_mass) for blade in scene.blades)
+    """kg m², about the shaft: of blades that lie as far from it as they can."""
+    arms = (blade.mass * sum(r * r for r in blade.centre_of_mass) + max(blade.inertia[:3]) for blade in scene.blades)
     return scene.hub_inertia + sum(arms)
 
 
 def singular_reason(scene: Scene) -> str:
     """Why the mass matrix is, or must become, singular; "" where it need not. Point-mass blades on a massless hub."""
+    if not _rotor_inertia(scene):
+        return "nothing has inertia about the shaft; give the hub or a blade some"
     if scene.hub_inertia or not all(blade.is_point_mass and blade.has_pitch_inertia for blade in scene.blades):
         return ""
     if all(abs(math.cos(angle)) < 1e-15 for angle in scene.initial_angles[1:]):

@@ -140,8 +140,8 @@ def energy_error(samples: Trajectory) -> Array | None:
 
 
 def longest_arm(scene: Scene) -> float:
-    """m: the largest distance of a blade's centre of mass from the hub's centre."""
-    return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades)
+    """m: the largest distance of a blade's centre of mass from the hub's centre; 1 where all are there."""
+    return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 
 
 _JOINT_GAP = QuantityMetric(
@@ -165,7 +165,7 @@ def _largest_root_force(_scene: Scene, run: Trajectory, until: int) -> float:
 
 def _largest_root_force_at_arm(scene: Scene, run: Trajectory, until: int) -> float:
     """N m, that force at the longest arm: a scale for moments, which may all be next to nothing."""
-    return _largest_root_force(scene, run, until) * (longest_arm(scene) or 1.0)
+    return _largest_root_force(scene, run, until) * longest_arm(scene)
 
 
 def _load(name: str, dimensions: tuple[str, ...], long_name: str, title: str, look_at: str) -> Quantity:

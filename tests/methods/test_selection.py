@@ -100,3 +100,22 @@ def test_a_run_names_every_method_it_took_first_the_one_it_stands_by(
     told = capsys.readouterr().err.splitlines()[0]
     assert told.startswith("own: neither stiff, singular nor long: ")
     assert told.index("lagrange/") < told.index("exudyn_tree/") < told.index("exudyn_chain/")
+
+
+@pytest.mark.parametrize(("inertia", "hub", "refused"), [(0.0, 0.0, True), (4.0, 0.0, False), (0.0, 4.0, False)])
+def test_balanced_blades_turn_by_themselves_or_with_the_hub(inertia: float, hub: float, refused: bool) -> None:
+    """Centres of mass on the shaft: no gravity, no length and no arm; without any inertia no equations either."""
+    blade = replace(paper("fig05").blades[0], centre_of_mass=(0.0, 0.0, 0.0), inertia=(inertia,) * 3 + (0.0,) * 3)
+    one = replace(
+        paper("fig05"), name="balanced", blades=(blade,) * 2, initial_angles=(0.0,) * 3, initial_rates=(1.0, 0.0, 0.0),
+        hub_inertia=hub, duration=1.0, samples=3, outputs=("angles",), text="",
+    )  # fmt: skip
+    if refused:
+        with pytest.raises(MethodRefusal, match="nothing has inertia about the shaft"):
+            choose(one, DEFAULT_METHODS)
+        return
+    for method in choose(one, DEFAULT_METHODS)[0]:
+        if not method.startswith("printed"):
+            run = solve(method, one, {})
+            assert abs(run.angles[-1, 0] - 1.0) < 1e-6  # at constant rate; Newton's tolerance leaves the chain 5e-9
+            assert judge(one, run, None).status in ("ok", "unchecked")

@@ -128,7 +128,7 @@ def _turning(modes: SceneModes, name: str) -> Section:
         caption = "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
         drawn.append(picture(multipliers(table), f"{name}-multipliers", caption, caption))
     if modes.chart is not None:
-        caption = "Stability chart: growth over a turn under gravity, over rotor speed and bearing stiffness"
+        caption = "Stability chart: growth over a turn under gravity; a line bounds what is stable"
         drawn.append(picture(chart(modes.chart), f"{name}-chart", caption, caption))
     rows: list[Row] = []
     for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
