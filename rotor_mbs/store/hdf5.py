@@ -30,7 +30,7 @@ _DAMAGE = (
 _UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
 
 # Of a scale its users, of these their scales, and a number in the file: the library writes them when one is attached.
-_OF_SCALES = {"REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid"}
+_OF_SCALES = (b"REFERENCE_LIST", b"DIMENSION_LIST", b"_Netcdf4Dimid")
 
 
 @contextmanager
@@ -226,10 +226,10 @@ def _attach_scales(source: Any, copied: Any) -> None:
             _attach_scales(source[name], item)
             continue
         _refuse_outside(item)
-        stale = _OF_SCALES & set(item.attrs)
-        users += [name] if "DIMENSION_LIST" in stale else []
+        stale = [attribute for attribute in _OF_SCALES if h5py.h5a.exists(item.id, attribute)]
+        users += [name] if b"DIMENSION_LIST" in stale else []
         for attribute in stale:
-            h5py.h5a.delete(item.id, attribute.encode())
+            h5py.h5a.delete(item.id, attribute)
     for name in users:
         for axis, dimension in enumerate(dimensions_of(source[name])):
             if dimension:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -105,10 +106,12 @@ def run_scenes(
         own = {name: own_settings(scene, name, settings or {}) for name in methods[scene.name]}
         cases += [reference, *(Case(scene, name, own[name], reference=reference.key) for name in own)]
     runs = {case.key for case in cases}
-    # Slowest first, so that no long one starts last and keeps one process busy while the others wait; of a method that
-    # compiles code anew, those beside the runs take longest.
-    cases = [*beside, *cases]
-    cases.sort(key=lambda case: -find_method(case.method).relative_cost)
+    # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
+    # fastest, which are those that are compiled, so that two processes seldom compile the same code at once.
+    cases = sorted([*beside, *cases], key=lambda case: -case.work)
+    quarter, count = len(cases) // 4, len(cases)
+    turns = zip(cases[:quarter], cases[count - quarter :], strict=True)
+    cases = [*itertools.chain.from_iterable(turns), *cases[quarter : count - quarter]]
     run = in_pool(perform or perform_run, workers, timeout_s, store_time_out)
     with writing(output):
         refuse_losses(output, cases)
