@@ -24,7 +24,7 @@ from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
-from rotor_mbs.scenario.catalogue import list_scenes, only_scene
+from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.plausibility import doubts
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import load_scene
@@ -88,14 +88,14 @@ def load(path: str | os.PathLike[str]) -> Scene:
 
 
 def run(
-    scene: Scene, method: str = "lagrange/taylor", *, timeout: float = float("inf"), reference: bool = False,
+    scene: Scene | str, method: str = "lagrange/taylor", *, timeout: float = float("inf"), reference: bool = False,
     **settings: object,
 ) -> Run:  # fmt: skip
     """One scene by one method, in this process, judged from its samples.
 
     Parameters
     ----------
-    scene : from `scene`, `load`, or made by `Scene.replace`.
+    scene : from `scene`, `load`, or made by `Scene.replace`; or its name, as in all functions here.
     method : "model/integrator"; `rotor-mbs show` lists those that can represent a scene.
     timeout : s, after which the integration ends itself; `Run.status` is then "timed_out".
     reference : whether to compute the quad-precision reference of a scene that has no shipped one (up to some seconds).
@@ -118,7 +118,7 @@ def run(
     >>> run.metrics["angle_error_max"] < 1e-9   # rad, against the reference, up to the scene's horizon
     True
     """
-    found, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
+    found, exact = solve_judged(scene_of(scene), method, settings, compute_reference=reference, time_limit_s=timeout)
     return Run(**vars(found), reference=exact)
 
 
@@ -212,7 +212,12 @@ class Comparison:
 
 
 def compare(
-    scene: Scene, methods: str | Sequence[str] = (), *, workers: int = 0, timeout: float = 60.0, **settings: object
+    scene: Scene | str,
+    methods: str | Sequence[str] = (),
+    *,
+    workers: int = 0,
+    timeout: float = 60.0,
+    **settings: object,
 ) -> Comparison:
     """One scene by several methods, each judged against the scene's reference (shipped, or computed).
 
@@ -243,7 +248,7 @@ def compare(
     >>> float(study.to_xarray().angles.sel(solver="exudyn_tree/rk67", coordinate="pitch 1").isel(time=0))
     0.7853981633974483
     """
-    named = check_names(methods)
+    scene, named = scene_of(scene), check_names(methods)
     chosen, reasons = (asked_methods([scene], named), []) if named else selected_methods([scene])
     if not (able := chosen[scene.name]):
         raise MethodRefusal("; ".join(reasons))
@@ -257,7 +262,7 @@ def compare(
 
 
 def sweep(
-    scene: Scene,
+    scene: Scene | str,
     parameters: Mapping[str, object],
     *,
     methods: str | Sequence[str] = ("lagrange/taylor",),
@@ -298,7 +303,7 @@ def sweep(
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
-    study = sweep_of(scene, parameters, methods=list(check_names(methods)), **options)
+    study = sweep_of(scene_of(scene), parameters, methods=list(check_names(methods)), **options)
     path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
     plan = plan_sweep(study, time_limit_s=timeout)
     with open_task_pool("local", workers) as pool:

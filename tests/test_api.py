@@ -41,6 +41,18 @@ def test_a_run_is_judged_against_the_shipped_reference() -> None:
     assert coarse.settings["relative_tolerance"] == 1e-3
 
 
+def test_every_function_takes_a_scene_by_its_name(tmp_path: Path) -> None:
+    run = rm.run("paper/fig08", "lagrange/dop853")
+    assert run.scene == rm.scene("paper/fig08")
+    assert rm.compare("paper/fig08", "lagrange/dop853").scene == run.scene
+    assert rm.compare_data({"time": run.time, "angles": run.angles}, "paper/fig08").agrees
+    assert rm.modes("paper/fig08").scene == "paper/fig08"
+    assert rm.sweep("paper/fig08", {"gravity": [0.0]}, methods="lagrange/dop853").statuses == {"ok": 1}
+    assert [path.name for path in rm.export("paper/fig08", "csv", tmp_path / "a.csv")] == ["a.csv"]
+    with pytest.raises(rm.InputError, match="paper/fig08"):
+        rm.run("paper/fig8", "lagrange/dop853")
+
+
 def test_a_scene_of_ones_own_gets_a_computed_reference(tmp_path: Path) -> None:
     pytest.importorskip("heyoka")
     path = tmp_path / "mine.toml"

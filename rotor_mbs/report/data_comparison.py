@@ -16,6 +16,7 @@ from rotor_mbs.foreign.trajectory import load_data
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.pages.data_comparison import comparison_page, error_panels
+from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
@@ -25,7 +26,7 @@ from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
 
 def compare_data(
     data: str | os.PathLike[str] | Mapping[str, Any],
-    scene: Scene,
+    scene: Scene | str,
     *,
     columns: str | os.PathLike[str] | Mapping[str, Any] | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
@@ -57,6 +58,7 @@ def compare_data(
     >>> rm.compare_data({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
     ('rotor: degrees taken as rad',)
     """
+    scene = scene_of(scene)
     study = compare_with_reference(load_data(data, scene, columns), scene, tolerance)
     verdict = study.verdict
     return DataComparison(study, verdict, verdict.status, verdict.message, verdict.agrees, verdict.likely)

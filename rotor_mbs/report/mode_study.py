@@ -16,6 +16,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.pages import modes as pages
+from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
@@ -23,7 +24,7 @@ from rotor_mbs.store.records import write_records
 from rotor_mbs.studies.modes import compute_modes
 
 
-def modes(scene: Scene, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
+def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
     """Natural frequencies, damping ratios and mode shapes of a scene, by every model that can be linearized.
 
     At rest under gravity; over `speeds` in steady rotation without gravity (Campbell diagram); under gravity by the
@@ -48,6 +49,7 @@ def modes(scene: Scene, speeds: Sequence[float] = (), stiffnesses: Sequence[floa
     >>> study.rotation["lagrange"].names
     ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
     """
+    scene = scene_of(scene)
     found = compute_modes(scene, speeds, stiffnesses)
     return Modes(**vars(found), hash=scene_hash(scene))
 

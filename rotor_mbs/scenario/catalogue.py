@@ -105,6 +105,11 @@ def only_scene(argument: str) -> Scene:
     return found[0]
 
 
+def scene_of(given: Scene | str) -> Scene:
+    """The scene itself, or the one that a name or the path of a TOML file means."""
+    return only_scene(given) if isinstance(given, str) else given
+
+
 def _shipped() -> dict[str, Path]:
     folder = scenarios_folder()
     paths = (path for path in folder.rglob("*.toml") if path.parent != sweeps_folder())

@@ -21,6 +21,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn.script import exudyn_script
 from rotor_mbs.models.lagrange.sympy_text import sympy_text
 from rotor_mbs.models.mujoco.mjcf import mjcf_file
+from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import scene_toml
 from rotor_mbs.solution import quantities
@@ -33,7 +34,7 @@ from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
 _ACCEPTED = 1e-6  # rad per unit of error amplification: the largest error that a benchmark problem accepts
 
 
-def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
+def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[Path]:
     """A scene in a format of other programs, as a file or, for "iftomm", a folder of files.
 
     Parameters
@@ -58,11 +59,11 @@ def export(scene: Scene, to: str, output: str | os.PathLike[str]) -> list[Path]:
     >>> import tempfile
     >>> import rotor_mbs as rm
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     (path,) = rm.export(rm.scene("paper/fig11"), "csv", f"{folder}/fig11.csv")
+    ...     (path,) = rm.export("paper/fig11", "csv", f"{folder}/fig11.csv")
     ...     print(path.read_text().partition(",rotor rate")[0])
     time [s],rotor [rad],pitch 1 [rad],pitch 2 [rad],pitch 3 [rad]
     """
-    output = Path(output)
+    scene, output = scene_of(scene), Path(output)
     if to not in FORMATS:
         raise InputError(f"no format {to!r}; allowed: {', '.join(FORMATS)}")
     text_of = FORMATS[to][1]

@@ -260,7 +260,7 @@ def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[st
             find_method(name).items(scene)
             able.append(name)
         except MethodRefusal as exc:
-            refused.append(f"{scene.name}: {name} left out: {exc}")
+            refused.append(f"{scene.name}: not by {name}: {exc}")
     return able, refused
 
 
