@@ -420,6 +420,10 @@ def test_own_old_pages_go_and_foreign_files_stay(tmp_path: Path) -> None:
     (out / "data.csv").write_text("1")
     write_report(store(tmp_path / "b.h5", [Made(replace(PLAIN, name="other"), TAYLOR, SWING)]), out)
     assert sorted(path.name for path in out.iterdir()) == ["data.csv", "index.html", "notes.html", "other.html"]
+    (out / "index.html").write_text("mine")
+    with pytest.raises(StoreError, match=r"index\.html: not a page of rotor_mbs.*another folder"):
+        write_report(tmp_path / "a.h5", out)
+    assert (out / "index.html").read_text() == "mine"
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
