@@ -60,9 +60,18 @@ class Allowed:
         return f"{text}, in {self.unit}" if self.unit else text
 
 
-def number(default: float, **limits: Any) -> Any:
-    """A field of a `Settings` class that is a finite number within `Allowed`; whole where `default` is an int."""
-    return field(default=default, metadata={"allowed": Allowed(whole=isinstance(default, int), **limits)})
+def number(
+    default: float,
+    *,
+    unit: str = "",
+    above: float = -math.inf,
+    at_least: float = -math.inf,
+    at_most: float = math.inf,
+    doc: str = "",
+) -> Any:
+    """A field of a `Settings` class that is a finite number; whole where `default` is an int."""
+    allowed = Allowed(unit, above, at_least, at_most, isinstance(default, int), (), doc)
+    return field(default=default, metadata={"allowed": allowed})
 
 
 def step(default: float) -> Any:
