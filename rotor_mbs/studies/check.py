@@ -171,13 +171,13 @@ def judge_measured(one: Verdict, bounds: Bounds) -> Verdict:
 
 
 def regressions(new: Sequence[Verdict], old: Sequence[Verdict], factor: float) -> list[Verdict]:
-    """A verdict "against" for every earlier one, in their order: how many times its margin has shrunk.
+    """A verdict "against" for every earlier one, how many times its margin has shrunk; one for a run that is gone.
 
     new, old   verdicts of the same checks, made with the same bounds
     factor     allowed ratio of the earlier margin to the present one, at least 1
 
-    The value is NaN, which fails, where `new` lacks the verdict, and infinite where a verdict that passed fails. A
-    verdict that failed before and fails now is no regression.
+    The value is NaN, which fails, where `new` lacks the verdict or the run, and infinite where a verdict that passed
+    fails. A verdict that failed before and fails now is no regression.
 
     >>> from dataclasses import replace
     >>> was = Verdict("energy", "paper/fig08", "exudyn_tree/rk67", "balance", 1e-12, 1e-9, "of scale", "")
@@ -186,7 +186,11 @@ def regressions(new: Sequence[Verdict], old: Sequence[Verdict], factor: float) -
     (64, False)
     """
     present = {_key(verdict): verdict for verdict in new}
-    return [_compared(present.get(_key(verdict)), verdict, factor) for verdict in old]
+    runs = {(verdict.scene, verdict.method) for verdict in new}
+    gone = {(one.scene, one.method): replace(one, check="run", channel="all") for one in old}
+    earlier = [one for one in old if (one.scene, one.method) in runs]
+    earlier += [one for run, one in gone.items() if run not in runs]
+    return [_compared(present.get(_key(verdict)), verdict, factor) for verdict in earlier]
 
 
 def _key(verdict: Verdict) -> tuple[str, str, str, str]:
