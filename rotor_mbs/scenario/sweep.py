@@ -300,10 +300,10 @@ def _check_rows(sweep: Sweep) -> None:
         try:
             variants.scene(row)
         except TableError as error:
-            pairs = zip(variants.keys, row, strict=True)
-            shown = ", ".join(key if error.is_of_keys else f"{key} = {value:g}" for key, value in pairs)
+            values = ", ".join(f"{key} = {value:g}" for key, value in zip(variants.keys, row, strict=True))
+            start = "" if error.is_of_keys else f"{values}: "
             for problem in error.problems:
-                problems.setdefault(sweep.problem(("axis", i, "key"), f"{shown}: {problem.message}"))
+                problems.setdefault(sweep.problem(("axis", i, "key"), f"{start}{problem.message}"))
             if len(problems) >= _MAX_ROW_ERRORS:
                 break
     if problems:

@@ -152,7 +152,7 @@ _BAD = {
     "an unknown key": ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1]', 4,
      "angels: is not a key here, perhaps angles"),
     "an unknown key of two values, reported once": ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]', 4,
-     r"^[^\n]*initial\.angels\[1\]: initial\.angels: is not a key here[^\n]*$"),
+     r"^[^\n]*: initial\.angels: is not a key here[^\n]*$"),
     "an index too high": ('[[axis]]\nkey = "initial.angles[4]"\nvalues = [1]', 4, r"initial.angles\[3\]"),
     "an unknown table": ('[[axis]]\nkey = "bering.stiffness"\nvalues = [1]', 4,
      "bering: is not a key here, perhaps bear"),
