@@ -54,13 +54,13 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
 def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
     """Each page whole or not at all; then removes pages of an earlier report that are no longer made.
 
-    Raises StoreError where the folder cannot be written, or has a page of that name that is not of this program.
+    Raises StoreError where the folder cannot be written, or has an index that is not of this program.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        foreign = [name for name in pages if (folder / name).is_file() and not _is_ours(folder / name)]
-        if foreign:
-            raise StoreError(f"{folder / foreign[0]}: not a page of rotor_mbs; allowed: another folder for the pages")
+        index = folder / INDEX
+        if index.is_file() and not _is_ours(index):
+            raise StoreError(f"{index}: not a page of rotor_mbs; allowed: another folder for the pages")
         for name, text in pages.items():
             replace_file(folder / name, text.encode("utf-8"))
         for old in folder.glob("*.html"):
