@@ -22,7 +22,7 @@ from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, reference_at, uncertainty
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.scenario.scene import scene_hash
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.trajectory import Integration
 from rotor_mbs.store.read import open_results
@@ -183,6 +183,30 @@ def test_where_heyoka_is_not_installed_the_fallback_takes_its_place(monkeypatch:
     scene = paper("fig03", duration=0.1, samples=3)
     assert all(isinstance(run, OdeSolver) for run in build(scene, None)._runs)
     assert len(reference_at(scene, np.linspace(0.0, 0.1, 3)).trajectory.time) == 3
+
+
+@pytest.mark.parametrize("is_perturbed", [True, False])
+def test_quotients_are_known_as_far_as_both_runs_went(is_perturbed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, solver_of = paper("fig03", duration=0.1, samples=4), reference_module._in_doubles
+
+    class EndsEarly:
+        def __init__(self, start: Scene, tolerances: tuple[float, float], times: Any) -> None:
+            self._run, self._rows = solver_of(start, tolerances, times), 2 if (start != scene) is is_perturbed else 4
+
+        def integrate(self) -> None:
+            self._run.integrate()
+
+        @property
+        def states(self) -> Any:
+            return self._run.states[: self._rows]
+
+    times = np.linspace(0.0, 0.1, 4)
+    whole = reference_module._matrices_by_quotients(scene, times)
+    monkeypatch.setattr(reference_module, "_in_doubles", EndsEarly)
+    found = reference_module._matrices_by_quotients(scene, times)
+    assert found[:2].tobytes() == whole[:2].tobytes()
+    assert np.all(np.isposinf(found[2:]))
+    assert len(found) == (4 if is_perturbed else 2)
 
 
 @pytest.mark.parametrize(("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)])

@@ -311,6 +311,7 @@ _TESTS = {
         f"{_REFERENCE}a_reference_that_fails_says_why_and_how_far_the_better_run_came",
         f"{_REFERENCE}a_reference_has_loads_where_they_are_asked_for",
         f"{_REFERENCE}a_reference_of_which_one_run_ends_early",
+        f"{_REFERENCE}quotients_are_known_as_far_as_both_runs_went",
         f"{_REFERENCE}where_heyoka_is_not_installed_the_fallback_takes_its_place",
         f"{_REFERENCE}growth_over_one_interval_is_that_over_its_halves",
         f"{_REFERENCE}a_pitch_that_is_fixed_has_no_growth_and_no_unit",
