@@ -24,6 +24,7 @@ _ONLY_PRINT = ("list", "show")
 
 # C0 but for tab and line feed, DEL, C1, and the marks that change the direction of writing.
 _CONTROLS = (*range(0x20), *range(0x7F, 0xA0), *range(0x200E, 0x2010), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+_received: list[int] = []  # signals that this call was to end by
 _SHOWN = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\t\n"}
 
 
@@ -52,11 +53,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Inside compiled code of a library, or while it loads, an interrupt becomes the cause of another error."""
+    """Inside compiled code of a library, or while it loads, an interrupt becomes another error, or its cause."""
     found: BaseException | None = error
     while found is not None and not isinstance(found, KeyboardInterrupt):
         found = found.__cause__ or found.__context__
-    return found is not None
+    return found is not None or bool(_received)
 
 
 def _run(words: Sequence[str]) -> int:
@@ -82,7 +83,8 @@ def _ended_in_order() -> Iterator[None]:
         yield
         return
 
-    def interrupt(_number: int, _frame: object) -> None:
+    def interrupt(number: int, _frame: object) -> None:
+        _received.append(number)
         raise KeyboardInterrupt
 
     def interrupt_again(ignored: sys.UnraisableHookArgs) -> None:
@@ -93,10 +95,12 @@ def _ended_in_order() -> Iterator[None]:
             hook(ignored)
 
     hook, sys.unraisablehook = sys.unraisablehook, interrupt_again
-    names = ("SIGTERM", "SIGHUP")
+    _received.clear()
+    names = ("SIGINT", "SIGTERM", "SIGHUP")
     numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
     # One that is ignored (nohup) stays so.
-    before = {one: signal.signal(one, interrupt) for one in numbers if signal.getsignal(one) is signal.SIG_DFL}
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    before = {one: signal.signal(one, interrupt) for one in numbers if signal.getsignal(one) in usual}
     try:
         yield
     finally:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import signal
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -84,6 +86,22 @@ def test_an_interrupt_inside_compiled_code_is_an_interrupt(
 
     def interrupted(_: object) -> None:
         raise error("initialization failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
+    assert main(["run", "paper/fig03"]) == 130
+    assert capsys.readouterr().err.startswith("interrupted; ")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_an_interrupt_that_becomes_another_error_without_a_trace(
+    number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """NumPy's own loading: PyCapsule_Import("datetime") forgets why the import failed."""
+
+    def interrupted(_: object) -> None:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(number)
+        raise ImportError("PyCapsule_Import could not import module")
 
     monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
     assert main(["run", "paper/fig03"]) == 130
