@@ -24,6 +24,10 @@ from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
+from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
+from rotor_mbs.runs.records import records_in
+from rotor_mbs.runs.sweep_columns import MISSING
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.plausibility import doubts
 from rotor_mbs.scenario.scene import Scene
@@ -33,15 +37,11 @@ from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.store.read import StoredRun, StoredScene, is_sweep, open_results
-from rotor_mbs.store.records import records_in
-from rotor_mbs.store.sweep_columns import MISSING
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
-    from rotor_mbs.store.sweep_dataset import StoredSweep
+    from rotor_mbs.runs.sweep_dataset import StoredSweep
 
 
 def scenes(folder: str = "") -> list[str]:
@@ -299,7 +299,7 @@ def sweep(
     >>> data.to_xarray().angles.dims
     ('run', 'time', 'coordinate')
     """
-    from rotor_mbs.execution.dask_cluster import open_task_pool
+    from rotor_mbs.runs.cluster import open_task_pool
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
@@ -349,7 +349,7 @@ class SweepData:
     @functools.cached_property
     def _stored(self) -> StoredSweep:
         """Read whole once, to verify it."""
-        from rotor_mbs.store.sweep_dataset import StoredSweep
+        from rotor_mbs.runs.sweep_dataset import StoredSweep
 
         return StoredSweep(self.path)
 

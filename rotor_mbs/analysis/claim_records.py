@@ -17,10 +17,10 @@ import numpy as np
 from rotor_mbs.analysis.claim_shares import RULE, ClaimShare, ClaimShares
 from rotor_mbs.analysis.published import published
 from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
+from rotor_mbs.runs.layout import KEY_ATTRIBUTE
+from rotor_mbs.runs.read import OpenResults, open_results
+from rotor_mbs.runs.records import Record, read_record, records_in
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.store.layout import KEY_ATTRIBUTE
-from rotor_mbs.store.read import OpenResults, open_results
-from rotor_mbs.store.records import Record, read_record, records_in
 
 KIND, SHARES, NUMBERS = "claims", "shares", "numbers"
 # The fields of `Conditions` behind the first as datasets; all of them as attributes, of the usual ones.

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
 from rotor_mbs.analysis.trajectory_numbers import measure
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 Choice = Callable[[StoredScene], StoredRun | None]
 # What is read off the runs of one model: None where it is undefined; without it where no run can decide.

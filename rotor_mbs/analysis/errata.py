@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.models.printed.errata import CheckedEntry
-from rotor_mbs.store import hdf5
-from rotor_mbs.store.read import OpenResults
-from rotor_mbs.store.records import Record, read_record
+from rotor_mbs.runs import files
+from rotor_mbs.runs.read import OpenResults
+from rotor_mbs.runs.records import Record, read_record
 
 ERRATA = "errata"
 _NUMBERS = {"difference": np.float64, "agrees": np.int8}
@@ -31,7 +31,7 @@ def entries(results: OpenResults) -> list[CheckedEntry]:
         return []
     record = read_record(ERRATA, results.root[ERRATA])
     if not record.arrays:  # of an earlier version, which had a group for each entry
-        return [_entry(hdf5.attributes_of(check)) for check in results.root[ERRATA].values()]
+        return [_entry(files.attributes_of(check)) for check in results.root[ERRATA].values()]
     columns = {**{name: record.attributes[name] for name in _TEXTS}, **record.arrays}
     return [_entry(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
 

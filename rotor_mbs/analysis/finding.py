@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import Claim
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 # Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that
 # (3e-7 of the scale at most, on the corrected equations).

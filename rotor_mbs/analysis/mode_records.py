@@ -28,8 +28,8 @@ from rotor_mbs.analysis.campbell import (
 )
 from rotor_mbs.analysis.modes import Complex, multiblade
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.store.layout import Column
-from rotor_mbs.store.records import Record, read_records
+from rotor_mbs.runs.layout import Column
+from rotor_mbs.runs.records import Record, read_records
 
 # By name: values, and what they are.
 Datasets: TypeAlias = Mapping[str, tuple[NDArray[Any], Column]]

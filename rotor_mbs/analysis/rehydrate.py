@@ -8,13 +8,13 @@ import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import REFERENCE, look_up
+from rotor_mbs.runs.freeze import KEPT
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.store.freeze import KEPT
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 
 @dataclass(frozen=True)

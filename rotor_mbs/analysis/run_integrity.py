@@ -10,10 +10,10 @@ import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import look_up
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.accuracy_bounds import expected_settings
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 _COMPARED = ("angles", "rates")
 # Of a column's largest value: below it a column is a straight line, which methods of any kind may give exactly.

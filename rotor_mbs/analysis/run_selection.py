@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rotor_mbs.methods.catalogue import REFERENCE, errata_methods, is_corrected, method_names
-from rotor_mbs.store.read import StoredRun, StoredScene
+from rotor_mbs.runs.read import StoredRun, StoredScene
 
 PRINTED = "printed/ode45"
 

@@ -9,9 +9,9 @@ from rotor_mbs.analysis.claim_shares import ClaimShares
 from rotor_mbs.analysis.finding import Finding, agreement
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.runs.records import Record
 from rotor_mbs.solution.text_table import TextTable
-from rotor_mbs.store.read import StoredRun, StoredScene
-from rotor_mbs.store.records import Record
 
 RUN_HEAD = ("method", "status", "error (rad)", "energy drift", "time (s)")
 _VERBS = {"holds": "hold", "fails": "fail"}

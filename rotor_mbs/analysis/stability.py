@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
+from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.text_table import listed
-from rotor_mbs.store.read import StoredRun, StoredScene, open_results
-from rotor_mbs.store.records import Record, read_records
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 

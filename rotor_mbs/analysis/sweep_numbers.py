@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.runs.sweep_columns import parameter_name
+from rotor_mbs.runs.sweep_dataset import StoredSweep
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.sweep_columns import parameter_name
-from rotor_mbs.store.sweep_dataset import StoredSweep
 
 # A pitch that has grown tenfold is leaving: what stays bounded in a stable rotor only swings, by its amplitude.
 GROWN = 10.0

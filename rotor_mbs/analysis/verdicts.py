@@ -20,6 +20,9 @@ from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
+from rotor_mbs.runs.digests import DIGESTS
+from rotor_mbs.runs.files import reading
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene, all_damages
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -29,9 +32,6 @@ from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array, Trajectory
-from rotor_mbs.store.digests import DIGESTS
-from rotor_mbs.store.hdf5 import reading
-from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene, all_damages
 
 
 @dataclass(frozen=True, slots=True)

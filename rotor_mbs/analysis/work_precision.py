@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.run_selection import corrected_runs
+from rotor_mbs.runs.read import StoredScene
+from rotor_mbs.runs.records import Record
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.read import StoredScene
-from rotor_mbs.store.records import Record
 
 TARGETS_RAD = (1e-3, 1e-6, 1e-9)
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import rotor_mbs
 from rotor_mbs.errors import nearest
-from rotor_mbs.execution import cores
+from rotor_mbs.runs import cores
 
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 _LONGEST_SPAN = 10_000

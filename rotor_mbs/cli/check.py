@@ -13,8 +13,8 @@ from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.report.pages import check as formats
+from rotor_mbs.runs.files import replace_file
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
-from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.studies import check as study
 
 _STANDARD_OUTPUT = Path("-")

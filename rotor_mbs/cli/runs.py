@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING
 from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
-from rotor_mbs.execution.output_lock import has_unfinished
-from rotor_mbs.execution.pool import local_pool
 from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.lock import has_unfinished
+from rotor_mbs.runs.pool import local_pool
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.reference import compute_references
 from rotor_mbs.studies.reproduce import made_from, summary_of
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
 
 if TYPE_CHECKING:
-    from rotor_mbs.execution.execute import Outcome
+    from rotor_mbs.runs.runner import Outcome
 
 # Of the time of `reproduce`: runs, pages.
 _REPRODUCE_PARTS = (0.8, 0.2)

@@ -15,15 +15,15 @@ from pathlib import Path
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution import cores
 from rotor_mbs.methods.catalogue import check_names
+from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, only_scene
 
 
 def bench(arguments: argparse.Namespace) -> int:
     """Error against run time, and its pages. 0 also where points failed: they are what is measured."""
     from rotor_mbs.analysis.run_tables import bench_table
-    from rotor_mbs.store.records import read_records
+    from rotor_mbs.runs.records import read_records
     from rotor_mbs.studies.bench import run_bench
     from rotor_mbs.studies.cost_scaling import run_cost_scaling
 

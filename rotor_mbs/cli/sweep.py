@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from rotor_mbs.cli import show
 from rotor_mbs.cli.terminal import SweepProgress, span
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.dask_cluster import open_task_pool
-from rotor_mbs.execution.pool import TaskPool
+from rotor_mbs.runs.cluster import open_task_pool
+from rotor_mbs.runs.pool import TaskPool
 
 if TYPE_CHECKING:
     from rotor_mbs.studies.sweep import SweepPlan, SweepResult
@@ -50,7 +50,7 @@ def _run(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
         show(f"{line}; not computed, the same command tries again", sys.stderr)
     if plan.sweep.table.picture and arguments.part == (1, 1):
         from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
-        from rotor_mbs.store.sweep_dataset import StoredSweep
+        from rotor_mbs.runs.sweep_dataset import StoredSweep
 
         line = save_picture(StoredSweep(result.path), output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)
@@ -73,7 +73,7 @@ def _summarize(result: SweepResult, *, as_json: bool) -> None:
 
 
 def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
-    from rotor_mbs.store.sweep_columns import row_type
+    from rotor_mbs.runs.sweep_columns import row_type
     from rotor_mbs.studies.sweep import estimate_seconds
 
     size, seconds = plan.runs * row_type(plan.sweep).itemsize, estimate_seconds(plan, pool)

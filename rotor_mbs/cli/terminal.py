@@ -19,7 +19,7 @@ from rotor_mbs.cli import printable
 from rotor_mbs.solution.status import STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
-    from rotor_mbs.execution.execute import Outcome
+    from rotor_mbs.runs.runner import Outcome
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.text_table import TextTable
     from rotor_mbs.studies.run import RunReport

@@ -13,7 +13,7 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.table import DataTable, table_of
 from rotor_mbs.foreign.text_files import read_text
-from rotor_mbs.store import hdf5
+from rotor_mbs.runs import files
 
 LARGEST = 1 << 29  # bytes; a trajectory of a million rows of ten columns is 80 MB
 FORMATS = "text with a header, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
@@ -23,7 +23,7 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # spreadsheets' "Unicode text"
 
 
 def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -> DataTable:
-    """The columns of numbers in a file; `group`, `scene`: see `store.hdf5.read_arrays`.
+    """The columns of numbers in a file; `group`, `scene`: see `runs.files.read_arrays`.
 
     Raises InputError or StoreError, in one line, for what cannot be read.
     """
@@ -32,7 +32,7 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
     source = str(path)
     try:
         if head.startswith(_HDF5) or head[512:].startswith(_HDF5):  # MATLAB puts a block of its own in front
-            return table_of(source, *hdf5.read_arrays(path, group, scene))
+            return table_of(source, *files.read_arrays(path, group, scene))
         if head.startswith(_ZIP):
             with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 return table_of(source, {name: archive[name] for name in archive.files})

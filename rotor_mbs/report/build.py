@@ -14,7 +14,6 @@ from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
-from rotor_mbs.execution.pool import Workers, pool_of, run_in
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core import files
 from rotor_mbs.report.core.files import Site, page_names, render
@@ -27,9 +26,10 @@ from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
-from rotor_mbs.store.read import OpenResults, in_memory, is_sweep, open_results
-from rotor_mbs.store.records import Record, read_records
-from rotor_mbs.store.sweep_dataset import StoredSweep
+from rotor_mbs.runs.pool import Workers, pool_of, run_in
+from rotor_mbs.runs.read import OpenResults, in_memory, is_sweep, open_results
+from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.runs.sweep_dataset import StoredSweep
 
 Part = str | Path | PaperFigure  # a scene by its name, a page by its file, or a figure of the paper
 _GROUPS = 2  # per worker

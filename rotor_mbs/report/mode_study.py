@@ -16,11 +16,11 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.pages import modes as pages
+from rotor_mbs.runs.records import write_records
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
-from rotor_mbs.store.records import write_records
 from rotor_mbs.studies.modes import compute_modes
 
 

@@ -20,25 +20,25 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution import last_core
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
-from rotor_mbs.execution.pool import WorkerPool, run_in
-from rotor_mbs.execution.timing import Timings, conduct, statistics
 from rotor_mbs.methods.catalogue import ladders, settings_for
 from rotor_mbs.methods.ladders import STEP, Ladder
+from rotor_mbs.runs import last_core
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.layout import KEY_ATTRIBUTE
+from rotor_mbs.runs.pool import WorkerPool, run_in
+from rotor_mbs.runs.records import Record, write_records
+from rotor_mbs.runs.results_file import ResultsStore
+from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress
+from rotor_mbs.runs.timing import Timings, conduct, statistics
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.store.layout import KEY_ATTRIBUTE
-from rotor_mbs.store.records import Record, write_records
-from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench_worker import ERRORS, Point, PointScenes, ask, prepared_scene, start_timer
 from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
 
 BENCH = "bench"
-SOURCES = ("studies/bench.py", "studies/bench_worker.py", "execution/timing.py")
+SOURCES = ("studies/bench.py", "studies/bench_worker.py", "runs/timing.py")
 
 _REFERENCE_LIMIT_S = 60.0
 # A run longer than this is ended: a hanging engine must not eat the budget of the others.

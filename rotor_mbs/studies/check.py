@@ -13,17 +13,17 @@ from pathlib import Path
 from rotor_mbs.analysis.run_integrity import defaults_faults
 from rotor_mbs.analysis.verdicts import Verdict, judged, verdicts
 from rotor_mbs.errors import RotorError, StoreError
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import OnProgress, ignore_progress
-from rotor_mbs.execution.pool import local_pool, run_in
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.freeze import changed_arrays
+from rotor_mbs.runs.pool import local_pool, run_in
+from rotor_mbs.runs.read import is_sweep, open_results
+from rotor_mbs.runs.runner import OnProgress, ignore_progress
+from rotor_mbs.runs.sweep_columns import MISSING
+from rotor_mbs.runs.sweep_dataset import StoredSweep
 from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.freeze import changed_arrays
-from rotor_mbs.store.read import is_sweep, open_results
-from rotor_mbs.store.sweep_columns import MISSING
-from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.check_probes import SPEED_RATIOS, measure, measured, probe, probes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_files

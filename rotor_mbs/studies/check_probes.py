@@ -12,10 +12,10 @@ import numpy as np
 
 from rotor_mbs.analysis.exact import mirrored, relabelled
 from rotor_mbs.analysis.verdicts import Verdict
-from rotor_mbs.execution.case import Case
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
+from rotor_mbs.runs.case import Case
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene

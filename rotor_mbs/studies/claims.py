@@ -22,19 +22,19 @@ from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.trajectory_numbers import measure
 from rotor_mbs.errors import RotorError, StoreError
-from rotor_mbs.execution.dask_cluster import open_task_pool
-from rotor_mbs.execution.output_lock import writing
-from rotor_mbs.execution.pool import local_pool, run_in
-from rotor_mbs.execution.provenance import versions
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
+from rotor_mbs.runs.cluster import open_task_pool
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.pool import local_pool, run_in
+from rotor_mbs.runs.records import write_records
+from rotor_mbs.runs.results_file import ResultsStore, refuse_other_kinds
+from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import Sweep, sweep_of
-from rotor_mbs.store.records import write_records
-from rotor_mbs.store.results_file import ResultsStore, refuse_other_kinds
-from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
 METHODS = (PRINTED, "lagrange/taylor")

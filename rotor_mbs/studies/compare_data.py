@@ -20,19 +20,19 @@ from rotor_mbs.analysis.data_verdict import (
     rows_to_the_horizon,
 )
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.provenance import versions
 from rotor_mbs.foreign.channels import channels
 from rotor_mbs.foreign.trajectory import ForeignData
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
+from rotor_mbs.runs.layout import Column
+from rotor_mbs.runs.records import Record
+from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-from rotor_mbs.store.layout import Column
-from rotor_mbs.store.records import Record
 from rotor_mbs.studies.data_causes import CauseSearch, states_of
 from rotor_mbs.studies.scene_causes import likely_causes
 

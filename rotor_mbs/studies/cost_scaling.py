@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.work_precision import cost_exponent
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.methods.catalogue import methods as all_methods
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.layout import KEY_ATTRIBUTE
+from rotor_mbs.runs.records import COST_SCALING, Record
+from rotor_mbs.runs.results_file import ResultsStore
+from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.store.layout import KEY_ATTRIBUTE
-from rotor_mbs.store.records import COST_SCALING, Record
-from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench import BENCH, SOURCES, arrays_of, measure_points, store_curve
 from rotor_mbs.studies.bench_worker import Point
 

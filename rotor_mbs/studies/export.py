@@ -21,6 +21,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn.script import exudyn_script
 from rotor_mbs.models.lagrange.sympy_text import sympy_text
 from rotor_mbs.models.mujoco.mjcf import mjcf_file
+from rotor_mbs.runs.files import replace_file
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import scene_toml
@@ -28,7 +29,6 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.solution.metrics import HORIZON_GROWTH, horizon
 from rotor_mbs.solution.quantities import Array
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.store.hdf5 import replace_file
 from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
 
 _ACCEPTED = 1e-6  # rad per unit of error amplification: the largest error that a benchmark problem accepts

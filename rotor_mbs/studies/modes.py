@@ -20,17 +20,17 @@ from rotor_mbs.analysis.campbell import REST, ROTATION, FloquetTable, LinearMode
 from rotor_mbs.analysis.mode_records import to_records
 from rotor_mbs.analysis.modes import GROWTH, Complex, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.layout import KEY_ATTRIBUTE, TOGETHER
+from rotor_mbs.runs.records import write_records
+from rotor_mbs.runs.results_file import ResultsStore
+from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, value_at
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.layout import KEY_ATTRIBUTE, TOGETHER
-from rotor_mbs.store.records import write_records
-from rotor_mbs.store.results_file import ResultsStore
 
 if TYPE_CHECKING:
     from rotor_mbs.models.lagrange.floquet import Turn

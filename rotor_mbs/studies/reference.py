@@ -7,12 +7,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.execute import OnProgress, ignore_progress
-from rotor_mbs.execution.output_lock import writing
+from rotor_mbs.runs.freeze import freeze
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.results_file import refuse_other_kinds
+from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.freeze import freeze
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.results_file import refuse_other_kinds
 from rotor_mbs.studies.run import RunReport, run_scenes
 
 

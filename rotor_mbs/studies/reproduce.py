@@ -19,17 +19,17 @@ from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.run_tables import finding_lines, method_table
 from rotor_mbs.errors import RotorError
-from rotor_mbs.execution.case import RUN, Case
-from rotor_mbs.execution.execute import Job, OnProgress, Result, ignore_progress
-from rotor_mbs.execution.pool import OF_THE_MACHINE, Workers, one_line
-from rotor_mbs.execution.provenance import fingerprint, versions
 from rotor_mbs.methods.catalogue import default_methods, errata_methods, ladders
+from rotor_mbs.runs.case import RUN, Case
+from rotor_mbs.runs.layout import KEY_ATTRIBUTE
+from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line
+from rotor_mbs.runs.read import in_memory, open_results
+from rotor_mbs.runs.records import write_records
+from rotor_mbs.runs.results_file import ResultsStore
+from rotor_mbs.runs.runner import Job, OnProgress, Result, ignore_progress
+from rotor_mbs.runs.versions import fingerprint, versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.layout import KEY_ATTRIBUTE
-from rotor_mbs.store.read import in_memory, open_results
-from rotor_mbs.store.records import write_records
-from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.bench import BENCH, SOURCES, Measured, curve_record, facts_of, points_of, store_curve
 from rotor_mbs.studies.bench_worker import PointTimer, prepared_scene
 from rotor_mbs.studies.run import RunReport, able_methods, perform_run, reference_case, run_scenes

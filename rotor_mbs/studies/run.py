@@ -11,10 +11,6 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
-from rotor_mbs.execution.case import RUN, Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.execution.output_lock import writing
-from rotor_mbs.execution.pool import OF_THE_MACHINE, Workers, one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     check_names,
@@ -28,15 +24,19 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
+from rotor_mbs.runs.case import RUN, Case
+from rotor_mbs.runs.layout import KEY_ATTRIBUTE, LIMIT
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.results_file import ResultsStore
+from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
+from rotor_mbs.runs.write import write_run
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.toml_file import of_file
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.store.layout import KEY_ATTRIBUTE, LIMIT
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.store.write import write_run
 from rotor_mbs.studies.stored_references import digest, frozen_file, frozen_solution, load_reference
 
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.

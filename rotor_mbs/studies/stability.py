@@ -18,11 +18,14 @@ import numpy as np
 
 from rotor_mbs.analysis import exact as theory
 from rotor_mbs.analysis.stability import TARGET, SuiteRun, suite_runs
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.methods.catalogue import find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.layout import KEY_ATTRIBUTE
+from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.results_file import ResultsStore
+from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.impulse import angular_momentum
 from rotor_mbs.solution.judgement import Judgement, judge
@@ -30,9 +33,6 @@ from rotor_mbs.solution.metrics import energy_scale
 from rotor_mbs.solution.quantities import energy_error
 from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.store.layout import KEY_ATTRIBUTE
-from rotor_mbs.store.records import Record, read_records, write_records
-from rotor_mbs.store.results_file import ResultsStore
 from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
 from rotor_mbs.studies.stored_references import load_reference
 

@@ -12,12 +12,12 @@ import numpy as np
 from rotor_mbs.analysis.claim_records import shipped_claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs.read import StoredRun, open_results
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.store.read import StoredRun, open_results
 
 _SHORT = 5001  # samples: at some 30 numbers each, twenty references take 25 MB at most
 

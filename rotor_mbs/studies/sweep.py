@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.execution.pool import Finished, TaskPool, run_in
-from rotor_mbs.execution.provenance import NUMERICS, fingerprint, machine, versions
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
+from rotor_mbs.runs.layout import KEYWORDS, SWEEP_IDENTITY
+from rotor_mbs.runs.pool import Finished, TaskPool, run_in
+from rotor_mbs.runs.sweep_columns import MISSING, Rows, RunColumns, row_type
+from rotor_mbs.runs.sweep_dataset import open_sweep
+from rotor_mbs.runs.versions import NUMERICS, fingerprint, machine, versions
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.toml_file import of_file, shown_path
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.store.layout import KEYWORDS, SWEEP_IDENTITY
-from rotor_mbs.store.sweep_columns import MISSING, Rows, RunColumns, row_type
-from rotor_mbs.store.sweep_dataset import open_sweep
 from rotor_mbs.studies.sweep_work import Chunk, lost_rows, perform
 
 # Runs handed to a worker at once where the method computes many side by side: by the fastest one an eighth of a second

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.layout import KEYWORDS
+from rotor_mbs.runs.sweep_dataset import StoredSweep
 from rotor_mbs.scenario.sweep_design import SPLITS
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.store.layout import KEYWORDS
-from rotor_mbs.store.sweep_dataset import StoredSweep
 
 _PIECE = 1 << 24  # bytes of a variable that are read at once
 _CRATE = "ro-crate-metadata.json"

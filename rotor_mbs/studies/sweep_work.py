@@ -15,6 +15,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import error_growth
+from rotor_mbs.runs.sweep_columns import AMPLIFICATION, MESSAGE_BYTES, METRICS, Rows, RunColumns
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
@@ -24,7 +25,6 @@ from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock, Trajectory
-from rotor_mbs.store.sweep_columns import AMPLIFICATION, MESSAGE_BYTES, METRICS, Rows, RunColumns
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
 

@@ -19,9 +19,9 @@ from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, errata, published
 from rotor_mbs.analysis.trajectory_numbers import STATISTICS, measure
 from rotor_mbs.models.printed.errata import CheckedEntry
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.records import write_records
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.records import write_records
 
 FIG11 = paper("fig11", samples=501)
 PRINTED, REFERENCE, TAYLOR = "printed/ode45", "reference", "lagrange/taylor"

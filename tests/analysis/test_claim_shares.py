@@ -11,9 +11,9 @@ import pytest
 from rotor_mbs.analysis.claim_records import ClaimStudy, count_of_rows, records_of, shipped_claims, stored_claims
 from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares, SampledRuns, marks
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.records import write_records
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.records import write_records
 
 PRINTED, CLOSED_FORM = "printed/ode45", "lagrange/taylor"
 

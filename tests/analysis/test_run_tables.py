@@ -10,9 +10,9 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.analysis.finding import Finding, Tally
 from rotor_mbs.analysis.run_tables import bench_table, finding_lines, method_table, run_table
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.records import Record
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.records import Record
 
 SCENE = find_scenes(["paper/fig05"])[0]
 GOOD, BAD = "lagrange/dop853", "exudyn_tree/rk67"

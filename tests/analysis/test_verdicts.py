@@ -17,6 +17,7 @@ from rotor_mbs.analysis import verdicts
 from rotor_mbs.analysis.rehydrate import Rehydrated
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
@@ -24,7 +25,6 @@ from rotor_mbs.solution.judgement import energy_slack, start_slack
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
 from rotor_mbs.solution.quantities import Quantity, QuantityMetric
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.read import open_results
 
 METHOD, BOUNDS = "lagrange/dop853", load_bounds()
 

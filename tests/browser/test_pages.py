@@ -27,7 +27,7 @@ from support.sweeps import made_sweep
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.pages.modes import modes_page
-from rotor_mbs.store.read import open_results
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.studies.modes import compute_modes
 from rotor_mbs.studies.run import solve_judged
 

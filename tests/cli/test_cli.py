@@ -17,7 +17,7 @@ import pytest
 
 from rotor_mbs.cli.arguments import pages_beside, parse
 from rotor_mbs.report.pages.scene_tables import metrics_table
-from rotor_mbs.store.read import open_results
+from rotor_mbs.runs.read import open_results
 
 RUN = [sys.executable, "-m", "rotor_mbs"]
 QUICK = """

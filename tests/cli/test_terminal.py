@@ -12,8 +12,8 @@ import pytest
 from rotor_mbs.cli import main
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Outcome, Result
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.runner import Outcome, Result
 from rotor_mbs.scenario.catalogue import find_scenes
 
 SCENE = find_scenes(["paper/fig05"])[0]

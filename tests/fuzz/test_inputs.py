@@ -1,6 +1,6 @@
 """Random scene files, sweep files and damaged stored files: whatever they hold, a command answers in order.
 
-The long forms (10,000 scenes, 2,000 sweeps, 1,000 damaged files): `pytest -m slow tests/fuzz`.
+The long forms (10,000 scenes, 2,000 sweeps, 1,000 damaged files): `pytest -m full tests/fuzz`.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from support.scenes import paper
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.dask_cluster import open_task_pool
-from rotor_mbs.execution.execute import Job
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.cluster import open_task_pool
+from rotor_mbs.runs.runner import Job
+from rotor_mbs.runs.sweep_columns import MISSING
+from rotor_mbs.runs.sweep_dataset import StoredSweep
 from rotor_mbs.scenario.scene_file import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store.sweep_columns import MISSING
-from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.run import able_methods, perform_run, selected_methods
 from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
@@ -33,7 +33,7 @@ _LIMIT_S = 0.2
 
 @pytest.mark.parametrize(
     ("first", "count"),
-    [(0, 40), (9119, 1), pytest.param(0, 10_000, marks=pytest.mark.slow)],
+    [(0, 40), (9119, 1), pytest.param(0, 10_000, marks=pytest.mark.full)],
     ids=["short", "a speed beyond double precision", "long"],
 )
 def test_scenes(tmp_path: Path, first: int, count: int) -> None:
@@ -70,7 +70,7 @@ def _run_fault(scene: object, method: str, folder: Path, statuses: Counter[objec
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 30), pytest.param(0, 2_000, marks=pytest.mark.slow)], ids=["short", "long"]
+    ("first", "count"), [(0, 30), pytest.param(0, 2_000, marks=pytest.mark.full)], ids=["short", "long"]
 )
 def test_sweeps(tmp_path: Path, first: int, count: int) -> None:
     """Made by a worker process, which is ended where a run never ends; then read, and verified."""
@@ -98,7 +98,7 @@ def test_sweeps(tmp_path: Path, first: int, count: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 40), pytest.param(0, 1_000, marks=pytest.mark.slow)], ids=["short", "long"]
+    ("first", "count"), [(0, 40), pytest.param(0, 1_000, marks=pytest.mark.full)], ids=["short", "long"]
 )
 def test_damaged_files(tmp_path: Path, first: int, count: int) -> None:
     """Checked and reported: a verdict, or one line with the reason; never an exception."""

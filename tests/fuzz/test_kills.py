@@ -1,6 +1,6 @@
 """Commands ended by a signal at random moments: nothing lost, no process and no temporary file left behind.
 
-The long form (300 signals over all commands below): `pytest -m slow tests/fuzz/test_kills.py`.
+The long form (300 signals over all commands below): `pytest -m full tests/fuzz/test_kills.py`.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def _same_arrays(one: Path, other: Path) -> bool:
 
 @pytest.mark.parametrize(
     ("names", "kills"),
-    [(("run",), 2), pytest.param(tuple(COMMANDS), 300, marks=pytest.mark.slow)],
+    [(("run",), 2), pytest.param(tuple(COMMANDS), 300, marks=pytest.mark.full)],
     ids=["short", "long"],
 )
 def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, ...], kills: int) -> None:

@@ -112,7 +112,7 @@ def test_a_method_of_another_package_is_found_listed_and_run(tmp_path: Path) -> 
     assert "energy drift" in done.stderr or done.returncode == 0
     code = (
         "import pathlib, sys\n"
-        "from rotor_mbs.store.read import open_results\n"
+        "from rotor_mbs.runs.read import open_results\n"
         "with open_results(pathlib.Path(sys.argv[1])) as results:\n"
         "    stored = results.scenes['paper/fig03'].runs['made_up/turning']\n"
         "    print(stored.settings, stored.array('rates')[-1, 0], results.attributes['made_up'])\n"

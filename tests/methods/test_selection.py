@@ -48,7 +48,7 @@ def test_overdamped_scenes_get_what_holds_there(name: str) -> None:
 _NOTHING_HOLDS = ("extreme/rate-1e200", "extreme/pendulum-million")
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("name", [found.name for found in find_scenes(["stiff", "extreme"])])
 def test_what_the_rule_takes_holds(name: str) -> None:
     """Every method that claims to be right, at its default settings, against the frozen reference."""

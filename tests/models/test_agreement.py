@@ -71,7 +71,7 @@ def test_the_chain_on_fig08_up_to_its_horizon() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in ("fig03", "fig11") else pytest.param(name, marks=pytest.mark.slow) for name in PAPER]
+    "name", [name if name in ("fig03", "fig11") else pytest.param(name, marks=pytest.mark.full) for name in PAPER]
 )
 def test_the_chain_while_the_growth_is_below_1000(name: str) -> None:
     scene, exact = cut(name, 1e3)

@@ -71,7 +71,7 @@ def test_uncertainty_bounds_the_error_at_every_sample(name: str, method: str, sa
     assert found.trajectory.angle_uncertainty[-1] <= 5e-6
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "step", "tolerance"),
     [
@@ -94,7 +94,7 @@ def test_chaotic_scenes_to_1e_6_before_the_horizon(name: str, step: float, toler
     assert (error <= uncertainty).all()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_fig08_to_1e_9_over_ten_seconds() -> None:
     """Seven seconds past the time at which the neighbours of its invariant set have left."""
     found = run(scene("paper/fig08"), ALPHA, **RICHARDSON, newton_relative_tolerance=1e-12)

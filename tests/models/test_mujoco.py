@@ -105,7 +105,7 @@ def test_the_order_on_every_scene_of_the_paper(
     assert coarse < 1e-11 or np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("name", PAPER)
 def test_the_scenes_of_the_paper_at_the_default_step(name: str) -> None:
     metrics = metrics_of(paper(name), run(paper(name)), references.reference(f"paper/{name}"))

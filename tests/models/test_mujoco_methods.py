@@ -14,8 +14,8 @@ from support.scenes import paper
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.solution.judgement import judge
-from rotor_mbs.store.read import open_results
 
 METHODS = ("mujoco/rk4", "mujoco/implicitfast")
 

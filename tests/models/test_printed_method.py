@@ -94,7 +94,7 @@ def test_figure_8_rotor_stays_below_half_a_radian():
         pytest.param(replace(FIG11, gravity=9.81), {}, id="g = 9.81"),
         pytest.param(FIG11, {"relative_tolerance": 1e-7}, id="RelTol = 1e-7"),
         pytest.param(
-            scene(FIG11.initial_angles, FIG11.initial_rates, c=0.0854), {}, marks=pytest.mark.slow, id="c = 0.0854"
+            scene(FIG11.initial_angles, FIG11.initial_rates, c=0.0854), {}, marks=pytest.mark.full, id="c = 0.0854"
         ),  # comes close to the singularity: tens of thousands of steps
     ],
 )

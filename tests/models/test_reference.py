@@ -13,7 +13,6 @@ from support.references import reference as frozen_reference
 from support.references import scene as shipped_scene
 from support.scenes import PAPER, general, paper
 
-from rotor_mbs.execution.pool import WorkerPool, run_in
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
 from rotor_mbs.models.lagrange.loads import quad_loads, sampled_loads
@@ -21,11 +20,12 @@ from rotor_mbs.models.lagrange.methods import ReferenceSettings
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, reference_at, uncertainty
 from rotor_mbs.models.lagrange.taylor import Propagation
+from rotor_mbs.runs.pool import WorkerPool, run_in
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.scene_file import parse_scene
 from rotor_mbs.solution.trajectory import Integration
-from rotor_mbs.store.read import open_results
 
 FROZEN = reference_folder() / "paper.h5"
 
@@ -80,7 +80,7 @@ def test_uncertainty_bounds_the_true_error_at_every_sample(name: str) -> None:
     _assert_bounded(name)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("name", [f"paper/{name}" for name in PAPER])
 def test_uncertainty_bounds_the_true_error_in_the_paper(name: str) -> None:
     pytest.importorskip("heyoka")

@@ -10,6 +10,7 @@ from support.scenes import general, paper
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
+from rotor_mbs.runs.sweep_columns import row_type
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import sweep_of
 from rotor_mbs.scenario.variants import Variants
@@ -18,7 +19,6 @@ from rotor_mbs.solution.metrics import energy_drifts
 from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store.sweep_columns import row_type
 from rotor_mbs.studies.sweep_work import Chunk, perform, rows_of
 
 pytest.importorskip("heyoka")

@@ -18,7 +18,7 @@ from rotor_mbs.report.pages import comparison_pictures as comparisons
 from rotor_mbs.report.pages.comparison_pictures import Mark, parting
 from rotor_mbs.report.pages.index import heat_map, short_sentences
 from rotor_mbs.report.plots.time_histories import Series, errors
-from rotor_mbs.store.read import open_results
+from rotor_mbs.runs.read import open_results
 
 TIME = np.linspace(0.0, 10.0, 201)
 PRINTED, CORRECTED = look_of("printed/ode45"), look_of("lagrange/taylor")

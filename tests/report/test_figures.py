@@ -12,7 +12,7 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.cli import main
 from rotor_mbs.report.pages.figures import available, composed
-from rotor_mbs.store.read import open_results
+from rotor_mbs.runs.read import open_results
 
 RIGHT = rotor(lambda t: 0.5 + 0.1 * t, np.sin, np.cos)
 

@@ -15,8 +15,8 @@ from support.stored import Made, rotor, store
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.numbers import prefixed, with_unit
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.read import open_results
 
 PACKAGE = """
 from rotor_mbs.solution.quantities import Plot, Quantity

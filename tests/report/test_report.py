@@ -38,7 +38,7 @@ from rotor_mbs.report.pages.modes import multipliers
 from rotor_mbs.report.pages.scene_tables import range_table
 from rotor_mbs.report.plots import time_histories as figures
 from rotor_mbs.report.plots.paths import paths
-from rotor_mbs.store.read import open_results
+from rotor_mbs.runs.read import open_results
 
 FIG11 = paper("fig11", samples=301)
 PLAIN = replace(FIG11, outputs=("angles",))

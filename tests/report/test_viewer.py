@@ -15,7 +15,7 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.viewer import FEWEST, MOST, frames, magnification, packed, script_json, viewer
-from rotor_mbs.store.read import open_results
+from rotor_mbs.runs.read import open_results
 
 TEMPLATES = Path(write_report.__code__.co_filename).parent / "templates"
 FIG11 = paper("fig11", samples=301)

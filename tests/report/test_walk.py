@@ -14,8 +14,8 @@ from support.stored import Made, rotor, store
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.figures import FIGURES, in_pi, same_and_different
 from rotor_mbs.report.plots.paths import projected
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.read import open_results
 
 FIG11 = paper("fig11", samples=301)
 RIGHT = rotor(lambda t: 0.5 + 0.1 * t, np.sin)

@@ -16,6 +16,8 @@ from support.stored import Made, rotor, store
 from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.write import write_run
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.judgement import judge
@@ -23,8 +25,6 @@ from rotor_mbs.solution.quantities import BUILT_IN, Quantity
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, recode
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.write import write_run
 from rotor_mbs.studies.run import solve_judged
 
 PLUG_IN = """

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from support.scenes import paper
 
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job
-from rotor_mbs.store.records import Record
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.records import Record
+from rotor_mbs.runs.runner import Job
 from rotor_mbs.studies import bench
 from rotor_mbs.studies.bench_worker import Point, ask
 

@@ -19,13 +19,13 @@ from support.scenes import paper
 
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, fitted_order, time_to_reach
 from rotor_mbs.cli import main
-from rotor_mbs.execution.timing import conduct, statistics
 from rotor_mbs.methods.catalogue import find_method, ladders, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
+from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.runs.timing import conduct, statistics
 from rotor_mbs.solution.metrics import angle_error
-from rotor_mbs.store.records import Record, read_records
 from rotor_mbs.studies.bench_worker import Point, PointTimer, thinned, thinned_reference
 from rotor_mbs.studies.cost_scaling import with_blades
 
@@ -208,7 +208,7 @@ def test_a_budget_of_nothing_and_a_file_of_another_version_are_refused(
     assert "format_version 99, this program reads" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_two_benches_tell_the_same(tmp_path: Path) -> None:
     """Errors bit by bit, failures one by one; medians of runs over 1 ms within 15 % where nothing else is running."""
     methods = ("lagrange/taylor", "exudyn_tree/rk44", "exudyn_tree/rk67", "exudyn_tree/generalized_alpha")
@@ -238,7 +238,7 @@ def test_two_benches_tell_the_same(tmp_path: Path) -> None:
 Runner = Callable[[float], tuple[Callable[[], object], Callable[[], float]]]
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["fig08", "fig09", "fig11"])
 def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
     """Time to 1e-9 rad before the horizon, all in one interleaved run; every method hands out the same 101 samples.
@@ -323,7 +323,7 @@ def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
     assert ratios["numba"] > (0.7 if name == "fig08" else 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_cost_of_the_chain_grows_no_faster_than_a_power_of_1_25_from_12_to_96_blades() -> None:
     """By processor time, the least of three. The dense factorization of before: 2.5."""
     sizes, times = (12, 23, 48, 96), []

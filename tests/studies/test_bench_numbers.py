@@ -31,9 +31,9 @@ from rotor_mbs.report.pages.bench import (
     overview_table,
     reach_table,
 )
+from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.results_file import merge
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store.records import Record, read_records, write_records
-from rotor_mbs.store.results_file import merge
 
 
 def curve(

@@ -28,16 +28,16 @@ from support.checking import (
 
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli import main
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.pool import Finished
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report.pages import check as verdict_formats
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.digests import seal
+from rotor_mbs.runs.freeze import freeze, write_digests
+from rotor_mbs.runs.pool import Finished
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.store.digests import seal
-from rotor_mbs.store.freeze import freeze, write_digests
 from rotor_mbs.studies import check, check_probes
 from rotor_mbs.studies.check_probes import measure, probe, probes
 
@@ -124,7 +124,7 @@ def test_measurements_pass(case: Case) -> None:
     assert [v for v in _verdicts(case) if not v.passed] == []
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_default_set_passes_within_a_minute_of_two_cores(tmp_path: Path) -> None:
     """All of it, as a user starts it; the time is that of its processes, which a busy machine does not lengthen."""
     files = ["--json", tmp_path / "check.json", "--junit", tmp_path / "check.xml"]
@@ -168,7 +168,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("scene", ["check/general", pytest.param("paper/fig11", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("scene", ["check/general", pytest.param("paper/fig11", marks=pytest.mark.full)])
 def test_an_erratum_in_the_closed_form_fails(
     fault: str, scene: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -470,7 +470,7 @@ _SLOW = ("exudyn_chain", "lagrange/radau")
 
 @pytest.mark.parametrize(
     ("name", "scene_name", "method", "share"),
-    [pytest.param(*row, marks=pytest.mark.slow if row[2].startswith(_SLOW) else ()) for row in _KNOWN],
+    [pytest.param(*row, marks=pytest.mark.full if row[2].startswith(_SLOW) else ()) for row in _KNOWN],
 )
 def test_a_known_fault_reaches_what_its_bound_says(
     name: str, scene_name: str, method: str, share: float, tmp_path: Path
@@ -657,7 +657,7 @@ def test_a_measurement_that_is_lost_fails(monkeypatch: pytest.MonkeyPatch) -> No
     assert not check.judge_measured(Verdict("tip", "s", METHOD, "c", math.nan, 0.0, "", ""), load_bounds()).passed
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_changed_closed_form_fails_from_the_command_line(tmp_path: Path) -> None:
     """E1 in the shipped file itself: nothing is patched, every process imports it."""
     package = tmp_path / "rotor_mbs"
@@ -682,7 +682,7 @@ def test_a_changed_closed_form_fails_from_the_command_line(tmp_path: Path) -> No
     assert not any("FAIL agreement" in line and "exudyn" in line for line in lines)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_without_heyoka_the_stand_in_serves(tmp_path: Path) -> None:
     """A package of that name that cannot be imported goes before the real one, in every process."""
     (tmp_path / "site").mkdir()

@@ -52,7 +52,7 @@ def test_the_same_seed_gives_the_shipped_table_again(tmp_path: Path, shipped: Cl
     assert [one.marks for one in found.shares] == prefixes(shipped, names, 8.0, 2)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("duration", [8.0, 10.0, 12.0])
 def test_the_first_runs_of_every_claim_are_those_of_the_shipped_table(
     tmp_path: Path, shipped: ClaimStudy, duration: float

@@ -20,8 +20,8 @@ from rotor_mbs.cli import main
 from rotor_mbs.models.lagrange import reference
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.data_comparison import verdict_of
+from rotor_mbs.runs.records import read_records, write_records
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.store.records import read_records, write_records
 from rotor_mbs.testing import assert_agrees
 
 # (scene, format, duration of the short form, s)
@@ -67,7 +67,7 @@ def test_a_correct_code_agrees(tmp_path: Path, name: str, kind: str, duration: f
     accepted(name, kind, duration, tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["paper/fig08", "paper/fig09", "paper/fig11"])
 def test_a_correct_code_agrees_to_the_end(tmp_path: Path, name: str) -> None:
     accepted(name, "data.csv", 10.0, tmp_path)

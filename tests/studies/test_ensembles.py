@@ -55,7 +55,7 @@ def test_the_same_seed_gives_the_same_numbers() -> None:
     assert all((one[name] == other[name]).all() for name in one)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["fig11", "fig12", "fig13b", "fig14a", "fig14b", "fig14c"])
 def test_tree_and_closed_form_on_every_chaotic_scene(name: str) -> None:
     """900 runs of the closed form, 300 of the tree at its default step.

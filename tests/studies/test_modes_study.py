@@ -16,8 +16,8 @@ from rotor_mbs.analysis.mode_records import read_modes, to_records
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs.records import write_records
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.records import write_records
 from rotor_mbs.studies import modes as study
 
 NREL = find_scenes(["stiff/nrel-5mw"])[0]

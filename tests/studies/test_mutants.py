@@ -145,7 +145,7 @@ def test_a_sample_of_mutants_is_noticed() -> None:
     assert _unexplained(rows) == []
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_every_mutant_is_noticed_or_explained() -> None:
     """Of every eighth, in the order of targets and sources, so that each has its share; MUTANTS_EVERY=1 tries all."""
     every = int(os.environ.get("MUTANTS_EVERY", "8"))
@@ -195,11 +195,11 @@ def wrong_scenes(scene: Scene, share: float) -> Iterator[tuple[str, Scene]]:
     ("method", "share", "every"),
     [
         ("lagrange/dop853", 1e-6, 6),
-        pytest.param("lagrange/dop853", 1e-6, 1, marks=pytest.mark.slow),
-        pytest.param("exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.slow),
-        pytest.param("mujoco/rk4", 1e-3, 1, marks=pytest.mark.slow),
+        pytest.param("lagrange/dop853", 1e-6, 1, marks=pytest.mark.full),
+        pytest.param("exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.full),
+        pytest.param("mujoco/rk4", 1e-3, 1, marks=pytest.mark.full),
         # Of second order: a product of inertia of 25 beside 4000 kg m² shows from 3 % on.
-        pytest.param("exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.slow),
+        pytest.param("exudyn_chain/generalized_alpha", 5e-2, 1, marks=pytest.mark.full),
     ],
 )
 def test_every_number_of_a_scene_counts(method: str, share: float, every: int, tmp_path: Path) -> None:
@@ -221,8 +221,8 @@ def test_every_number_of_a_scene_counts(method: str, share: float, every: int, t
     ("method", "share", "every"),
     [
         ("lagrange/dop853", 1e-4, 5),
-        pytest.param("lagrange/dop853", 1e-4, 1, marks=pytest.mark.slow),
-        pytest.param("exudyn_tree/rk67", 1e-4, 1, marks=pytest.mark.slow),
+        pytest.param("lagrange/dop853", 1e-4, 1, marks=pytest.mark.full),
+        pytest.param("exudyn_tree/rk67", 1e-4, 1, marks=pytest.mark.full),
     ],
 )
 def test_every_number_of_torques_and_commands_of_pitches_counts(

@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 _SCHEMES, _TAYLOR = "rotor_mbs.models.exudyn.schemes", "rotor_mbs.models.lagrange.methods"
 _CHAIN = "rotor_mbs.models.exudyn.methods"
-_ODE45, _READ = "rotor_mbs.models.ode45", "rotor_mbs.store.read"
+_ODE45, _READ = "rotor_mbs.models.ode45", "rotor_mbs.runs.read"
 
 # What is asked: the verdicts on the defaults, on runs of the scenes made for checking by a method, or on references
 # computed anew; or a test.
@@ -113,7 +113,7 @@ def _asked(name: str, *, changed: bool = True) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in _SLOW else ()) for n in MUTANTS])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.full if n in _SLOW else ()) for n in MUTANTS])
 def test_an_outside_mutant_is_noticed(name: str) -> None:
     if MUTANTS[name][3] == ANEW or name.endswith("in the solver"):
         pytest.importorskip("heyoka")
@@ -121,6 +121,6 @@ def test_an_outside_mutant_is_noticed(name: str) -> None:
     assert re.search(pattern, _asked(name)), name
 
 
-@pytest.mark.parametrize("name", ["rk44 step doubled", pytest.param("reader swap", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["rk44 step doubled", pytest.param("reader swap", marks=pytest.mark.full)])
 def test_without_the_change_nothing_is_noticed(name: str) -> None:
     assert _asked(name, changed=False) == ""

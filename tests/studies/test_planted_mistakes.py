@@ -218,7 +218,7 @@ SLOW = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.slow if one in SLOW else ()) for one in PLANTS])
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.full if one in SLOW else ()) for one in PLANTS])
 def test_a_mistake_is_named(name: str) -> None:
     plant = PLANTS[name]
     found = rm.compare_data(plant.data(), short(plant.scene))

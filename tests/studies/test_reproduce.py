@@ -12,11 +12,11 @@ import pytest
 from support.scenes import PAPER
 
 from rotor_mbs.analysis.errata import entries
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.catalogue import is_corrected
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.runner import Job
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
-from rotor_mbs.store.read import open_results
 from rotor_mbs.studies.reproduce import BENCHED, ladder_cases
 from rotor_mbs.studies.run import store_time_out
 

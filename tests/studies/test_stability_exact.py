@@ -10,9 +10,9 @@ import pytest
 from support.quadrature import Passage
 from support.references import TAYLOR, reference, run, scene
 
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.runner import Job
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import horizon_samples, metrics_of
@@ -92,7 +92,7 @@ def test_springs_of_the_hour_hold_every_pitch() -> None:
         assert stiffness > 1.5 * blade.mass * one.gravity * np.hypot(*blade.centre_of_mass[:2])
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_tree_agrees_at_the_end_of_the_hour() -> None:
     """720 000 steps of order 6 at ωh = 0.07: (ωh)^7/7! a step, a few 1e-12 of the pitch, adds up to 1e-8 at most."""
     one = scene("extreme/hour-small")
@@ -168,7 +168,7 @@ def test_energy_drifts_like_a_random_walk() -> None:
     assert record.attributes["largest"] <= 1e-13
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_million_periods_of_the_pendulum() -> None:
     """Against sn of Jacobi; energy within a random walk of round-off, 2e-14·√steps at most, all along.
 

@@ -11,11 +11,11 @@ import pytest
 
 from rotor_mbs.analysis.stability import OUTCOMES, advice_lines, reached_by, suite_runs, unreached
 from rotor_mbs.cli import main
-from rotor_mbs.execution.execute import Outcome
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.pages.stability import NOT_COMPARED
+from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.runner import Outcome
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.store.records import Record, read_records, write_records
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stability import complete_records
 
@@ -38,7 +38,7 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_no_run_of_ours_claims_success(suite: Path) -> None:
     found = suite_runs(suite)
     assert {cell.scene for cell in found} == set(SCENES)
@@ -52,7 +52,7 @@ def test_no_run_of_ours_claims_success(suite: Path) -> None:
     assert reached_by(found, "extreme/light-1e-8") == "lagrange/taylor"
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_map_and_its_pages(suite: Path) -> None:
     folder = suite.with_name("stability-report")
     page = (folder / "index.html").read_text(encoding="utf-8")

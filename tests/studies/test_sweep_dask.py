@@ -17,8 +17,8 @@ from support.sweeps import stored_runs
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution import dask_cluster
-from rotor_mbs.execution.pool import SerialPool, run_in
+from rotor_mbs.runs import dask_cluster
+from rotor_mbs.runs.pool import SerialPool, run_in
 
 pytest.importorskip("distributed")
 

@@ -1,6 +1,6 @@
 """The fast path's price: 4,096 starts of Fig. 11 by one command, beside loops over single runs and other methods.
 
-    python -m pytest -m slow -s tests/studies/test_sweep_measured.py
+    python -m pytest -m full -s tests/studies/test_sweep_measured.py
 
 prints the table of the README (medians of five rounds, everything in turn) and what a run costs beside its integration.
 It skips itself where the machine is busy.
@@ -28,17 +28,17 @@ from support.comparison_dop853 import straightforward
 from support.scenes import paper
 
 from rotor_mbs.cli import main
-from rotor_mbs.execution.dask_cluster import open_task_pool
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import ensemble
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.taylor import build_system
+from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import Chunk, rows_of
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.full
 
 _RUNS, _MORE_RUNS = 4096, 16384
 _ROUNDS = 5

@@ -1,6 +1,6 @@
 """Sweeps in bounded memory: what a worker grows by, and what a parent of 100,000 runs takes.
 
-python -m pytest -m slow -s tests/studies/test_sweep_memory.py
+python -m pytest -m full -s tests/studies/test_sweep_memory.py
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from rotor_mbs.execution.dask_cluster import open_task_pool
+from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import perform
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.full,
     pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read in /proc"),
 ]
 

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from support.sweeps import command, run_local, stored_runs, wait_for_runs, workers_of
 
 from rotor_mbs.cli import main
+from rotor_mbs.runs import files
+from rotor_mbs.runs.sweep_columns import MISSING, Rows
+from rotor_mbs.runs.sweep_dataset import StoredSweep
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep, sweep_of
-from rotor_mbs.store import hdf5
-from rotor_mbs.store.sweep_columns import MISSING, Rows
-from rotor_mbs.store.sweep_dataset import StoredSweep
 from rotor_mbs.studies.sweep_work import Chunk, perform
 
 _SWEEP = """
@@ -218,7 +218,7 @@ normal = ["pi/4", 1e-3]
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
-@pytest.mark.parametrize(("kills", "draws"), [(5, 500), pytest.param(100, 2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "draws"), [(5, 500), pytest.param(100, 2000, marks=pytest.mark.full)])
 def test_killed_at_random_moments_the_fast_path_loses_nothing(tmp_path: Path, kills: int, draws: int) -> None:
     """Kills of the parent, every second one after one of a worker; the file opens in h5py and xarray all the time."""
     path = tmp_path / "s.toml"
@@ -260,7 +260,7 @@ def _open_everywhere(output: Path) -> None:
                 assert data.angles.dims == ("run", "time", "coordinate")
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_one_time_of_all_runs_is_read_five_times_faster_than_with_a_chunk_per_run(tmp_path: Path) -> None:
     """4,000 runs of 1,001 samples: medians of nine readings each, one after the other."""
     values = np.random.default_rng(0).standard_normal((4000, 1001, 4))
@@ -272,7 +272,7 @@ def test_one_time_of_all_runs_is_read_five_times_faster_than_with_a_chunk_per_ru
         for name, times in spent.items():
             with h5py.File(tmp_path / name) as file:
                 start = time.perf_counter()
-                found = file["angles"][:, 500] if name == "chunked" else np.array(hdf5.mapped(file["angles"])[:, 500])
+                found = file["angles"][:, 500] if name == "chunked" else np.array(files.mapped(file["angles"])[:, 500])
                 times.append(time.perf_counter() - start)
                 np.testing.assert_array_equal(found, values[:, 500])
     ratio = float(np.median(spent["chunked"]) / np.median(spent["contiguous"]))

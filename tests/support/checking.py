@@ -12,13 +12,13 @@ from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
+from rotor_mbs.runs.results_file import merge
+from rotor_mbs.runs.write import write_run
 from rotor_mbs.scenario.accuracy_bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store.results_file import merge
-from rotor_mbs.store.write import write_run
 from rotor_mbs.studies import check
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import load_reference

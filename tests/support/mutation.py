@@ -47,7 +47,7 @@ _CPU_LIMIT_S, _RUN_LIMIT_S = 20, 120.0  # of a mutant, whatever else the machine
 _KEPT_ELSE = ("rotor_mbs.errors", "rotor_mbs.scenario", "rotor_mbs.solution")
 _KEPT = {
     "rules": _KEPT_ELSE[:2],
-    "analysis": (*_KEPT_ELSE, "rotor_mbs.methods", "rotor_mbs.models", "rotor_mbs.execution", "rotor_mbs.store"),
+    "analysis": (*_KEPT_ELSE, "rotor_mbs.methods", "rotor_mbs.models", "rotor_mbs.runs", "rotor_mbs.runs"),
 }
 # Here whole numbers count, arguments of calls, and conditions; elsewhere the terms of equations.
 _PROGRAMS = ("ode45", "schemes", "adapter", "integration", "reference", "analysis")
@@ -789,7 +789,7 @@ def warm_up(modules: Sequence[str]) -> None:
     sys.setprofile(lambda frame, event, _: _RUN_ALREADY.add(frame.f_code) if event == "call" else None)
     for name in ("support.checking", *dict.fromkeys(target.module for target in TARGETS)):
         importlib.import_module(name)
-    sys.modules["rotor_mbs.execution.provenance"].versions()
+    sys.modules["rotor_mbs.runs.versions"].versions()
     sys.modules["rotor_mbs.studies.stored_references"].frozen_file("")
     tests = [str(ROOT / "tests" / test) for module in modules for test in _TESTS.get(module, ())]
     with contextlib.redirect_stdout(io.StringIO()):

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.runs.results_file import merge
+from rotor_mbs.runs.write import write_run
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.store.results_file import merge
-from rotor_mbs.store.write import write_run
 
 Curve = Callable[[Any], Any]  # time (n,) to angles (n, coordinates)
 

@@ -12,7 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rotor_mbs.execution.dask_cluster import open_task_pool
+from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.studies.sweep import SweepResult, plan_sweep, run_sweep
 from rotor_mbs.studies.sweep_work import rows_of

@@ -26,7 +26,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core.looks import VERMILLION, Look
 from rotor_mbs.report.core.numbers import power
-from rotor_mbs.store.hdf5 import replace_file
+from rotor_mbs.runs.files import replace_file
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS = "time (s)"

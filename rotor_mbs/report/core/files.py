@@ -20,7 +20,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.report.core import numbers
 from rotor_mbs.report.core.elements import DASHES, MARKS
 from rotor_mbs.report.core.looks import GREY, class_of, palette_css, with_light_palette
-from rotor_mbs.store.hdf5 import replace_file
+from rotor_mbs.runs.files import replace_file
 
 GENERATOR = "rotor_mbs report"
 INDEX, ERRATA, WALK = "index.html", "errata.html", "figures.html"

@@ -10,7 +10,7 @@ from rotor_mbs.analysis.claim_records import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.report.core.files import Site
-from rotor_mbs.store.records import Record
+from rotor_mbs.runs.records import Record
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of, with_capi
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import method_cell, status_text, versions
+from rotor_mbs.runs.read import OpenResults, StoredScene
+from rotor_mbs.runs.records import COST_SCALING, Record, read_records
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.store.read import OpenResults, StoredScene
-from rotor_mbs.store.records import COST_SCALING, Record, read_records
 
 Curves = Mapping[str, Sequence[Record]]  # by scene
 _FRONT_COLOUR = "#c8c8c8"

@@ -22,8 +22,8 @@ from rotor_mbs.report.pages.quantities import angle_difference
 from rotor_mbs.report.pages.scene_tables import path_table
 from rotor_mbs.report.plots import paths
 from rotor_mbs.report.plots.time_histories import Series, errors, mark_time, set_range, thin
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 _LOWEST = 1e-16  # relative energy at which a mark below it is drawn

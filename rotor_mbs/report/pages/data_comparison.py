@@ -19,7 +19,7 @@ from rotor_mbs.report.core.numbers import number, power, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.time_histories import Series
-from rotor_mbs.store.records import Record
+from rotor_mbs.runs.records import Record
 
 _ALLOWED = Look(GREY, ":", "")
 

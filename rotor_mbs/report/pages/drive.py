@@ -13,10 +13,10 @@ from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.core.numbers import prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots.time_histories import Series, lines
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, value_at
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 _COMMAND, _TAKEN = Look(GREY, ":", ""), Look(VERMILLION, "--", "")
 

@@ -18,7 +18,7 @@ from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.scene_tables import status_text
-from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 
 _TOKEN = re.compile(
     r"(?:(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)|q̇(?P<rate_index>\d)|(?P<name>[A-Za-zα-ω]))(?P<square>[²³]?)"

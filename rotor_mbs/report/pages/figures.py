@@ -30,9 +30,9 @@ from rotor_mbs.report.pages.quantities import angle_difference
 from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.report.plots import paths
 from rotor_mbs.report.plots import time_histories as histories
+from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.store.read import StoredRun, StoredScene, open_results
 
 _ROUNDING = 1e-9  # rad
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"

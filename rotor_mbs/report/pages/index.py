@@ -20,7 +20,7 @@ from rotor_mbs.report.pages.comparison_pictures import energy_of_scenes, key_pic
 from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text, versions
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import paths
-from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 
 Scenes = Mapping[str, StoredScene]
 # Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.

@@ -19,10 +19,10 @@ from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities
 from rotor_mbs.solution.quantities import sizes as lengths
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 Runs = Mapping[str, StoredRun]
 Curves = dict[str, Series]  # by method

@@ -24,8 +24,8 @@ from rotor_mbs.report.pages.scene_tables import metric
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.status import COMPLETE
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 
 class DrawnRuns(NamedTuple):

@@ -13,8 +13,8 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 # Attributes of a results file that say what made it.
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")

@@ -18,9 +18,9 @@ from rotor_mbs.report.pages import quantities
 from rotor_mbs.report.pages.scene import opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
 from rotor_mbs.report.plots import time_histories as histories
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.text_table import listed
-from rotor_mbs.store.read import OpenResults, StoredRun, StoredScene
-from rotor_mbs.store.records import Record, read_records
 
 _FOLDERS = ("stiff", "extreme")
 _SUITE = ("steps", "limits", "conservation")

@@ -18,9 +18,9 @@ from markupsafe import Markup
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report.core.looks import class_of, coordinate_look, with_capital
 from rotor_mbs.report.core.numbers import with_unit
+from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
-from rotor_mbs.store.read import StoredRun, StoredScene
 
 FEWEST, MOST = 241, 2401  # frames: of a slow motion; of a page of a size that can be mailed
 _ARC = 0.05  # rad that a coordinate turns from a frame to the next, where the samples and MOST allow it

@@ -9,8 +9,8 @@ import platform
 from pathlib import Path
 
 import rotor_mbs
-from rotor_mbs.execution import cores
 from rotor_mbs.methods.catalogue import methods
+from rotor_mbs.runs import cores
 
 _OWN = ("numpy", "h5py")
 NUMERICS = ("scenario", "solution", "methods", "models")  # sources that decide a run's numbers

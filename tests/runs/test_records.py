@@ -13,10 +13,10 @@ from support.stored import Made, rotor, store
 
 from rotor_mbs.analysis.errata import entries, errata_record
 from rotor_mbs.models.printed.errata import CheckedEntry
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.results_file import ResultsStore, merge
 from rotor_mbs.solution.status import code_of
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.records import Record, read_records, write_records
-from rotor_mbs.store.results_file import ResultsStore, merge
 
 CHECKS = [
     CheckedEntry("(8)", "row 1", "c", "0", 1.0, False, "E1"),

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs import files
+from rotor_mbs.runs.digests import array_digest
+from rotor_mbs.runs.read import OpenResults, open_results
+from rotor_mbs.runs.write import put_datasets
 from rotor_mbs.solution.quantities import BUILT_IN, LOADS
-from rotor_mbs.store import hdf5
-from rotor_mbs.store.digests import array_digest
-from rotor_mbs.store.read import OpenResults, open_results
-from rotor_mbs.store.write import put_datasets
 
 # What cannot be computed again from angles and rates as precisely, and the scales.
 _SCALES = ("time", "coordinate", "blade", "axis")
@@ -26,18 +26,18 @@ def freeze(source: Path, target: Path, date: str) -> None:
 
     Tip and energies follow from angles and rates. The work is kept only where it does not. Raises StoreError.
     """
-    with open_results(source) as results, hdf5.new_file(target) as file:
+    with open_results(source) as results, files.new_file(target) as file:
         for scene in results.scenes.values():
             reference = scene.reference
             if reference is None:
                 continue
-            hdf5.put_attributes(hdf5.new_group(file, scene.name), scene.attributes)
-            group = hdf5.new_group(file, f"{scene.name}/{REFERENCE}")
+            files.put_attributes(files.new_group(file, scene.name), scene.attributes)
+            group = files.new_group(file, f"{scene.name}/{REFERENCE}")
             arrays = {name: reference.array(name) for name in KEPT if name in reference}
             put_datasets(group, arrays, BUILT_IN, reference.labels)
             facts = {name: reference.attributes[name] for name in _ATTRIBUTES}
             made = f"heyoka {results.attributes['heyoka']}, {date}"
-            hdf5.put_attributes(group, {**facts, "frozen_with": made})
+            files.put_attributes(group, {**facts, "frozen_with": made})
     write_digests(target)
 
 
@@ -48,7 +48,7 @@ def write_digests(references: Path) -> None:
     """
     with open_results(references) as results:
         lines = [f"{digest}  {scene} {name}\n" for (scene, name), digest in _digests(results).items()]
-    hdf5.replace_file(references.with_suffix(".sha256"), "".join(lines).encode())
+    files.replace_file(references.with_suffix(".sha256"), "".join(lines).encode())
 
 
 def changed_arrays(results: OpenResults) -> dict[str, list[str]]:

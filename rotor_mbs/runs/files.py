@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError, saving
+from rotor_mbs.runs.digests import DIGESTS, plain, seal_all
+from rotor_mbs.runs.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Column
 from rotor_mbs.solution.quantities import Quantity
-from rotor_mbs.store.digests import DIGESTS, plain, seal_all
-from rotor_mbs.store.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Column
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from rotor_mbs.errors import RotorError
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.output_lock import writing
-from rotor_mbs.execution.pool import TaskPool, Workers, pool_of, run_in
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.pool import TaskPool, Workers, pool_of, run_in
 
 # Statuses of a case of which there is no record: the same call tries it again.
 NOT_COMPUTED = ("worker_died", "error", "no_reference")

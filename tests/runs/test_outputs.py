@@ -12,9 +12,9 @@ import pytest
 from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.output_lock import writing
-from rotor_mbs.store.hdf5 import replace_file
-from rotor_mbs.store.read import open_results
+from rotor_mbs.runs.files import replace_file
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.read import open_results
 from rotor_mbs.studies import claims
 
 SWEEP = """

@@ -17,11 +17,11 @@ import rotor_mbs as rm
 from rotor_mbs.analysis.claim_records import shipped_claims
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
+from rotor_mbs.runs.digests import seal
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.results_file import ResultsStore
+from rotor_mbs.runs.sweep_dataset import StoredSweep
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.store.digests import seal
-from rotor_mbs.store.read import open_results
-from rotor_mbs.store.results_file import ResultsStore
-from rotor_mbs.store.sweep_dataset import StoredSweep
 
 METHOD = "lagrange/dop853"
 RUN = f"check/held/{METHOD}"

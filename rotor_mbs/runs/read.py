@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs import digests, files
+from rotor_mbs.runs.layout import SWEEP_IDENTITY, key_of
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS, natural_order
-from rotor_mbs.store import digests, hdf5
-from rotor_mbs.store.layout import SWEEP_IDENTITY, key_of
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class StoredRun:
     def attributes(self) -> dict[str, Any]:
         """Status, message, metrics, times ... as plain values. Raises StoreError where they are damaged."""
         with self._reading("attributes"):
-            found = hdf5.attributes_of(self._group)
+            found = files.attributes_of(self._group)
             self._prove(digests.ATTRIBUTES, lambda: digests.attributes_digest(found))
             return found
 
@@ -61,7 +61,7 @@ class StoredRun:
         if "coordinate" not in self._group:
             return []
         with self._reading("coordinate"):
-            return [str(label) for label in hdf5.attributes_of(hdf5.member(self._group, "coordinate"))["labels"]]
+            return [str(label) for label in files.attributes_of(files.member(self._group, "coordinate"))["labels"]]
 
     @property
     def names(self) -> list[str]:
@@ -79,8 +79,8 @@ class StoredRun:
         if name not in self:
             raise StoreError(f"{self._group.file.filename}: {self._group.name} has no readable {name}")
         with self._reading(name):
-            dataset = hdf5.member(self._group, name)
-            values = hdf5.values_of(dataset)
+            dataset = files.member(self._group, name)
+            values = files.values_of(dataset)
             self._prove(name, lambda: digests.dataset_digest(values, dataset.attrs))
         if self._kept is not None:
             self._kept[name] = values
@@ -95,7 +95,7 @@ class StoredRun:
         return digests.stored_digests(self._group.attrs)
 
     def _reading(self, part: str) -> AbstractContextManager[None]:
-        return hdf5.reading(self._group.file.filename, f"{self._group.name}: {part}")
+        return files.reading(self._group.file.filename, f"{self._group.name}: {part}")
 
     def _prove(self, part: str, found: Callable[[], str]) -> None:
         """Files of earlier versions, and shipped references, have no digests here."""
@@ -141,10 +141,10 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
 
     Raises StoreError where `path` is not a results file of this program, or is damaged.
     """
-    with hdf5.open_file(path) as file:
-        with hdf5.reading(path):
-            scenes = {scene.name: scene for scene in _scenes(file, "", verify, {hdf5.address(file)})}
-            attributes = hdf5.attributes_of(file)
+    with files.open_file(path) as file:
+        with files.reading(path):
+            scenes = {scene.name: scene for scene in _scenes(file, "", verify, {files.address(file)})}
+            attributes = files.attributes_of(file)
         yield OpenResults(path, attributes, scenes, file)
 
 
@@ -157,19 +157,19 @@ def in_memory(opened: OpenResults) -> OpenResults:
 
 def is_sweep(path: Path) -> bool:
     """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
-    with hdf5.open_file(path) as file, hdf5.reading(path):
+    with files.open_file(path) as file, files.reading(path):
         return SWEEP_IDENTITY in file.attrs
 
 
 def _scenes(group: Any, name: str, verify: bool, seen: set[int]) -> Iterator[StoredScene]:
     """`seen`: addresses of the groups above and before: each is looked into once."""
-    for key, item in hdf5.members(group):
-        if not hdf5.is_group(item) or (not name and key in RESERVED_GROUPS) or hdf5.address(item) in seen:
+    for key, item in files.members(group):
+        if not files.is_group(item) or (not name and key in RESERVED_GROUPS) or files.address(item) in seen:
             continue
-        seen.add(hdf5.address(item))
+        seen.add(files.address(item))
         path = f"{name}/{key}" if name else key
         if "scene_hash" in item.attrs:
-            known, attributes = digests.stored_digests(item.attrs) if verify else {}, hdf5.attributes_of(item)
+            known, attributes = digests.stored_digests(item.attrs) if verify else {}, files.attributes_of(item)
             if known and known.get(digests.ATTRIBUTES) != digests.attributes_digest(attributes):
                 raise StoreError(f"{item.file.filename}: {item.name}: attributes changed after they were written")
             runs = {run.method: run for run in _runs(item, path, verify)}
@@ -179,11 +179,11 @@ def _scenes(group: Any, name: str, verify: bool, seen: set[int]) -> Iterator[Sto
 
 
 def _runs(group: Any, scene: str, verify: bool) -> Iterator[StoredRun]:
-    for model, item in hdf5.members(group):
+    for model, item in files.members(group):
         if model == REFERENCE:
             yield StoredRun(scene, model, item, verify)
-        elif hdf5.is_group(item):
-            for integrator, run in hdf5.members(item):
+        elif files.is_group(item):
+            for integrator, run in files.members(item):
                 yield StoredRun(scene, f"{model}/{integrator}", run, verify)
 
 
@@ -202,35 +202,35 @@ def damages_of(group: Any) -> list[str]:
     found = {digests.ATTRIBUTES: _digest(group, attributes_alone=True)}
     for name in group:
         item, is_unfilled = _member(group, name), name in unfilled
-        if not hdf5.is_group(item):
+        if not files.is_group(item):
             found[digests.unfilled(name) if is_unfilled else name] = _digest(item, attributes_alone=is_unfilled)
     return [name for name in {**known, **found} if known.get(name) != found.get(name)]
 
 
 def _member(group: Any, name: str) -> Any:
     """None where it is a link, or cannot be read."""
-    with suppress(StoreError), hdf5.reading(""):
-        return hdf5.member(group, name)
+    with suppress(StoreError), files.reading(""):
+        return files.member(group, name)
     return None
 
 
 def _digest(item: Any, *, attributes_alone: bool) -> str:
     """ "" where there is none, or its content cannot be read."""
-    with suppress(StoreError), hdf5.reading(""):
+    with suppress(StoreError), files.reading(""):
         if attributes_alone:
             return digests.attributes_digest(item.attrs)
-        return digests.dataset_digest(hdf5.values_of(item), item.attrs)
+        return digests.dataset_digest(files.values_of(item), item.attrs)
     return ""
 
 
 def all_damages(group: Any, seen: set[int] | None = None) -> Iterator[tuple[str, str]]:
     """(path, part) of whatever is damaged in a group and the groups below it; at most once each."""
     seen = set() if seen is None else seen
-    if hdf5.address(group) in seen:
+    if files.address(group) in seen:
         return
-    seen.add(hdf5.address(group))
+    seen.add(files.address(group))
     yield from ((str(group.name).strip("/"), part) for part in damages_of(group))
     for name in group:
         item = _member(group, name)
-        if hdf5.is_group(item):
+        if files.is_group(item):
             yield from all_damages(item, seen)

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.execution.output_lock import writing
-from rotor_mbs.execution.provenance import machine, versions
+from rotor_mbs.runs import files
+from rotor_mbs.runs.digests import DIGESTS
+from rotor_mbs.runs.layout import KEYWORDS, LIMIT, TOGETHER, Column, key_of
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.read import OpenResults, StoredRun, all_damages, is_sweep, open_results
+from rotor_mbs.runs.records import COLUMNS, records_in
+from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import RESERVED_GROUPS
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.store import hdf5
-from rotor_mbs.store.digests import DIGESTS
-from rotor_mbs.store.layout import KEYWORDS, LIMIT, TOGETHER, Column, key_of
-from rotor_mbs.store.read import OpenResults, StoredRun, all_damages, is_sweep, open_results
-from rotor_mbs.store.records import COLUMNS, records_in
 
 # Attributes of a run, as columns of the summary; NaN where a run has none.
 _NUMBERS = (
@@ -63,7 +63,7 @@ def _verified_keys(path: Path, _state: tuple[int, int, int]) -> dict[str, float]
 
     Of the file in this state (inode, time of change, size): read and verified once, and not again for each job.
     """
-    with open_results(path, verify=False) as results, hdf5.reading(path):
+    with open_results(path, verify=False) as results, files.reading(path):
         damaged = {place for place, part in all_damages(results.root) if part != DIGESTS}
         runs = {f"{scene.name}/{run.method}": run for scene in results.scenes.values() for run in scene.runs.values()}
         return {
@@ -99,16 +99,16 @@ def merge(
     """
     refuse_other_kinds(path)
     plan = _plan(sources, without)
-    with hdf5.new_file(path) as file:
+    with files.new_file(path) as file:
         created = datetime.now(UTC).isoformat(timespec="seconds")
-        hdf5.put_attributes(file, {**_description(plan), **versions, "created": created, "date_created": created})
+        files.put_attributes(file, {**_description(plan), **versions, "created": created, "date_created": created})
         for owner in sorted(plan, key=lambda name: (name.split("/")[0] in RESERVED_GROUPS, name)):
             for source, names in _by_source(plan[owner]).items():
-                with hdf5.open_file(source) as root, hdf5.reading(source):
+                with files.open_file(source) as root, files.reading(source):
                     for name in names:
-                        hdf5.copy_group(root[name], file, name)
+                        files.copy_group(root[name], file, name)
                     attributes = dict(root[owner].attrs)
-            hdf5.new_group(file, owner).attrs.update(attributes)
+            files.new_group(file, owner).attrs.update(attributes)
         _put_summary(file, [(owner, name.removeprefix(f"{owner}/")) for owner, name in _runs_in(plan)])
 
 
@@ -134,7 +134,7 @@ def _plan(sources: Sequence[Path], without: Collection[str]) -> dict[str, dict[s
     """Group above -> group -> the source to take it from."""
     latest: dict[str, tuple[str, dict[str, Path]]] = {}
     for source in sources:
-        with open_results(source, verify=False) as results, hdf5.reading(source):
+        with open_results(source, verify=False) as results, files.reading(source):
             for above, owner, name, key in _members(results):
                 if key not in without or not key:
                     known, groups = latest.get(above, (owner, {}))
@@ -174,20 +174,20 @@ def _put_summary(file: Any, runs: Sequence[tuple[str, str]]) -> None:
     """
     if not runs:
         return
-    group = hdf5.new_group(file, "summary")
-    hdf5.put_attributes(group, {"title": "all runs of this file"})
-    hdf5.put(group, "row", np.arange(len(runs)), Column(("row",), "1", "number of the row"))
+    group = files.new_group(file, "summary")
+    files.put_attributes(group, {"title": "all runs of this file"})
+    files.put(group, "row", np.arange(len(runs)), Column(("row",), "1", "number of the row"))
     for column, what, names in zip(("scene", "solver"), ("scene", "method"), zip(*runs, strict=True), strict=True):
         labels = list(dict.fromkeys(names))
         codes = np.array([labels.index(name) for name in names], np.int32)
         described = Column(("row",), "1", f"{what}, as a number of its attribute labels")
-        hdf5.put_attributes(hdf5.put(group, column, codes, described), {"labels": labels})
+        files.put_attributes(files.put(group, column, codes, described), {"labels": labels})
     facts = [file[f"{scene}/{method}"].attrs for scene, method in runs]
     statuses = (str(one.get("status")) for one in facts)
     codes = np.array([code_of(status) if status in STATUSES else -1 for status in statuses], np.int8)
-    hdf5.put_flags(hdf5.put(group, "status", codes, Column(("row",), *COLUMNS["status"])), STATUSES)
+    files.put_flags(files.put(group, "status", codes, Column(("row",), *COLUMNS["status"])), STATUSES)
     for name in _NUMBERS:
-        hdf5.put(group, name, _numbers([one.get(name) for one in facts]), Column(("row",), *COLUMNS[name]))
+        files.put(group, name, _numbers([one.get(name) for one in facts]), Column(("row",), *COLUMNS[name]))
 
 
 def _numbers(values: Sequence[object]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import rotor_mbs
-from rotor_mbs.execution.provenance import fingerprint
+from rotor_mbs.runs.versions import fingerprint
 
 
 def test_a_process_that_compiles_the_sources_changes_no_fingerprint(

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError, saving
+from rotor_mbs.runs.layout import Column
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.store.layout import Column
 
 # (runs, ...) arrays by the name of their dataset.
 Rows = dict[str, NDArray[Any]]

@@ -14,8 +14,8 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.execution.case import Case
-from rotor_mbs.execution.execute import Job, Outcome, Result, execute, in_pool
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.runner import Job, Outcome, Result, execute, in_pool
 
 SCENE = paper("fig08")
 METHOD = "lagrange/dop853"

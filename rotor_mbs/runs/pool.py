@@ -23,7 +23,7 @@ from queue import LifoQueue
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
 from rotor_mbs.errors import ResourceError, RotorError
-from rotor_mbs.execution import cores
+from rotor_mbs.runs import cores
 
 if TYPE_CHECKING:  # loaded with the first process
     from pebble import ProcessPool

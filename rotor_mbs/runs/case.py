@@ -8,8 +8,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rotor_mbs.execution.provenance import NUMERICS, fingerprint, versions_with
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs.versions import NUMERICS, fingerprint, versions_with
 from rotor_mbs.scenario.scene import Scene, scene_hash
 
 RUN = "run"

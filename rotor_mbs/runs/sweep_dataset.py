@@ -18,16 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.execution.output_lock import refuse_finished_runs, writing
+from rotor_mbs.runs import digests, files, sweep_columns
+from rotor_mbs.runs.layout import SWEEP_IDENTITY, Column
+from rotor_mbs.runs.lock import refuse_finished_runs, writing
+from rotor_mbs.runs.read import damages_of
+from rotor_mbs.runs.sweep_columns import COLUMNS, MISSING, RunColumns
+from rotor_mbs.runs.write import put_scales
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
 from rotor_mbs.solution.quantities import scale_values
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.store import digests, hdf5, sweep_columns
-from rotor_mbs.store.layout import SWEEP_IDENTITY, Column
-from rotor_mbs.store.read import damages_of
-from rotor_mbs.store.sweep_columns import COLUMNS, MISSING, RunColumns
-from rotor_mbs.store.write import put_scales
 
 _HEAD_BYTES = 1 << 17  # of a file beside its runs, at most: descriptions and texts
 
@@ -55,7 +55,7 @@ def open_sweep(
         path = output.resolve() if output.is_symlink() else output  # a link stays one
         if not path.exists():
             _lay_out(path, sweep, methods, numbers, attributes)
-        with hdf5.open_file(path) as file, hdf5.reading(path):
+        with files.open_file(path) as file, files.reading(path):
             if file.attrs.get(SWEEP_IDENTITY) != attributes[SWEEP_IDENTITY]:
                 raise InputError(
                     f"{path}: holds something else than this sweep (or a sweep of another version); allowed: another "
@@ -84,7 +84,7 @@ def _stored_runs(file: Any) -> tuple[RunColumns, NDArray[np.int8], NDArray[np.in
     names = digests.unfilled_in(digests.stored_digests(file.attrs))
     row = np.dtype([(name, file[name].dtype, file[name].shape[1:]) for name in names])
     offsets = {name: file[name].id.get_offset() for name in names}
-    path, marked = Path(file.filename), hdf5.values_of(file["status"])
+    path, marked = Path(file.filename), files.values_of(file["status"])
     first = int(file["run"][0]) if len(marked) else 0  # of a part without runs
     runs = RunColumns(path, path.stat().st_ino, first, offsets, row)
     return runs, marked, runs.stored(marked)
@@ -97,15 +97,15 @@ def _lay_out(
 
     The space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins.
     """
-    with hdf5.replacing(path) as temporary:
+    with files.replacing(path) as temporary:
         row = sweep_columns.row_type(sweep)
         _reserve(temporary, _HEAD_BYTES + len(numbers) * (row.itemsize + 8 * (4 + len(sweep.keys))))
-        with hdf5.begin_file(temporary) as file:
-            hdf5.put_attributes(file, attributes)
+        with files.begin_file(temporary) as file:
+            files.put_attributes(file, attributes)
             _put_columns(file, sweep, methods, numbers)
             digests.seal(file, later=row.names or ())
         _reserve(temporary, temporary.stat().st_size)
-    hdf5.sync_folder(path.parent)
+    files.sync_folder(path.parent)
 
 
 def _reserve(path: Path, size: int) -> None:
@@ -124,24 +124,24 @@ def _reserve(path: Path, size: int) -> None:
 def _put_columns(file: Any, sweep: Sweep, methods: Sequence[str], numbers: range) -> None:
     """What is known of the runs before they are computed, scales, then room for what is computed."""
     runs, rows, table = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.table
-    hdf5.put(file, "run", runs, COLUMNS["run"])
+    files.put(file, "run", runs, COLUMNS["run"])
     values = sweep.design.rows(numbers.start, numbers.stop)
     for i, (key, unit) in enumerate(zip(sweep.keys, sweep.units, strict=True)):
         column = Column(("run",), unit, f"varied parameter {key}")
-        hdf5.put(file, sweep_columns.parameter_name(key), np.ascontiguousarray(values[:, i]), column)
-    hdf5.put(file, "variant", runs % rows, COLUMNS["variant"])
-    hdf5.put_flags(hdf5.put(file, "solver", (runs // rows).astype(np.int8), COLUMNS["solver"]), methods)
+        files.put(file, sweep_columns.parameter_name(key), np.ascontiguousarray(values[:, i]), column)
+    files.put(file, "variant", runs % rows, COLUMNS["variant"])
+    files.put_flags(files.put(file, "solver", (runs // rows).astype(np.int8), COLUMNS["solver"]), methods)
     if table.validation or table.test:
         splits = split_rows(rows, table.validation, table.test, table.seed)
-        hdf5.put_flags(hdf5.put(file, "split", splits[runs % rows], COLUMNS["split"]), SPLITS)
+        files.put_flags(files.put(file, "split", splits[runs % rows], COLUMNS["split"]), SPLITS)
     columns, row = sweep_columns.result_columns(sweep), sweep_columns.row_type(sweep)
-    hdf5.put(file, "message_byte", np.arange(sweep_columns.MESSAGE_BYTES, dtype=np.int16), COLUMNS["message_byte"])
+    files.put(file, "message_byte", np.arange(sweep_columns.MESSAGE_BYTES, dtype=np.int16), COLUMNS["message_byte"])
     put_scales(file, columns.values(), scale_values(sweep.base), sweep.base.coordinate_labels)
-    hdf5.put_attributes(file["time"], {"standard_name": "time"})
+    files.put_attributes(file["time"], {"standard_name": "time"})
     for name, column in columns.items():
         fill = MISSING if name == "status" else None
-        hdf5.put_empty(file, name, (len(runs), *row[name].shape), row[name].base, column, fill)
-    hdf5.put_flags(file["status"], STATUSES)
+        files.put_empty(file, name, (len(runs), *row[name].shape), row[name].base, column, fill)
+    files.put_flags(file["status"], STATUSES)
 
 
 class StoredSweep:
@@ -158,13 +158,13 @@ class StoredSweep:
     def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
         self._path = path
         self.columns: dict[str, Column] = {}
-        with hdf5.open_file(path) as file, hdf5.reading(path):
-            self.attributes = hdf5.attributes_of(file)
+        with files.open_file(path) as file, files.reading(path):
+            self.attributes = files.attributes_of(file)
             if SWEEP_IDENTITY not in self.attributes:
                 raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
             runs, marked, statuses = _stored_runs(file)
             for name, item in file.items():
-                dimensions = tuple(one or name for one in hdf5.dimensions_of(item))
+                dimensions = tuple(one or name for one in files.dimensions_of(item))
                 self.columns[name] = Column(dimensions, str(item.attrs["units"]), str(item.attrs["long_name"]))
         self.keys: list[str] = self.attributes["parameter_keys"]
         self.damaged_runs = runs.first + np.flatnonzero((marked != MISSING) & (statuses == MISSING))
@@ -182,5 +182,5 @@ class StoredSweep:
         """
         if name not in self.columns:
             raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")
-        with hdf5.open_file(self._path) as file, hdf5.reading(self._path, name):
-            return hdf5.mapped(file[name])
+        with files.open_file(self._path) as file, files.reading(self._path, name):
+            return files.mapped(file[name])

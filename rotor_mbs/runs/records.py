@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
+from rotor_mbs.runs import files
+from rotor_mbs.runs.digests import DIGESTS
+from rotor_mbs.runs.layout import Column, key_of
+from rotor_mbs.runs.read import damages_of
 from rotor_mbs.solution.status import STATUSES, recode
-from rotor_mbs.store import hdf5
-from rotor_mbs.store.digests import DIGESTS
-from rotor_mbs.store.layout import Column, key_of
-from rotor_mbs.store.read import damages_of
 
 # The scene's place in a record of how cost scales with blades or duration.
 COST_SCALING = "growth"
@@ -125,40 +125,40 @@ class Record:
 
 def write_records(path: Path, records: Sequence[Record]) -> None:
     """A results file with these records alone, atomically. Raises StoreError."""
-    with hdf5.new_file(path) as file:
+    with files.new_file(path) as file:
         for record in records:
             _put_record(file, record)
 
 
 def _put_record(file: Any, record: Record) -> None:
-    group = hdf5.new_group(file, record.path)
-    hdf5.put_attributes(group, {"record": 1, **record.attributes})
+    group = files.new_group(file, record.path)
+    files.put_attributes(group, {"record": 1, **record.attributes})
     for name, column in record.columns.items():
-        dataset = hdf5.put(group, name, np.asarray(record.arrays[name]), column)
+        dataset = files.put(group, name, np.asarray(record.arrays[name]), column)
         if f"{name}_labels" in record.attributes:
-            hdf5.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
+            files.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
     if record.columns:
         return
     dimension = _DIMENSIONS.get(record.kind, "row")
     if dimension == "setting":
         kind = str(record.attributes["setting_kind"])
         scale = Column((dimension,), _SETTING_UNITS[kind], kind)
-        hdf5.put_attributes(hdf5.put(group, dimension, record.arrays[dimension], scale), {"kind": kind})
+        files.put_attributes(files.put(group, dimension, record.arrays[dimension], scale), {"kind": kind})
     elif record.arrays:
         rows = np.arange(len(next(iter(record.arrays.values()))))
-        hdf5.put(group, dimension, rows, Column((dimension,), "1", "number of the row"))
+        files.put(group, dimension, rows, Column((dimension,), "1", "number of the row"))
     for name, (units, long_name) in COLUMNS.items():
         if name in record.arrays:
             values = np.asarray(record.arrays[name])
             values = values.astype(np.int64) if name in _INTEGERS else values
-            dataset = hdf5.put(group, name, values, Column((dimension,), units, long_name))
+            dataset = files.put(group, name, values, Column((dimension,), units, long_name))
             if name == "status":
-                hdf5.put_flags(dataset, STATUSES)
+                files.put_flags(dataset, STATUSES)
 
 
 def read_records(path: Path, *kinds: str) -> list[Record]:
     """The records of a results file, of these kinds or of all, in the order of the file. Raises StoreError."""
-    with hdf5.open_file(path) as file, hdf5.reading(path):
+    with files.open_file(path) as file, files.reading(path):
         return [read_record(name, group) for name, group in records_in(file, *kinds)]
 
 
@@ -172,10 +172,10 @@ def records_in(file: Any, *kinds: str) -> Iterator[tuple[str, Any]]:
 
 def _leaves(group: Any, path: str) -> Iterator[tuple[str, Any]]:
     """A record has arrays, or says that it is one; the errata are one record."""
-    if "record" in group.attrs or path == "errata" or not all(hdf5.is_group(item) for item in group.values()):
+    if "record" in group.attrs or path == "errata" or not all(files.is_group(item) for item in group.values()):
         yield path, group
     else:
-        for name, item in hdf5.members(group):
+        for name, item in files.members(group):
             yield from _leaves(item, f"{path}/{name}")
 
 
@@ -186,7 +186,7 @@ def read_record(path: str, group: Any) -> Record:
         raise StoreError(f"{group.file.filename}: {path}: {', '.join(damages)} changed after they were written")
     kind = next(kind for kind, folder in _FOLDERS.items() if path == folder or path.startswith(f"{folder}/"))
     parts = path.removeprefix(_FOLDERS[kind]).strip("/").split("/")
-    arrays = {name: item[()] for name, item in group.items() if name != "row" and not hdf5.is_group(item)}
+    arrays = {name: item[()] for name, item in group.items() if name != "row" and not files.is_group(item)}
     if "status" in arrays:
         arrays["status"] = recode(arrays["status"], group["status"].attrs)
-    return Record(kind, "/".join(parts[:-2]), "/".join(parts[-2:]), hdf5.attributes_of(group), arrays)
+    return Record(kind, "/".join(parts[:-2]), "/".join(parts[-2:]), files.attributes_of(group), arrays)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.runs import files
+from rotor_mbs.runs.layout import Column
 from rotor_mbs.solution.quantities import SCALES, Quantity, quantities, scale_values
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.store import hdf5
-from rotor_mbs.store.layout import Column
 
 
 def write_run(path: Path, scene_hash: str, run: Solution, attributes: Mapping[str, object]) -> None:
@@ -35,11 +35,11 @@ def write_run(path: Path, scene_hash: str, run: Solution, attributes: Mapping[st
     if run.method == REFERENCE:  # it is read back by its angles and rates, whatever the scene asks for
         datasets |= {"angles": run.angles, "rates": run.rates}
         outputs = (*outputs, "angles", "rates")
-    with hdf5.new_file(path) as file:
-        hdf5.put_attributes(hdf5.new_group(file, scene.name), facts)
-        group = hdf5.new_group(file, f"{scene.name}/{run.method}")
+    with files.new_file(path) as file:
+        files.put_attributes(files.new_group(file, scene.name), facts)
+        group = files.new_group(file, f"{scene.name}/{run.method}")
         put_datasets(group, datasets, quantities(outputs), list(scene.coordinate_labels))
-        hdf5.put_attributes(group, {**_facts(run), **attributes})
+        files.put_attributes(group, {**_facts(run), **attributes})
 
 
 def _facts(run: Solution) -> dict[str, object]:
@@ -65,9 +65,9 @@ def put_datasets(group: Any, named: Mapping[str, Any], known: Sequence[Quantity]
     data = [quantity for quantity in known if quantity.name in named]
     put_scales(group, data, named, labels)
     for quantity in data:
-        hdf5.put(group, quantity.name, named[quantity.name], quantity, compress=not quantity.is_over_time)
+        files.put(group, quantity.name, named[quantity.name], quantity, compress=not quantity.is_over_time)
     if "angles" in group:
-        hdf5.put_attributes(group, {"NX_class": "NXdata", "signal": "angles", "axes": ["time", "coordinate"]})
+        files.put_attributes(group, {"NX_class": "NXdata", "signal": "angles", "axes": ["time", "coordinate"]})
 
 
 def put_scales(group: Any, data: Iterable[Column | Quantity], values: Mapping[str, Any], labels: Sequence[str]) -> None:
@@ -75,6 +75,6 @@ def put_scales(group: Any, data: Iterable[Column | Quantity], values: Mapping[st
     used = {"time"}.union(*(one.dimensions for one in data))
     for name, scale in SCALES.items():
         if name in used:
-            dataset = hdf5.put(group, name, values[name], scale)
+            dataset = files.put(group, name, values[name], scale)
             if name == "coordinate":
-                hdf5.put_attributes(dataset, {"labels": labels})
+                files.put_attributes(dataset, {"labels": labels})

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from rotor_mbs.errors import ResourceError
-from rotor_mbs.execution.pool import Finished, TaskLostError, WorkerPool, run_in
+from rotor_mbs.runs.pool import Finished, TaskLostError, WorkerPool, run_in
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
@@ -325,7 +325,7 @@ def test_dead_processes_leave_no_open_files() -> None:
 
 _BUSY_PROGRAM = """
 import os, sys, time
-from rotor_mbs.execution.pool import WorkerPool
+from rotor_mbs.runs.pool import WorkerPool
 
 def busy(_):
     print(os.getpid(), file=sys.stderr, flush=True)
