@@ -3,14 +3,13 @@
 The Python API. Everything is loaded when it is first used: importing this package imports nothing else.
 
     scenes, scene, load      names of the shipped scenes; one of them; a scene of one's own from a TOML file
-    run                      one scene by one method: a `Run`
-    compare                  one scene by several methods, against its reference: a `Comparison`
-    compare_data             a trajectory of another program against a scene's reference: a `DataComparison`
-    sweep                    one scene over the values of its parameters: a `SweepData`
+    run                      one scene by one method: a `Run`; by several, judged by its reference: `Runs`
+    sweep                    one scene over the values of its parameters: `Runs`
+    compare                  a trajectory of another program against a scene's reference: a `DataComparison`
     claims                   the paper's claims in words as shares of many runs, its numbers under other conditions
     export                   a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark problem
     modes                    natural frequencies, damping and shapes over rotor speed: `Modes`
-    open                     a results file: runs by their path; the dataset of a sweep
+    open                     the `Runs` in a file: of scenes, or of a sweep
 
 Examples
 --------
@@ -26,11 +25,8 @@ TYPE_CHECKING = False  # what type checkers take for true; importing `typing` wo
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from rotor_mbs.api import Comparison as Comparison
-    from rotor_mbs.api import ResultsTree as ResultsTree
     from rotor_mbs.api import Run as Run
-    from rotor_mbs.api import SweepData as SweepData
-    from rotor_mbs.api import compare as compare
+    from rotor_mbs.api import Runs as Runs
     from rotor_mbs.api import load as load
     from rotor_mbs.api import open as open
     from rotor_mbs.api import run as run
@@ -43,7 +39,7 @@ if TYPE_CHECKING:
     from rotor_mbs.errors import StoreError as StoreError
     from rotor_mbs.methods.base import Method as Method
     from rotor_mbs.report.data_comparison import DataComparison as DataComparison
-    from rotor_mbs.report.data_comparison import compare_data as compare_data
+    from rotor_mbs.report.data_comparison import compare as compare
     from rotor_mbs.report.mode_study import modes as modes
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
@@ -51,10 +47,10 @@ if TYPE_CHECKING:
     from rotor_mbs.studies.export import export as export
 
 _MODULES = {
-    "rotor_mbs.api": "Comparison ResultsTree Run SweepData compare load open run scene scenes sweep",
+    "rotor_mbs.api": "Run Runs load open run scene scenes sweep",
     "rotor_mbs.errors": "InputError MethodRefusal RotorError StoreError",
     "rotor_mbs.methods.base": "Method",
-    "rotor_mbs.report.data_comparison": "DataComparison compare_data",
+    "rotor_mbs.report.data_comparison": "DataComparison compare",
     "rotor_mbs.report.mode_study": "modes",
     "rotor_mbs.scenario.scene": "Blade Scene",
     "rotor_mbs.studies.claims": "claims",

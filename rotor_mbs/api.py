@@ -6,6 +6,7 @@ Prints nothing. Bad input raises `rotor_mbs.errors.InputError`, an unreadable or
 from __future__ import annotations
 
 import functools
+import json
 import os
 import shutil
 import tempfile
@@ -16,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -26,22 +27,23 @@ from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, Sto
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
-from rotor_mbs.runs.records import records_in
-from rotor_mbs.runs.sweep_columns import MISSING
+from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
+from rotor_mbs.runs.table import MISSING
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.plausibility import doubts
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.scene_file import load_scene
-from rotor_mbs.solution.metrics import metrics_of
+from rotor_mbs.scenario.scene_file import load_scene, parse_scene
+from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.text_table import TextTable
-from rotor_mbs.solution.trajectory import Trajectory
+from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
-    from rotor_mbs.runs.sweep_dataset import StoredSweep
+
+_NO_LIMIT_S = 1e9
 
 
 def scenes(folder: str = "") -> list[str]:
@@ -87,27 +89,61 @@ def load(path: str | os.PathLike[str]) -> Scene:
     return found
 
 
+@overload
 def run(
-    scene: Scene | str, method: str = "lagrange/taylor", *, timeout: float = float("inf"), reference: bool = False,
+    scene: Scene | str, method: str = ..., *, timeout: float = ..., reference: bool = ..., workers: int = ...,
     **settings: object,
-) -> Run:  # fmt: skip
-    """One scene by one method, in this process, judged from its samples.
+) -> Run: ...  # fmt: skip
+
+
+@overload
+def run(
+    scene: Scene | str, method: Sequence[str], *, timeout: float = ..., reference: bool = ..., workers: int = ...,
+    **settings: object,
+) -> Runs: ...  # fmt: skip
+
+
+def run(
+    scene: Scene | str,
+    method: str | Sequence[str] = "lagrange/taylor",
+    *,
+    timeout: float = float("inf"),
+    reference: bool = False,
+    workers: int = 0,
+    **settings: object,
+) -> Run | Runs:
+    """One scene by one method, or by several, judged from the samples.
 
     Parameters
     ----------
-    scene : from `scene`, `load`, or made by `Scene.replace`; or its name, as in all functions here.
-    method : "model/integrator"; `rotor-mbs show` lists those that can represent a scene.
-    timeout : s, after which the integration ends itself; `Run.status` is then "timed_out".
-    reference : whether to compute the quad-precision reference of a scene that has no shipped one (up to some seconds).
-        Without any, the status rests on the samples and the energy balance.
-    **settings : of the method, in place of its defaults; `rotor-mbs show METHOD` has names, units and ranges.
+    scene : Scene or str
+        From `scene`, `load`, or made by `Scene.replace`; or its name, as in all functions here.
+    method : str or sequence of str
+        "model/integrator"; `rotor-mbs show` lists those that can represent a scene. Of several, an empty list stands
+        for those that the selection rule takes for such a scene.
+    timeout : float
+        s, after which an integration ends itself; its status is then "timed_out".
+    reference : bool
+        Whether to compute the quad-precision reference of a scene that has no shipped one (up to some seconds), as is
+        always done for several methods. Without any, the status rests on the samples and the energy balance.
+    workers : int
+        Parallel processes for several methods; 0 runs everything in this process. In a script, processes need the
+        usual `if __name__ == "__main__":`.
+    **settings
+        Of the methods that have them, in place of defaults; `rotor-mbs show METHOD` has names, units and ranges.
+
+    Returns
+    -------
+    Run
+        Of one method; of several, `Runs` by the names of the methods, the reference among them.
 
     Raises
     ------
     InputError
-        For an unknown method, or a setting that the method does not have or that is out of its range.
+        For an unknown method, a setting that no method has or that is out of its range, and for one of several methods
+        that cannot represent the scene.
     MethodRefusal
-        Where the method cannot represent the scene, or is not installed.
+        Where one method cannot represent the scene, or is not installed.
 
     Examples
     --------
@@ -117,9 +153,28 @@ def run(
     'ok'
     >>> run.metrics["angle_error_max"] < 1e-9   # rad, against the reference, up to the scene's horizon
     True
+    >>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
+    >>> runs = rm.run(scene, ["lagrange/dop853", "exudyn_tree/rk67"])
+    >>> [run.status for run in runs.values()]
+    ['ok', 'ok', 'ok']
+    >>> data = runs.to_xarray()
+    >>> float(abs(data.angles - data.angles.sel(run="reference")).max()) < 1e-9   # rad
+    True
     """
-    found, exact = solve_judged(scene_of(scene), method, settings, compute_reference=reference, time_limit_s=timeout)
-    return Run(**vars(found), reference=exact)
+    scene = scene_of(scene)
+    if isinstance(method, str):
+        solution, exact = solve_judged(
+            scene, method, settings, compute_reference=reference, time_limit_s=timeout
+        )
+        return Run(**vars(solution), reference=exact)
+    named = check_names(tuple(method))
+    chosen, reasons = (asked_methods([scene], named), []) if named else selected_methods([scene])
+    if not chosen[scene.name]:
+        raise MethodRefusal("; ".join(reasons))
+    folder = _TemporaryFolder()
+    path = folder.path / "runs.h5"
+    run_scenes([scene], chosen, path, workers=workers, timeout_s=min(timeout, _NO_LIMIT_S), settings=settings)
+    return Runs(path, scene.name, _folder=folder)
 
 
 @dataclass(repr=False)
@@ -147,120 +202,6 @@ class Run(Solution):
         return super()._repr_html_() + (self.plot()._repr_svg_() if len(self.time) else "")
 
 
-@dataclass
-class Comparison:
-    """A scene by several methods, judged against its reference, in one results file.
-
-    Attributes
-    ----------
-    scene, runs : the scene; a `Run` by the name of each method.
-    reference : the trajectory that they were compared with.
-    plot : `comparison.plot.error()`, `.rotor()`, `.energy_error()`.
-    """
-
-    scene: Scene
-    runs: dict[str, Run]
-    reference: Trajectory | None
-    _file: Path  # in a temporary folder, removed with this object
-
-    def __post_init__(self) -> None:
-        weakref.finalize(self, shutil.rmtree, self._file.parent, ignore_errors=True)
-
-    def __getitem__(self, method: str) -> Run:
-        return self.runs[method]
-
-    def table(self) -> TextTable:
-        """A row for each method: status, error (rad), energy drift (of the energy scale), run time (s)."""
-        rows = [run_row(r.method, r.status, r.metrics, float(np.median(r.run_times_s))) for r in self.runs.values()]
-        return TextTable(RUN_HEAD, rows)
-
-    @property
-    def plot(self) -> ComparisonPlots:
-        from rotor_mbs.report.run_plots import ComparisonPlots  # late: matplotlib
-
-        return ComparisonPlots(self.runs, self.reference)
-
-    def to_xarray(self) -> Any:
-        """All runs as one xarray.Dataset with the dimension `solver`; samples that a run did not reach are NaN.
-
-        Select by label: `data.angles.sel(solver="lagrange/taylor", coordinate="pitch 1")`.
-        """
-        xarray = need_xarray()
-        over_time = [run.to_xarray().drop_dims("refined_time", errors="ignore") for run in self.runs.values()]
-        solvers = xarray.Variable("solver", list(self.runs))
-        joined = xarray.concat(over_time, solvers, join="outer", combine_attrs="drop_conflicts")
-        return joined.assign(status=("solver", [run.status for run in self.runs.values()]))
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """The results file under another name; `rotor-mbs report` and `rotor_mbs.open` read it. Replaces the file."""
-        target = Path(path)
-        replace_file(target, self._file.read_bytes())
-        return target
-
-    def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """The report's pages into a folder; the path of its index."""
-        from rotor_mbs.report.build import write_report  # late: templates
-
-        return write_report(self._file, Path(folder))
-
-    def __repr__(self) -> str:
-        return f"{self.scene.name}: {self.scene.title}\n{self.table()}"
-
-    def _repr_html_(self) -> str:
-        drawn = self.plot.error()._repr_svg_() if self.reference is not None else ""
-        return f"<p>{escape(self.scene.name)}: {escape(self.scene.title)}</p>{self.table()._repr_html_()}{drawn}"
-
-
-def compare(
-    scene: Scene | str,
-    methods: str | Sequence[str] = (),
-    *,
-    workers: int = 0,
-    timeout: float = 60.0,
-    **settings: object,
-) -> Comparison:
-    """One scene by several methods, each judged against the scene's reference (shipped, or computed).
-
-    On the command line that is `rotor-mbs run SCENE -m METHOD -m METHOD`. `rotor-mbs compare` is `compare_data`.
-
-    Parameters
-    ----------
-    methods : names; where none is given, those that the selection rule takes for such a scene.
-    workers : parallel processes; 0 runs everything in this process. In a script, processes need the usual
-        `if __name__ == "__main__":`.
-    timeout : s, for each run.
-    **settings : of the methods that have them, in place of defaults and of the scene's own.
-
-    Raises
-    ------
-    InputError
-        For an unknown method or setting, and for a method that was named and cannot represent the scene.
-    MethodRefusal
-        Where no method is named and the scene has no motion to be followed.
-
-    Examples
-    --------
-    >>> import rotor_mbs as rm
-    >>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
-    >>> study = rm.compare(scene, ["lagrange/dop853", "exudyn_tree/rk67"])
-    >>> [run.status for run in study.runs.values()]
-    ['ok', 'ok']
-    >>> float(study.to_xarray().angles.sel(solver="exudyn_tree/rk67", coordinate="pitch 1").isel(time=0))
-    0.7853981633974483
-    """
-    scene, named = scene_of(scene), check_names(methods)
-    chosen, reasons = (asked_methods([scene], named), []) if named else selected_methods([scene])
-    if not (able := chosen[scene.name]):
-        raise MethodRefusal("; ".join(reasons))
-    path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "comparison.h5"
-    run_scenes([scene], {scene.name: able}, path, workers=workers, timeout_s=timeout, settings=settings)
-    with open_results(path) as results:
-        stored = results.scenes[scene.name]
-        runs = {name: _loaded(stored, stored.runs[name]) for name in able}
-    reference = next(iter(runs.values())).reference if runs else None
-    return Comparison(scene, runs, reference, path)
-
-
 def sweep(
     scene: Scene | str,
     parameters: Mapping[str, object],
@@ -269,8 +210,9 @@ def sweep(
     output: str | os.PathLike[str] | None = None,
     workers: int = 0,
     timeout: float = 60.0,
+    fresh: bool = False,
     **options: object,
-) -> SweepData:
+) -> Runs:
     """One scene over all combinations of the values of its parameters, into one dataset.
 
     Parameters
@@ -282,6 +224,7 @@ def sweep(
     workers : parallel processes; 0 runs everything in this process. In a script, processes need the usual
         `if __name__ == "__main__":`.
     timeout : s, for each run.
+    fresh : whether runs that `output` has are computed again; by default also those of other versions are kept.
     **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation, settings, ...
 
     Raises
@@ -293,138 +236,261 @@ def sweep(
     --------
     >>> import rotor_mbs as rm
     >>> scene = rm.scene("paper/fig08").replace(duration=1.0, samples=101)
-    >>> data = rm.sweep(scene, {"bearing.stiffness": [0.0, 1e3, 1e4]}, methods=["lagrange/dop853"], samples=11)
-    >>> data.statuses
+    >>> runs = rm.sweep(scene, {"bearing.stiffness": [0.0, 1e3, 1e4]}, methods=["lagrange/dop853"], samples=11)
+    >>> runs.statuses
     {'ok': 3}
-    >>> data.to_xarray().angles.dims
+    >>> runs.to_xarray().angles.dims
     ('run', 'time', 'coordinate')
+    >>> runs.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3, coordinate="pitch 1").dims
+    ('time',)
     """
     from rotor_mbs.runs.cluster import open_task_pool
     from rotor_mbs.scenario.sweep import sweep_of
     from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
     study = sweep_of(scene_of(scene), parameters, methods=list(check_names(methods)), **options)
-    path = Path(tempfile.mkdtemp(prefix="rotor_mbs-")) / "sweep.h5" if output is None else Path(output)
+    folder = _TemporaryFolder() if output is None else None
+    path = folder.path / "sweep.h5" if folder is not None else Path(str(output))
     plan = plan_sweep(study, time_limit_s=timeout)
     with open_task_pool("local", workers) as pool:
-        run_sweep(plan, path, pool)
-    data = SweepData(path)
-    if output is None:
-        weakref.finalize(data, shutil.rmtree, path.parent, ignore_errors=True)
-    return data
+        run_sweep(plan, path, pool, fresh=fresh)
+    return Runs(path, _folder=folder)
 
 
-@dataclass(eq=False)
-class SweepData:
-    """The dataset of a sweep.
-
-    Attributes
-    ----------
-    path : of the file.
-    statuses : how many runs have each status, of those that are stored.
-    """
-
-    path: Path
-
-    @functools.cached_property
-    def statuses(self) -> dict[str, int]:
-        return dict(Counter(STATUSES[code] for code in self.column("status").tolist() if code != MISSING))
-
-    def column(self, name: str) -> Any:
-        """An array whole, such as "status", "pitch_max" or "angles": one row for each run. Raises StoreError."""
-        return np.array(self._stored.column(name))
-
-    def at(self, name: str, sample: int) -> Any:
-        """(runs, ...) a trajectory, such as "angles", at one sample of all runs. Raises StoreError."""
-        return np.array(self._stored.column(name)[:, sample])
-
-    def to_xarray(self) -> Any:
-        """The dataset as an xarray.Dataset, opened lazily: one variable for each parameter, with its unit.
-
-        Raises StoreError, as `column` and `at` do, where a run is not what was written.
-        """
-        xarray, _ = need_xarray(), self._stored
-        return xarray.open_dataset(self.path)
-
-    @functools.cached_property
-    def _stored(self) -> StoredSweep:
-        """Read whole once, to verify it."""
-        from rotor_mbs.runs.sweep_dataset import StoredSweep
-
-        return StoredSweep(self.path)
-
-    def __repr__(self) -> str:
-        counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
-        return f"{self.path}: {sum(self.statuses.values())} runs: {counts}"
-
-
-def open(path: str | os.PathLike[str]) -> ResultsTree | SweepData:
-    """The results file at `path`: its scenes and runs by path, or the dataset of a sweep. Raises StoreError for others.
+def open(path: str | os.PathLike[str]) -> Runs:
+    """The runs in a file: of all its scenes, or of a sweep. Raises StoreError for other files.
 
     Examples
     --------
     >>> import rotor_mbs as rm
-    >>> tree = rm.open("rotor-mbs-out/results.h5")            # doctest: +SKIP
-    >>> tree["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
+    >>> runs = rm.open("rotor-mbs-out/results.h5")            # doctest: +SKIP
+    >>> runs["paper/fig11"].table()                           # doctest: +SKIP
+    >>> runs["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
     (1001, 4)
     """
-    if is_sweep(file := Path(path)):
-        return SweepData(file)
-    with open_results(file) as results:
-        runs = {name: tuple(scene.runs) for name, scene in results.scenes.items()}
-        return ResultsTree(file, runs, tuple(name for name, _ in records_in(results.root)))
+    return Runs(Path(path))
 
 
-@dataclass(frozen=True)
-class ResultsTree(Mapping[str, Run]):
-    """A results file: a mapping from "scene/model/integrator" (or "scene/reference") to a `Run`, read when asked for.
+class _TemporaryFolder:
+    """A folder that goes with the last object that refers to it."""
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="rotor_mbs-"))
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+
+
+class Runs(Mapping[Any, Any]):
+    """Some runs in a file: a mapping from label to `Run`, which is read when it is asked for.
+
+    Labels are the names of methods (and "reference") where it is one scene's, "paper/fig11/lagrange/taylor" where the
+    file's, and numbers where it is a sweep's. `runs["paper/fig11"]` of a file's runs are that scene's.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file, which is open only while something is read.
+    scene : str
+        The scene whose runs these are; "" for all that the file has.
 
     Attributes
     ----------
-    path : of the file, which is open only while something is read.
-    scenes : names of the methods (and "reference") by the name of each scene.
-    records : paths of what other studies stored: curves of a bench, modes, comparisons, ...
+    plot : of one scene, `runs.plot.error()`, `.rotor()`, `.energy_error()`.
+    statuses : how many runs have each status, of those that are stored.
     """
 
-    path: Path
-    scenes: Mapping[str, tuple[str, ...]]
-    records: tuple[str, ...] = ()
+    def __init__(self, path: Path, scene: str = "", *, _folder: _TemporaryFolder | None = None) -> None:
+        self.path, self.scene, self._folder = path, scene, _folder
+        self._is_sweep = is_sweep(path)
+        self._labels = self._stored_labels()
 
-    def __getitem__(self, name: str) -> Run:
-        """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
-        scene = next((one for one in self.scenes if name.startswith(f"{one}/")), None)
-        if scene is None or name.removeprefix(f"{scene}/") not in self.scenes[scene]:
-            raise KeyError(f"{name}; the file has: {', '.join(self)}")
+    def _stored_labels(self) -> list[Any]:
+        if self._is_sweep:
+            return [int(run) for run in self._sweep.column("run")[self._sweep.column("status") != MISSING]]
         with open_results(self.path) as results:
-            stored = results.scenes[scene]
-            return _loaded(stored, stored.runs[name.removeprefix(f"{scene}/")])
+            if self.scene:
+                return list(results.scenes[self.scene].runs)
+            return [f"{scene.name}/{method}" for scene in results.scenes.values() for method in scene.runs]
 
-    def __iter__(self) -> Iterator[str]:
-        return (f"{scene}/{method}" for scene, methods in self.scenes.items() for method in methods)
+    def __getitem__(self, label: Any) -> Any:
+        """Raises KeyError for what the file does not have, StoreError for samples that cannot be read."""
+        if not self._is_sweep and not self.scene and any(str(known).startswith(f"{label}/") for known in self._labels):
+            with open_results(self.path) as results:
+                if label in results.scenes:
+                    return Runs(self.path, label, _folder=self._folder)
+        if label not in self._labels:
+            raise KeyError(f"{label}; there are: {', '.join(map(str, self._labels[:20]))}")
+        if self._is_sweep:
+            return self._run_of_sweep(int(label))
+        scene = self.scene
+        with open_results(self.path) as results:
+            if not scene:
+                scene = next(name for name in results.scenes if label.startswith(f"{name}/"))
+                label = label.removeprefix(f"{scene}/")
+            stored = results.scenes[scene]
+            return _loaded(stored, stored.runs[label])
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self._labels)
 
     def __len__(self) -> int:
-        return sum(map(len, self.scenes.values()))
+        return len(self._labels)
 
-    def to_xarray(self) -> Any:
-        """The whole file as an xarray.DataTree, opened lazily."""
-        return need_xarray().open_datatree(self.path)
+    @functools.cached_property
+    def statuses(self) -> dict[str, int]:
+        if self._is_sweep:
+            codes = self._sweep.column("status").tolist()
+            return dict(Counter(STATUSES[code] for code in codes if code != MISSING))
+        return dict(Counter(status for _, _, status, _ in self._rows()))
+
+    @functools.cached_property
+    def _sweep(self) -> StoredSweep:
+        """Read whole once, to verify it."""
+        return StoredSweep(self.path)
+
+    def _rows(self) -> list[tuple[str, str, str, dict[str, Any]]]:
+        """Scene, method, status and metrics of each run."""
+        with open_results(self.path) as results:
+            scenes = [results.scenes[self.scene]] if self.scene else results.scenes.values()
+            return [
+                (scene.name, run.method, run.status, run.attributes) for scene in scenes for run in scene.runs.values()
+            ]
+
+    def table(self) -> TextTable:
+        """A row for each run: status, error (rad), energy drift (of the energy scale), run time (s)."""
+        if self._is_sweep:
+            counts = [(status, str(count)) for status, count in self.statuses.items()]
+            return TextTable(("status", "runs"), counts)
+        rows = []
+        for scene, method, status, facts in self._rows():
+            seconds = None if "frozen_with" in facts else facts.get("run_time_s", 0.0)
+            cells = run_row(method, status, {} if method == REFERENCE else facts, seconds)
+            rows.append(cells if self.scene else (scene, *cells))
+        return TextTable(RUN_HEAD if self.scene else ("scene", *RUN_HEAD), rows)
+
+    @property
+    def plot(self) -> ComparisonPlots:
+        from rotor_mbs.report.run_plots import ComparisonPlots  # late: matplotlib
+
+        if not self.scene:
+            raise InputError("plot: allowed of the runs of one scene, such as runs['paper/fig11']")
+        reference = self[REFERENCE].trajectory if REFERENCE in self else None
+        return ComparisonPlots({name: self[name] for name in self if name != REFERENCE}, reference)
+
+    def column(self, name: str) -> Any:
+        """(runs, ...) Of a sweep, an array whole, such as "status", "pitch_max" or "angles". Raises StoreError."""
+        return np.array(self._sweep.column(name))
+
+    def at(self, name: str, sample: int) -> Any:
+        """(runs, ...) Of a sweep, a trajectory such as "angles" at one sample of all runs. Raises StoreError."""
+        return np.array(self._sweep.column(name)[:, sample])
+
+    def to_xarray(self, *, unstack: bool = False) -> Any:
+        """The runs as xarray objects, with units, long names and labels.
+
+        Parameters
+        ----------
+        unstack : bool
+            Of a grid sweep, whether each varied parameter becomes a dimension in place of `run`.
+
+        Returns
+        -------
+        xarray.Dataset
+            Of one scene, or of a sweep (opened lazily), with the dimension `run`. Select by label:
+            `data.angles.sel(run="lagrange/taylor", coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`.
+        xarray.DataTree
+            Of a file with several scenes, opened lazily.
+
+        Raises
+        ------
+        StoreError
+            Where a run of a sweep is not what was written.
+        """
+        xarray = need_xarray()
+        if not self._is_sweep and not self.scene:
+            return xarray.open_datatree(self.path)
+        if self._is_sweep:
+            data = _labelled(xarray.open_dataset(self.path))
+            names = np.array(self._sweep.methods)[self._sweep.column("method_code")]
+            data = data.assign_coords(method_name=("run", names))
+            if unstack:
+                keys = [parameter_name(key) for key in self._sweep.keys]
+                keys += ["method_name"] if len(self._sweep.methods) > 1 else []
+                data = data.set_index(run=keys).unstack("run")
+            return data
+        with xarray.open_dataset(self.path, group=self.scene) as scene:
+            data = _labelled(scene.load())
+        return data.assign(status=("run", [status for _, _, status, _ in self._rows()]))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """The file under another name, which `rotor-mbs report` and `rotor_mbs.open` read. Replaces the file."""
+        target = Path(path)
+        replace_file(target, self.path.read_bytes())
+        return target
+
+    def to_html(self, folder: str | os.PathLike[str]) -> Path:
+        """The report's pages into a folder; the path of its index."""
+        from rotor_mbs.report.build import write_report  # late: templates
+
+        return write_report(self.path, Path(folder))
+
+    def _run_of_sweep(self, number: int) -> Run:
+        sweep = self._sweep
+        facts, row = sweep.attributes, number - int(sweep.column("run")[0])
+        values = {key: float(sweep.column(parameter_name(key))[row]) for key in sweep.keys}
+        base = parse_scene(str(facts["scene_toml"]), str(facts["base_scene"]))
+        scene = base.replace(**values, samples=len(sweep.column("time")))
+        arrays: dict[str, Any] = {}
+        for quantity in known_quantities(scene.outputs):
+            if quantity.name in sweep.columns:
+                arrays[quantity.name] = np.array(sweep.column(quantity.name)[row], float)
+        known = [~np.isnan(array.reshape(len(array), -1)).any(axis=1) for array in arrays.values()]
+        samples = int(np.all(known, axis=0).sum()) if known else 0
+        blank = np.full((samples, 1 + len(scene.blades)), np.nan)
+        arrays = {"angles": blank, "rates": blank, **{name: array[:samples] for name, array in arrays.items()}}
+        status = STATUSES[int(sweep.column("status")[row])]
+        message = sweep.column("message")[row].tobytes().rstrip(b"\0").decode(errors="ignore")
+        time = np.array(sweep.column("time")[:samples])
+        metrics = {
+            name: float(sweep.column(name)[row])
+            for name in ("energy_drift_max", "rotor_angle_max", "rotor_rate_max", "pitch_max")
+        }
+        method = sweep.methods[int(sweep.column("method_code")[row])]
+        settings = json.loads(str(facts["settings"]))
+        return Run(
+            scene, method, Trajectory(time, **arrays), Integration(status == "ok", message), settings, status=status,
+            message=message, metrics=metrics,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
-        head = f"{self.path}: {len(self.scenes)} scenes, {len(self)} runs"
-        if self.records:
-            head += f", {len(self.records)} records"
-        return "\n".join([head, *map("  {}".format, (*self, *self.records))])
+        if self._is_sweep:
+            counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
+            return f"{self.path}: {len(self)} runs: {counts}"
+        return f"{self.scene or self.path}\n{self.table()}"
+
+    def _repr_html_(self) -> str:
+        drawn = self.plot.error()._repr_svg_() if self.scene and REFERENCE in self else ""
+        return f"<p>{escape(self.scene or str(self.path))}</p>{self.table()._repr_html_()}{drawn}"
+
+
+def _labelled(data: Any) -> Any:
+    """A dataset whose coordinates and axes have their names in place of numbers."""
+    labels = {}
+    if "coordinate" in data.coords:
+        labels["coordinate"] = list(np.atleast_1d(data.coordinate.attrs["labels"]))
+    if "axis" in data.coords:
+        labels["axis"] = ["x", "y", "z"]
+    return data.assign_coords(labels)
 
 
 def _loaded(scene: StoredScene, stored: StoredRun) -> Run:
-    """A run as it was stored; its metrics follow from its samples."""
+    """A run as it was stored."""
     found = rehydrate(scene, stored)
     if found.run is None:
         raise StoreError(f"{scene.name}/{stored.method}: {'; '.join(found.faults)}")
     facts = stored.attributes
     run = Run(**vars(found.run), reference=None if stored.method == REFERENCE else found.reference)
     run.status, run.message = stored.status, str(facts.get("message", ""))
-    run.metrics = metrics_of(run.scene, run.trajectory, run.reference)
+    run.metrics = {name: value for name, value in facts.items() if isinstance(value, float)}
     setup, seconds, output = (float(facts.get(f"{name}_time_s", 0.0)) for name in ("setup", "run", "output"))
     run.setup_time_s, run.run_times_s, run.output_time_s = setup, [seconds], output
     return run

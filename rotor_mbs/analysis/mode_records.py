@@ -28,7 +28,7 @@ from rotor_mbs.analysis.campbell import (
 )
 from rotor_mbs.analysis.modes import Complex, multiblade
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.layout import Column
+from rotor_mbs.runs.files import Column
 from rotor_mbs.runs.records import Record, read_records
 
 # By name: values, and what they are.

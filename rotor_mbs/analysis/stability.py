@@ -90,7 +90,7 @@ _FAMILIES = {  # of scenes whose names do not begin with that of their family
 
 def suite_runs(path: Path) -> list[SuiteRun]:
     """Every run of a results file, in its order. Raises StoreError."""
-    ladders = {(record.scene, record.name): record for record in read_records(path, "steps")}
+    ladders = {(record.scene, record.name): record for record in read_records(path, "stability")}
     found = []
     with open_results(path) as results:
         for scene in results.scenes.values():

@@ -255,6 +255,7 @@ _COMMANDS = (
         _flag("--metadata", help="RO-Crate, Croissant and statistics for normalization beside FILE, as JSON"),
         _argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port"),
         _argument("--part", type=part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array"),
+        _flag("--fresh", help="compute stored runs again"),
         _flag("--dry-run", help="how many runs, about how long, how much"),
         _flag("--yes", help="start a sweep of over a million runs"),
         _flag("--json", help="progress and summary as JSON lines"),

@@ -16,7 +16,7 @@ from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.runs.files import replace_file
-from rotor_mbs.runs.lock import has_unfinished
+from rotor_mbs.runs.lock import is_being_written
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -26,7 +26,7 @@ from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
 
 if TYPE_CHECKING:
-    from rotor_mbs.runs.runner import Outcome
+    from rotor_mbs.studies.run import Outcome
 
 # Of the time of `reproduce`: runs, pages.
 _REPRODUCE_PARTS = (0.8, 0.2)
@@ -66,8 +66,8 @@ def reproduce(arguments: argparse.Namespace) -> int:
     results, pages = arguments.output / "results.h5", arguments.output / "report"
     index, summary, stamp = (pages / name for name in ("index.html", "summary.txt", ".made-from"))
     there = results.is_file() and index.is_file() and summary.is_file() and stamp.is_file()
-    if there and stamp.read_text() == made_from(results, arguments.timeout) and not has_unfinished(results):
-        print(f"{results}: nothing to do, every run is there already")
+    if there and stamp.read_text() == made_from(results, arguments.timeout) and not is_being_written(results):
+        print(f"{results}: nothing to do, every run is already stored")
     else:
         status, text = _reproduce(arguments, results, pages)
         replace_file(summary, text.encode())
@@ -85,7 +85,7 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
 
         def on_progress(done: int, total: int, outcome: Outcome) -> None:
             progress(done, total, outcome)
-            if done == total:  # the results are merged now
+            if done == total:
                 for _ in range(pool.workers):
                     pool.submit(import_module, _PAGES, arguments.timeout)
 

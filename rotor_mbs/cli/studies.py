@@ -38,14 +38,14 @@ def bench(arguments: argparse.Namespace) -> int:
         made, left_out = run_bench(
             scenes, methods, output, workers=cores(), settings=settings, on_progress=progress, **limits
         )
-        measured = len({one.case.scene.name for one in made})
+        measured = len({outcome.label.partition(" ")[0] for outcome in made})
         if arguments.growth:
             made += run_cost_scaling(methods, output, on_progress=progress, **limits)
     for line in left_out:
         print(line, file=sys.stderr)
     names = {scene.name for scene in scenes}
     print_table(bench_table([curve for curve in read_records(output, "bench") if curve.scene in names]))
-    print(f"{output}: {measured} scenes measured, {len(scenes) - measured} there already")
+    print(f"{output}: {measured} scenes measured, {len(scenes) - measured} already stored")
     _write_pages(output)
     return int(print_not_computed(made))
 
@@ -88,7 +88,7 @@ def modes(arguments: argparse.Namespace) -> int:
             workers=arguments.jobs, timeout_s=arguments.timeout, on_progress=progress,
         )  # fmt: skip
     is_lost = print_not_computed(made)
-    lost = {one.case.scene.name for one in made if not one.is_computed}
+    lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
     chosen = [found[scene.name] for scene in scenes if scene.name in found]
     if arguments.json:

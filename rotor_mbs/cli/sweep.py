@@ -41,16 +41,18 @@ def _run(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{plan.sweep.name}.{arguments.format}")
     try:
         with SweepProgress(as_json=arguments.json) as progress:
-            result = run_sweep(plan, output, pool, progress)
+            result = run_sweep(plan, output, pool, progress, fresh=arguments.fresh)
     except StoreError as exc:  # the disk, not the input: what is stored stays, the same command continues
         show(str(exc), sys.stderr)
         return 1
     _summarize(result, as_json=arguments.json)
+    if result.older:
+        show(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)
     for line in result.lost:
         show(f"{line}; not computed, the same command tries again", sys.stderr)
     if plan.sweep.table.picture and arguments.part == (1, 1):
         from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
-        from rotor_mbs.runs.sweep_dataset import StoredSweep
+        from rotor_mbs.runs.sweeps import StoredSweep
 
         line = save_picture(StoredSweep(result.path), output.with_suffix(".svg"))
         print(line, file=sys.stderr if arguments.json else sys.stdout)
@@ -73,10 +75,9 @@ def _summarize(result: SweepResult, *, as_json: bool) -> None:
 
 
 def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
-    from rotor_mbs.runs.sweep_columns import row_type
     from rotor_mbs.studies.sweep import estimate_seconds
 
-    size, seconds = plan.runs * row_type(plan.sweep).itemsize, estimate_seconds(plan, pool)
+    size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)
     if arguments.json:
         facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
         print(json.dumps(facts))

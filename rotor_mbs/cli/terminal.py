@@ -19,10 +19,9 @@ from rotor_mbs.cli import printable
 from rotor_mbs.solution.status import STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
-    from rotor_mbs.runs.runner import Outcome
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.text_table import TextTable
-    from rotor_mbs.studies.run import RunReport
+    from rotor_mbs.studies.run import Outcome, RunReport
 
 
 # How a status is coloured on a terminal: well; open to doubt; anything else went wrong.
@@ -109,9 +108,9 @@ class _RenewedLine:
 
 
 class ProgressLine(_RenewedLine):
-    """Called after each case. What is left is estimated from the work done, not from the number of cases.
+    """Called after each run. What is left is estimated from the work done, not from the number of runs.
 
-    parts: shares of the work, in order, of the lists of cases and of the stages that a command has. Where the lists are
+    parts: shares of the work, in order, of the lists of runs and of the stages that a command has. Where the lists are
     more than these, each is estimated by itself.
     """
 
@@ -125,15 +124,16 @@ class ProgressLine(_RenewedLine):
         if done == 1:
             self._begin_part()
         self._last = time.monotonic()
-        result = outcome.result
-        seconds = " (read, not computed)" if result.is_read else f" {result.seconds:.3f} s" if result.seconds else ""
-        reason = f": {result.message}" if result.message else ""
-        text = f"[{done:{len(str(total))}d}/{total}] {outcome.case.label} {result.status}{seconds}{reason}"
-        keep = result.status != "ok"  # a person must not miss it
+        seconds = f" {outcome.seconds:.3f} s" if outcome.seconds > 0.0 else ""
+        if outcome.is_read:
+            seconds = " (read, not computed)"
+        reason = f": {outcome.message}" if outcome.message else ""
+        text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
+        keep = outcome.status != "ok"  # a person must not miss it
         self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
     def stage(self, text: str, done: int, total: int) -> None:
-        """What is done beside cases, such as drawing pages: called before the first (done = 0) and after each."""
+        """What is done beside runs, such as drawing pages: called before the first (done = 0) and after each."""
         if done == 0:
             self._begin_part()
         self._last = time.monotonic()
@@ -202,7 +202,7 @@ def print_summary(report: RunReport, output: Path) -> int:
     }
     parts = [f"{len(report.made) - sum(counts.values())} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
-    print(f"{output}: {made}, {report.kept} there already")
+    print(f"{output}: {made}, {report.kept} already stored")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
     return 1 if report.failures or is_lost or report.stored_failures else 0
@@ -218,8 +218,8 @@ def print_doubts(scenes: Sequence[Scene]) -> None:
 
 
 def print_not_computed(made: Sequence[Outcome]) -> bool:
-    """A line for each case whose process died or could not start; whether there are any."""
-    lost = [one for one in made if not one.is_computed]
-    for one in lost:
-        print(f"{one.case.label}: not computed ({one.result.message}); the same command tries again", file=sys.stderr)
+    """A line for each run whose process died or could not start; whether there are any."""
+    lost = [outcome for outcome in made if not outcome.is_stored]
+    for outcome in lost:
+        print(f"{outcome.label}: not computed ({outcome.message}); the same command tries again", file=sys.stderr)
     return bool(lost)

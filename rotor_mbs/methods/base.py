@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from importlib.util import find_spec
+from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -67,6 +68,9 @@ class Method:
                     and energies alone, or None
     linearize       (scene, steady angles, rotor speed, rotor torque) -> the model linearized there, or None; one method
                     of a model has it. Raises MethodRefusal for a state that the model cannot be linearized about
+    arrays          (settings) -> names of the quantities that not every method has and this one stores, such as
+                    "constraint_error"
+    sources         of a method from outside: the files whose code decides its runs
     load            imports what it computes with, and prevents the use of compiled code from an earlier process: before
                     timings, which exclude both
     """
@@ -91,6 +95,8 @@ class Method:
     bounds: tuple[Bound, ...] = ()
     solve_many: Callable[[Sequence[Scene], Any], RunBlock] | None = None
     linearize: Callable[[Scene, Any, float, float], Linearization] | None = None
+    arrays: Callable[[Any], tuple[str, ...]] = lambda _: ()
+    sources: tuple[Path, ...] = ()
     load: Callable[[], object] = lambda: None
 
     def __post_init__(self) -> None:

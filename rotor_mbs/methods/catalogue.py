@@ -10,6 +10,7 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module, metadata
+from pathlib import Path
 
 from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.methods.base import Method
@@ -171,5 +172,15 @@ def _plug_ins() -> dict[str, Method]:
                 _log.warning("plug-in %s of %s: method %s left out: name taken", point.name, point.value, method.name)
                 continue
             taken.add(method.name)
-            found[method.name] = replace(method, distributions=tuple(dict.fromkeys((*method.distributions, *package))))
+            distributions = tuple(dict.fromkeys((*method.distributions, *package)))
+            found[method.name] = replace(method, distributions=distributions, sources=_sources(point.module))
     return found
+
+
+def _sources(module: str) -> tuple[Path, ...]:
+    """The files of the package that a module is in, or the module's own."""
+    top = import_module(module.partition(".")[0])
+    folders = [Path(folder) for folder in getattr(top, "__path__", ())]
+    if folders:
+        return tuple(path for folder in folders for path in sorted(folder.rglob("*.py")))
+    return (Path(top.__file__),) if top.__file__ else ()

@@ -29,7 +29,7 @@ from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
 from rotor_mbs.runs.read import OpenResults, in_memory, is_sweep, open_results
 from rotor_mbs.runs.records import Record, read_records
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep
 
 Part = str | Path | PaperFigure  # a scene by its name, a page by its file, or a figure of the paper
 _GROUPS = 2  # per worker

@@ -19,13 +19,11 @@ from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.pool import R, T, TaskPool, local_pool, one_line
-from rotor_mbs.runs.versions import fingerprint, versions
+from rotor_mbs.runs.versions import numerics_digest, versions
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 _CONNECT_S = 3.0
 _OTHER_CODE = "a worker has other versions or other code; allowed: workers with the same"
-# Of the package: all that decides a number of a sweep.
-_CODE = ("scenario", "solution", "methods", "models", "runs", "studies")
 
 # A task's arrays are as large as the last one's. Memory that a process keeps (with the GNU C library, up to 128 MB) it
 # need not get from the system again, page by page: an eleventh of a fast run with many samples.
@@ -127,7 +125,7 @@ class Cluster(TaskPool):
 
 def identity() -> dict[str, str]:
     """What must be equal here and in a worker, or its numbers would be others: versions and code."""
-    return {**versions(), "code of rotor_mbs": fingerprint(*_CODE)[:12]}
+    return {**versions(), "code of rotor_mbs": numerics_digest()}
 
 
 def refuse_other_code(expected: Mapping[str, str]) -> None:

@@ -1,8 +1,7 @@
 """Digests of what a group of a file holds, stored with it: a changed bit is found and located.
 
 The attribute `digests` of a group is a JSON object: SHA-256 by the name of each dataset, over values and attributes,
-and by "attributes" over the group's own. Of columns that are filled later it covers the attributes alone. Knows no
-file library.
+and by "attributes" over the group's own. Of columns that are filled later it covers the attributes alone.
 """
 
 from __future__ import annotations
@@ -10,26 +9,21 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-DIGESTS = "digests"
+from rotor_mbs.errors import StoreError
+from rotor_mbs.runs import files
+from rotor_mbs.runs.files import DIGESTS, plain
+
 ATTRIBUTES = "attributes"
 _UNFILLED = "attributes of "
 
 # What the library writes and changes by itself.
 _NOT_COVERED = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
-
-
-def plain(value: Any) -> Any:
-    """An attribute as a plain Python value."""
-    if isinstance(value, np.ndarray):
-        return [plain(item) for item in value]
-    if isinstance(value, bytes):
-        return value.decode()
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def array_digest(values: NDArray[Any]) -> str:
@@ -38,6 +32,8 @@ def array_digest(values: NDArray[Any]) -> str:
 
 
 def _of_array(values: NDArray[Any]) -> Any:
+    if values.dtype.kind == "O":  # texts
+        return hashlib.sha256("\0".join(map(str, values.tolist())).encode())
     values = np.ascontiguousarray(values)
     digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
     digest.update(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
@@ -58,23 +54,53 @@ def attributes_digest(attributes: Mapping[str, Any]) -> str:
 
 
 def seal(group: Any, later: Collection[str] = ()) -> None:
-    """Stores the digests of a group; of the datasets `later`, which are filled by others, those of their attributes."""
-    found = {ATTRIBUTES: attributes_digest(group.attrs)}
+    """Store the digests of a group; of the datasets `later`, which are filled by others, those of their attributes."""
+    sums = {ATTRIBUTES: attributes_digest(group.attrs)}
     for name, item in group.items():
         if name in later:
-            found[unfilled(name)] = attributes_digest(item.attrs)
-        elif not hasattr(item, "items"):
-            found[name] = dataset_digest(item[()], item.attrs)
-    group.attrs[DIGESTS] = json.dumps(found)
+            sums[unfilled(name)] = attributes_digest(item.attrs)
+        elif not files.is_group(item) and not files.is_dimension_only(item):
+            sums[name] = _digest_of(item)
+    group.attrs[DIGESTS] = json.dumps(sums)
+
+
+def _digest_of(dataset: Any) -> str:
+    values = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
+    return dataset_digest(values, dataset.attrs)
 
 
 def seal_all(group: Any) -> None:
-    """Stores the digests of every group that has none: what was copied keeps those of when it was written."""
+    """Store the digests of every group that has none yet."""
     if DIGESTS not in group.attrs:
         seal(group)
     for name in group:
-        if hasattr(group.get(name, getclass=True), "items"):
+        if files.is_group(group.get(name)):
             seal_all(group[name])
+
+
+def damages_of(group: Any) -> list[str]:
+    """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
+
+    "digests" where it has none. Links, and arrays that cannot be read, count too.
+    """
+    try:
+        known = stored_digests(group.attrs)
+    except ValueError:
+        known = {}
+    if not known:
+        return [DIGESTS]
+    sums = {ATTRIBUTES: attributes_digest(group.attrs)}
+    for name in group:
+        is_unfilled = unfilled(name) in known
+        label = unfilled(name) if is_unfilled else name
+        sums[label] = ""
+        with suppress(StoreError), files.reading(""):
+            item = files.member(group, name)
+            if files.is_group(item) or files.is_dimension_only(item):
+                del sums[label]
+            else:
+                sums[label] = attributes_digest(item.attrs) if is_unfilled else _digest_of(item)
+    return [name for name in {**known, **sums} if known.get(name) != sums.get(name)]
 
 
 def stored_digests(attributes: Mapping[str, Any]) -> dict[str, str]:

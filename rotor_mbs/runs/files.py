@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError, saving
-from rotor_mbs.runs.digests import DIGESTS, plain, seal_all
-from rotor_mbs.runs.layout import CONVENTIONS, FORMAT, FORMAT_VERSION, Column
 from rotor_mbs.solution.quantities import Quantity
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
+
+FORMAT = "rotor_mbs"
+FORMAT_VERSION = 2
+CONVENTIONS = "CF-1.11, ACDD-1.3"
+# What every file is about: the attribute `keywords` of the ACDD conventions.
+KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
+DIGESTS = "digests"  # the attribute with the digests of a group
+CHARACTERS = "characters"  # the dimension of texts that are filled in later
+# The netCDF-4 library's name for the scale of a dimension without values.
+_WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
 
 # What h5py and HDF5 raise on damaged files, and what plain code does with what they return.
 _DAMAGE = (
@@ -29,22 +38,27 @@ _DAMAGE = (
 # An array may be larger than its bytes in the file, where it is compressed: up to a factor, and a size in any case.
 _UNPACKED, _UNPACKED_BYTES = 100, 1 << 26
 
-# Of a scale its users, of these their scales, and a number in the file: the library writes them when one is attached.
-_OF_SCALES = (b"REFERENCE_LIST", b"DIMENSION_LIST", b"_Netcdf4Dimid")
+
+class Column(NamedTuple):
+    """A dataset: its dimensions (names of scales), units, what it is, and the type of its values in the file."""
+
+    dimensions: tuple[str, ...]
+    units: str
+    long_name: str
+    kind: str = "<f8"
+
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Any]:
     """A new HDF5 file, put in the place of `path` when all of it is written and on the disk.
 
-    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Every group that has
-    no digests yet gets them. Raises StoreError where the file cannot be written; what stood at `path` before then still
-    stands.
+    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does. Raises StoreError
+    where the file cannot be written; what stood at `path` before then still stands.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
-    with begin_file(path.name, **memory) as file:
+    with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
         yield file
-        seal_all(file)
         file.flush()
         image = file.id.get_file_image()
     replace_file(path, image)
@@ -148,6 +162,17 @@ def mapped(dataset: Any) -> NDArray[Any]:
     return values
 
 
+def is_text(dataset: Any) -> bool:
+    """Whether a dataset has texts of any length."""
+    return h5py.check_string_dtype(dataset.dtype) is not None and dataset.dtype.kind == "O"
+
+
+def texts_of(dataset: Any) -> NDArray[Any]:
+    """(n,) A dataset of texts, whole. Raises StoreError where it is stored in another file."""
+    _refuse_outside(dataset)
+    return np.array([plain(text) for text in dataset[()]], dtype=object)
+
+
 def values_of(dataset: Any) -> NDArray[Any]:
     """An array, whole. Raises StoreError where it is not in the file, or claims far more than the file holds."""
     place = f"{dataset.file.filename}: {dataset.name}"
@@ -161,11 +186,6 @@ def values_of(dataset: Any) -> NDArray[Any]:
     return values
 
 
-def address(group: Any) -> int:
-    """Where a group stands in its file: two names of one group have one address."""
-    return int(h5py.h5o.get_info(group.id).addr)
-
-
 def new_group(parent: Any, name: str) -> Any:
     """A group, and those above it, that list their members in the order of writing."""
     for part in name.split("/"):
@@ -173,10 +193,14 @@ def new_group(parent: Any, name: str) -> Any:
     return parent
 
 
-def put(group: Any, name: str, values: NDArray[Any], quantity: Column | Quantity, *, compress: bool = False) -> Any:
-    """A dataset with unit and long name; its dimensions' scales must be there already. A scale is its own dimension."""
-    options = {"compression": "gzip", "shuffle": True} if compress and values.ndim and values.size > 64 else {}
-    return _described(group.create_dataset(name, data=values, **options), group, quantity)
+def put(group: Any, name: str, values: Any, quantity: Column | Quantity) -> Any:
+    """A dataset of numbers or texts with unit and long name; the scales of its dimensions must be there already.
+
+    A scale is its own dimension.
+    """
+    is_text = len(values) > 0 and isinstance(values[0], str)
+    data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
+    return _described(group.create_dataset(name, data=data), group, quantity)
 
 
 def _described(dataset: Any, group: Any, quantity: Column | Quantity) -> Any:
@@ -190,6 +214,17 @@ def _described(dataset: Any, group: Any, quantity: Column | Quantity) -> Any:
     return dataset
 
 
+def put_dimension(group: Any, name: str, length: int) -> None:
+    """A dimension without values, as the netCDF-4 library has them."""
+    scale = group.create_dataset(name, (length,), ">f4")
+    scale.make_scale(f"{_WITHOUT_VALUES}{length:10d}")
+
+
+def is_dimension_only(dataset: Any) -> bool:
+    """Whether a dataset is a dimension without values."""
+    return str(plain(dataset.attrs.get("NAME", ""))).startswith(_WITHOUT_VALUES)
+
+
 def put_attributes(target: Any, values: Mapping[str, object]) -> None:
     """Numbers as float64 or int64, truth as int8 (netCDF-4 has no booleans), lists of names as strings."""
     for name, value in values.items():
@@ -201,39 +236,18 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
             target.attrs[name] = value
 
 
+def plain(value: Any) -> Any:
+    """An attribute as a plain Python value."""
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.item() if isinstance(value, np.generic) else value
+
+
 def attributes_of(target: Any) -> dict[str, Any]:
     """As plain Python values."""
     return {name: plain(value) for name, value in target.attrs.items() if name not in ("REFERENCE_LIST", DIGESTS)}
-
-
-def copy_group(source: Any, file: Any, name: str) -> None:
-    """A group with all that it holds, into another file at a place of its own.
-
-    The library copies references as they are, of the file they come from: scales are attached anew. Raises StoreError
-    at a link, and at an array that is stored in another file.
-    """
-    above = name.rpartition("/")[0]
-    if above:
-        new_group(file, above)
-    h5py.h5o.copy(source.id, b".", file.id, name.encode())
-    _attach_scales(source, file[name])
-
-
-def _attach_scales(source: Any, copied: Any) -> None:
-    items, users = dict(members(copied)), []
-    for name, item in items.items():
-        if is_group(item):
-            _attach_scales(source[name], item)
-            continue
-        _refuse_outside(item)
-        stale = [attribute for attribute in _OF_SCALES if h5py.h5a.exists(item.id, attribute)]
-        users += [name] if b"DIMENSION_LIST" in stale else []
-        for attribute in stale:
-            h5py.h5a.delete(item.id, attribute)
-    for name in users:
-        for axis, dimension in enumerate(dimensions_of(source[name])):
-            if dimension:
-                items[name].dims[axis].attach_scale(items[dimension])
 
 
 def _refuse_outside(dataset: Any) -> None:
@@ -251,7 +265,16 @@ def dimensions_of(dataset: Any) -> list[str]:
     By the attribute of the scale: the library would look for its path through the whole file, and its own way to the
     name ends the process where that is damaged.
     """
-    return [plain(dimension[0].attrs["NAME"]) if len(dimension) else "" for dimension in dataset.dims]
+    names = [str(plain(dimension[0].attrs["NAME"])) if len(dimension) else "" for dimension in dataset.dims]
+    return [CHARACTERS if name.startswith(_WITHOUT_VALUES) else name for name in names]
+
+
+def groups_in(file: Any) -> Iterator[Any]:
+    """An open file and every group below it. Raises StoreError at a link."""
+    yield file
+    for _, item in members(file):
+        if is_group(item):
+            yield from groups_in(item)
 
 
 def is_group(item: Any) -> bool:
@@ -268,17 +291,15 @@ def put_empty(
     """
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
+    layout.set_obj_track_times(False)  # the same call gives the same bytes
     layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
     if fill is not None:
         layout.set_fill_value(np.array(fill, kind))
-    return _described(group.create_dataset(name, shape, kind, dcpl=layout), group, quantity)
-
-
-def put_flags(dataset: Any, meanings: Sequence[str]) -> None:
-    """Marks integer codes from 0 up as the CF conventions do; no meaning may contain a blank."""
-    dataset.attrs["flag_values"] = np.arange(len(meanings), dtype=dataset.dtype)
-    dataset.attrs["flag_meanings"] = " ".join(meanings)
+    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, quantity)
+    if np.dtype(kind).kind == "S":
+        dataset.attrs["_Encoding"] = "utf-8"
+    return dataset
 
 
 def sync_folder(folder: Path) -> None:

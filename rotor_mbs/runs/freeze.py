@@ -5,39 +5,53 @@ The digests stand in a text file beside each file of references: a changed numbe
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs import files
 from rotor_mbs.runs.digests import array_digest
+from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import OpenResults, open_results
-from rotor_mbs.runs.write import put_datasets
-from rotor_mbs.solution.quantities import BUILT_IN, LOADS
+from rotor_mbs.runs.results import Asked, fit, runs_table, scene_table
+from rotor_mbs.runs.table import blank_rows
+from rotor_mbs.solution.quantities import LOADS
+from rotor_mbs.solution.status import code_of
 
-# What cannot be computed again from angles and rates as precisely, and the scales.
-_SCALES = ("time", "coordinate", "blade", "axis")
-KEPT = (*_SCALES, "angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
-_ATTRIBUTES = ("settings", "steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s", "status")
+# What cannot be computed again from angles and rates as precisely.
+KEPT = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
+_FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
 
 
-def freeze(source: Path, target: Path, date: str) -> None:
-    """Angles, rates, loads, uncertainty and growth of every reference in `source` into `target`; digests too.
+def write_references(
+    target: Path, references: Sequence[tuple[Asked, Mapping[str, Any], Mapping[str, np.ndarray[Any, Any]]]]
+) -> None:
+    """A file of references, and the digests beside it.
 
-    Tip and energies follow from angles and rates. The work is kept only where it does not. Raises StoreError.
+    Parameters
+    ----------
+    references : of each what it is, its facts (status, steps, times), and its arrays over time, those of `KEPT`.
+
+    Raises
+    ------
+    StoreError
+        Where they cannot be written.
     """
-    with open_results(source) as results, files.new_file(target) as file:
-        for scene in results.scenes.values():
-            reference = scene.reference
-            if reference is None:
-                continue
-            files.put_attributes(files.new_group(file, scene.name), scene.attributes)
-            group = files.new_group(file, f"{scene.name}/{REFERENCE}")
-            arrays = {name: reference.array(name) for name in KEPT if name in reference}
-            put_datasets(group, arrays, BUILT_IN, reference.labels)
-            facts = {name: reference.attributes[name] for name in _ATTRIBUTES}
-            made = f"heyoka {results.attributes['heyoka']}, {date}"
-            files.put_attributes(group, {**facts, "frozen_with": made})
+    target.unlink(missing_ok=True)
+    tables = [scene_table([asked], arrays=arrays.keys() & set(KEPT)) for asked, _, arrays in references]
+    file = fit(target, [runs_table([asked for asked, _, _ in references]), *tables])
+    for asked, facts, arrays in references:
+        place = file.place(asked.run)
+        row = blank_rows(1, place.row)
+        row["status"][0], row["samples"][0] = code_of(str(facts["status"])), len(arrays["angles"])
+        for name in _FACTS:
+            row[name][0] = facts[name]
+        for name, values in arrays.items():
+            if name in row:
+                row[name][0, : len(values)] = values
+        place.write(place.first, row)
     write_digests(target)
 
 
@@ -48,13 +62,16 @@ def write_digests(references: Path) -> None:
     """
     with open_results(references) as results:
         lines = [f"{digest}  {scene} {name}\n" for (scene, name), digest in _digests(results).items()]
-    files.replace_file(references.with_suffix(".sha256"), "".join(lines).encode())
+    replace_file(references.with_suffix(".sha256"), "".join(lines).encode())
 
 
 def changed_arrays(results: OpenResults) -> dict[str, list[str]]:
     """By scene, the arrays of its reference that are not what was frozen, are new or are gone; [] where all is well.
 
-    Raises StoreError where there is no digest file.
+    Raises
+    ------
+    StoreError
+        Where there is no digest file.
     """
     path = results.path.with_suffix(".sha256")
     try:
@@ -62,11 +79,11 @@ def changed_arrays(results: OpenResults) -> dict[str, list[str]]:
     except (OSError, UnicodeDecodeError) as exc:
         raise StoreError(f"{path}: cannot be read ({exc}); `rotor-mbs reference` writes it") from exc
     frozen = {(row[1], row[2]): row[0] for row in rows if len(row) == 3}
-    found = _digests(results)
+    present = _digests(results)
     scenes: dict[str, list[str]] = {}
-    for scene, name in {**found, **frozen}:
+    for scene, name in {**present, **frozen}:
         changed = scenes.setdefault(scene, [])
-        if frozen.get((scene, name)) != found.get((scene, name)):
+        if frozen.get((scene, name)) != present.get((scene, name)):
             changed.append(name)
     return scenes
 

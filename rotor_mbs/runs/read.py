@@ -1,106 +1,130 @@
-"""Results files read back: scenes and runs by name, arrays when asked for. Needs no engine."""
+"""Results files read back: scenes and runs by name, rows when they are asked for. Needs no engine."""
 
 from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass, replace
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs import digests, files
-from rotor_mbs.runs.layout import SWEEP_IDENTITY, key_of
-from rotor_mbs.scenario.catalogue import RESERVED_GROUPS, natural_order
+from rotor_mbs.runs.results import OF_METHODS, RUNS, TableFile
+from rotor_mbs.runs.table import MISSING, Place, Rows, checksums, text_of
+from rotor_mbs.scenario.catalogue import natural_order
+from rotor_mbs.solution.status import STATUSES
+
+_TEXTS = ("message", "engine_message")
+_OWN_NAMES = {name: quantity for quantity, name in OF_METHODS.items()}
+_ATTEMPTS = 3  # to open a file that is being replaced
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StoredRun:
-    """A run (or the reference) in an open file; what is asked for is read when it is asked for, attributes once.
+    """A run (or the reference) in an open file; its row is read, and verified, when something of it is asked for.
 
-    scene, method    "paper/fig05", "lagrange/taylor" (or "reference")
+    Attributes
+    ----------
+    scene, method : "paper/fig05", "lagrange/taylor" (or "reference").
+    known : what the design says of it: settings, versions, ...
+    scales : time, coordinate, blade, axis, as far as the scene has them.
     """
 
     scene: str
     method: str
-    _group: Any
+    known: Mapping[str, Any]
+    scales: Mapping[str, NDArray[Any]]
+    _labels: tuple[str, ...]
+    _place: Place
+    _file: IO[bytes]
     _verify: bool = True
-    _kept: dict[str, NDArray[Any]] | None = None  # arrays that were read, where they stay in memory
+
+    @functools.cached_property
+    def _row(self) -> Rows:
+        """The columns of its row. Raises StoreError where they are not what was written."""
+        place = f"{self._place.path}: {self.scene}/{self.method}"
+        with files.reading(place):
+            row = self._place.read(file=self._file)
+        if self._verify and (checksums(self._place.first, row, self._place.row) != row["crc32"]).any():
+            raise StoreError(f"{place} changed after it was written")
+        return {_OWN_NAMES.get(name, name): values[0] for name, values in row.items()}
+
+    @functools.cached_property
+    def is_damaged(self) -> bool:
+        """Whether its row is not what was written."""
+        row = self._place.read(file=self._file)
+        return bool((checksums(self._place.first, row, self._place.row) != row["crc32"]).any())
 
     @functools.cached_property
     def attributes(self) -> dict[str, Any]:
-        """Status, message, metrics, times ... as plain values. Raises StoreError where they are damaged."""
-        with self._reading("attributes"):
-            found = files.attributes_of(self._group)
-            self._prove(digests.ATTRIBUTES, lambda: digests.attributes_digest(found))
-            return found
+        """Status, message, metrics, times ... as plain values; those that the run does not have are left out."""
+        facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
+        facts |= {name: text_of(self._row[name]) for name in _TEXTS}
+        for name, value in self._row.items():
+            if name in ("status", "crc32", *_TEXTS) or np.ndim(value):
+                continue
+            number = value.item()
+            if (isinstance(number, int) and number >= 0) or (isinstance(number, float) and number == number):
+                facts[name] = number
+        versions = json.loads(self.known["versions"])
+        if "frozen_with" in versions:
+            facts["frozen_with"] = versions["frozen_with"]
+        return facts
 
     @property
     def status(self) -> str:
-        return str(self.attributes.get("status", ""))
-
-    @property
-    def key(self) -> str:
-        """The content hash of what decides it, read alone and not verified; "" where it has none."""
-        with self._reading("key"):
-            return key_of(self._group.attrs)
+        code = int(self._row["status"])
+        return STATUSES[code] if 0 <= code < len(STATUSES) else ""
 
     @property
     def settings(self) -> dict[str, Any]:
-        with self._reading("settings"):
-            return dict(json.loads(self.attributes.get("settings", "{}")))
+        """Of the method, all of them."""
+        return dict(json.loads(self.known["settings"]))
 
     @property
     def labels(self) -> list[str]:
         """Names of the coordinates: rotor, pitch 1, ...; none where neither angles nor rates are stored."""
-        if "coordinate" not in self._group:
-            return []
-        with self._reading("coordinate"):
-            return [str(label) for label in files.attributes_of(files.member(self._group, "coordinate"))["labels"]]
+        return list(self._labels) if "angles" in self or "rates" in self else []
 
     @property
     def names(self) -> list[str]:
-        """The datasets it has, scales included."""
-        return list(self._group)
+        """The arrays that it has, scales included."""
+        arrays = [name for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS and name in self]
+        return [*self.scales, *arrays]
+
+    @property
+    def samples(self) -> int:
+        return int(self._row["samples"])
 
     def __contains__(self, name: str) -> bool:
-        with self._reading(name):
-            return name in self._group
+        """An array that its method or its scene's outputs do not have is NaN from the first sample on."""
+        if name in self.scales:
+            return True
+        values = self._row.get(name)
+        if values is None or not np.ndim(values) or name in _TEXTS:
+            return False
+        return self.samples == 0 or not np.isnan(values[0]).all()
 
     def array(self, name: str) -> NDArray[Any]:
-        """A dataset, whole. Raises StoreError where the run has none of that name, or it is not what was written."""
-        if self._kept and name in self._kept:
-            return self._kept[name]
+        """(samples, ...) An array, or a scale. Raises StoreError where the run has none of that name."""
         if name not in self:
-            raise StoreError(f"{self._group.file.filename}: {self._group.name} has no readable {name}")
-        with self._reading(name):
-            dataset = files.member(self._group, name)
-            values = files.values_of(dataset)
-            self._prove(name, lambda: digests.dataset_digest(values, dataset.attrs))
-        if self._kept is not None:
-            self._kept[name] = values
+            raise StoreError(f"{self._place.path}: {self.scene}/{self.method} has no {name}")
+        if name in self.scales:
+            return self.scales[name][: self.samples] if name == "time" else self.scales[name]
+        values: NDArray[Any] = self._row[name][: self.samples]
         return values
 
     def get(self, name: str) -> NDArray[Any] | None:
-        """A dataset, whole; None where the run has none of that name."""
+        """As `array`; None where the run has none of that name."""
         return self.array(name) if name in self else None
-
-    @functools.cached_property
-    def _digests(self) -> dict[str, str]:
-        return digests.stored_digests(self._group.attrs)
-
-    def _reading(self, part: str) -> AbstractContextManager[None]:
-        return files.reading(self._group.file.filename, f"{self._group.name}: {part}")
-
-    def _prove(self, part: str, found: Callable[[], str]) -> None:
-        """Files of earlier versions, and shipped references, have no digests here."""
-        if self._verify and self._digests and self._digests.get(part) != found():
-            raise StoreError(f"{self._group.file.filename}: {self._group.name}: {part} changed after it was written")
 
 
 @dataclass(frozen=True)
@@ -127,110 +151,69 @@ class StoredScene:
 
 @dataclass(frozen=True)
 class OpenResults:
-    """An open results file: its attributes (versions, platform, created) and its scenes by name, in file order."""
+    """An open results file: its attributes (versions, platform, created) and its scenes by name, in natural order."""
 
     path: Path
     attributes: dict[str, Any]
     scenes: dict[str, StoredScene]
-    root: Any
 
 
 @contextmanager
 def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
-    """An open results file. What is read of it is compared with its digests, but for verify=False.
+    """An open results file. A run is compared with its checksum when it is read, but for verify=False.
 
-    Raises StoreError where `path` is not a results file of this program, or is damaged.
+    A file that replaces it meanwhile is not seen.
+
+    Raises
+    ------
+    StoreError
+        Where `path` is not a results file of this program, or what was laid out has changed.
     """
-    with files.open_file(path) as file:
-        with files.reading(path):
-            scenes = {scene.name: scene for scene in _scenes(file, "", verify, {files.address(file)})}
-            attributes = files.attributes_of(file)
-        yield OpenResults(path, attributes, scenes, file)
-
-
-def in_memory(opened: OpenResults) -> OpenResults:
-    """An open file with its scenes in order, and with arrays that are read once: pages ask for each some six times."""
-    scenes = (opened.scenes[name] for name in natural_order(opened.scenes))
-    kept = {one.name: {name: replace(run, _kept={}) for name, run in one.runs.items()} for one in scenes}
-    return replace(opened, scenes={name: replace(opened.scenes[name], runs=runs) for name, runs in kept.items()})
+    with files.open_file(path) as h5, files.reading(path):
+        attributes = files.attributes_of(h5)
+    for _ in range(_ATTEMPTS):
+        with path.open("rb") as file:
+            stored = TableFile(path)
+            if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
+                continue
+            with files.reading(path):
+                scenes = {scene.name: scene for scene in _scenes(stored, file, verify)}
+            yield OpenResults(path, attributes, {name: scenes[name] for name in natural_order(scenes)})
+            return
+    raise StoreError(f"{path}: is being replaced by another process")
 
 
 def is_sweep(path: Path) -> bool:
     """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
     with files.open_file(path) as file, files.reading(path):
-        return SWEEP_IDENTITY in file.attrs
+        return "run" in file
 
 
-def _scenes(group: Any, name: str, verify: bool, seen: set[int]) -> Iterator[StoredScene]:
-    """`seen`: addresses of the groups above and before: each is looked into once."""
-    for key, item in files.members(group):
-        if not files.is_group(item) or (not name and key in RESERVED_GROUPS) or files.address(item) in seen:
-            continue
-        seen.add(files.address(item))
-        path = f"{name}/{key}" if name else key
-        if "scene_hash" in item.attrs:
-            known, attributes = digests.stored_digests(item.attrs) if verify else {}, files.attributes_of(item)
-            if known and known.get(digests.ATTRIBUTES) != digests.attributes_digest(attributes):
-                raise StoreError(f"{item.file.filename}: {item.name}: attributes changed after they were written")
-            runs = {run.method: run for run in _runs(item, path, verify)}
-            yield StoredScene(path, attributes, runs)
-        else:
-            yield from _scenes(item, path, verify, seen)
+def damages(path: Path) -> dict[str, list[str]]:
+    """Parts of a results file's groups that are not what was laid out, by group; the root is "file"."""
+    with files.open_file(path) as file, files.reading(path):
+        places = {(str(group.name).strip("/") or "file"): digests.damages_of(group) for group in files.groups_in(file)}
+    return {place: parts for place, parts in places.items() if parts}
 
 
-def _runs(group: Any, scene: str, verify: bool) -> Iterator[StoredRun]:
-    for model, item in files.members(group):
-        if model == REFERENCE:
-            yield StoredRun(scene, model, item, verify)
-        elif files.is_group(item):
-            for integrator, run in files.members(item):
-                yield StoredRun(scene, f"{model}/{integrator}", run, verify)
-
-
-def damages_of(group: Any) -> list[str]:
-    """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
-
-    "digests" where it has none. Links, and arrays that cannot be read, count too.
-    """
-    try:
-        known = digests.stored_digests(group.attrs)
-    except ValueError:
-        known = {}
-    if not known:
-        return [digests.DIGESTS]
-    unfilled = digests.unfilled_in(known)
-    found = {digests.ATTRIBUTES: _digest(group, attributes_alone=True)}
-    for name in group:
-        item, is_unfilled = _member(group, name), name in unfilled
-        if not files.is_group(item):
-            found[digests.unfilled(name) if is_unfilled else name] = _digest(item, attributes_alone=is_unfilled)
-    return [name for name in {**known, **found} if known.get(name) != found.get(name)]
-
-
-def _member(group: Any, name: str) -> Any:
-    """None where it is a link, or cannot be read."""
-    with suppress(StoreError), files.reading(""):
-        return files.member(group, name)
-    return None
-
-
-def _digest(item: Any, *, attributes_alone: bool) -> str:
-    """ "" where there is none, or its content cannot be read."""
-    with suppress(StoreError), files.reading(""):
-        if attributes_alone:
-            return digests.attributes_digest(item.attrs)
-        return digests.dataset_digest(files.values_of(item), item.attrs)
-    return ""
-
-
-def all_damages(group: Any, seen: set[int] | None = None) -> Iterator[tuple[str, str]]:
-    """(path, part) of whatever is damaged in a group and the groups below it; at most once each."""
-    seen = set() if seen is None else seen
-    if files.address(group) in seen:
+def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[StoredScene]:
+    if RUNS not in stored.tables:
         return
-    seen.add(files.address(group))
-    yield from ((str(group.name).strip("/"), part) for part in damages_of(group))
-    for name in group:
-        item = _member(group, name)
-        if files.is_group(item):
-            yield from all_damages(item, seen)
+    runs = stored.tables[RUNS]
+    file.seek(runs.filled["status"].offset)
+    statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
+    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"][1]}
+    for i, run in enumerate(runs.runs.tolist()):
+        if statuses[i] == MISSING:
+            continue
+        known = stored.known(RUNS, i)
+        scene = str(known["scene"])
+        arrays = stored.tables[scene]
+        scales = {name: values for name, (_, values) in arrays.scales.items()}
+        labels = tuple(map(str, arrays.labels.get("coordinate", ())))
+        by_scene[scene].append(
+            StoredRun(scene, str(known["method_name"]), known, scales, labels, stored.place(run), file, verify)
+        )
+    for scene, found in by_scene.items():
+        if found:
+            yield StoredScene(scene, dict(stored.tables[scene].attributes), {run.method: run for run in found})

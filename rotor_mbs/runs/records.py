@@ -1,16 +1,15 @@
-"""Records beside the runs of a results file: arrays and attributes in a group of their own.
+"""What studies store beside runs: tables of points, and groups of arrays with dimensions of their own.
 
-    /bench/<scene>/<method>                  error against run time over `setting`
-    /stability/<kind>/<scene>/<method>       step ladders, stability limits and conservation over `row`
-    /errata                                  the check of the printed entries over `row`
-    /modes/<scene>/<model>/<kind>            modes over speed; its arrays have dimensions of their own
-    /claims/shares, /claims/numbers          the paper's claims from many starts, its numbers under other conditions
-    /comparison/<scene>/data/trajectory      data of another program and the reference at their times
-Writes and reads them; judges nothing.
+    /bench                          a row per point of a curve: a method at one setting on a scene
+    /stability                      a row per step of a ladder: a fixed-step method on a scene
+    /stability_limits, /symmetry    a row per method and scene: numbers of many runs
+    /modes/<scene>/<model>/<kind>   modes over speed, in a file of modes
+    /comparison/<scene>/data/trajectory   data of another program and the reference at their times
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,76 +19,109 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs import files
-from rotor_mbs.runs.digests import DIGESTS
-from rotor_mbs.runs.layout import Column, key_of
-from rotor_mbs.runs.read import damages_of
-from rotor_mbs.solution.status import STATUSES, recode
+from rotor_mbs.runs import digests, files
+from rotor_mbs.runs.files import CHARACTERS, Column
+from rotor_mbs.runs.results import TableFile
+from rotor_mbs.runs.table import CHARACTER, MISSING, Place, Rows, Table, blank_rows, characters, text_of
+from rotor_mbs.solution.status import STATUSES, code_of
 
-# The scene's place in a record of how cost scales with blades or duration.
-COST_SCALING = "growth"
+_MESSAGE_LENGTH = 300
 
-# By kind.
-_FOLDERS = {
-    folder.rpartition("/")[2]: folder
-    for folder in (
-        "bench", "stability/steps", "stability/limits", "stability/conservation", "errata", "modes", "claims",
-        "comparison",
-    )
-}  # fmt: skip
-_DIMENSIONS = {"bench": "setting"}  # of the others: row
-_SETTING_UNITS = {"step": "s", "tolerance": "1", "blades": "1", "duration": "s"}
-_INTEGERS = ("repeats", "steps", "status", "false_success")
 
-# Units and long name of every array over rows or settings that a record, or the summary of the runs, may have.
-COLUMNS = {
-    "angle_error_max": ("rad", "largest angle error up to the horizon"),
-    "angle_error_end": ("rad", "angle error at the last sample"),
-    "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
-    "energy_drift_max": ("1", "largest energy error over the run, of the energy scale"),
-    "horizon_s": ("s", "last sample before the error growth reaches 1e5, or the end"),
-    "time_reached": ("s", "time of the last sample"),
-    "run_time_s": ("s", "median run time of the integration alone"),
-    "run_time_min_s": ("s", "shortest run time"),
-    "run_time_q1_s": ("s", "lower quartile of the run times"),
-    "run_time_q3_s": ("s", "upper quartile of the run times"),
-    "setup_time_s": ("s", "building the model, everything compiled anew"),
-    "setup_again_time_s": ("s", "building the model a second time"),
-    "output_time_s": ("s", "reading out and computing the samples"),
-    "simulated_s": ("s", "duration of the scene"),
-    "repeats": ("1", "timed runs"),
-    "steps": ("1", "steps of one run"),
-    "status": ("1", "how the run ended, from its state"),
-    "false_success": ("1", "1 where the engine reported success and the state says otherwise"),
-    "step": ("s", "fixed step"),
-    "time": ("s", "time"),
-    "energy_drift_rms": ("1", "energy error over perturbed starts, root mean square, of its scale"),
-    "difference": ("1", "largest relative difference of a printed entry from the derivative"),
-    "agrees": ("1", "1 where the printed entry is the derivative"),
-    "duration": ("s", "duration of the runs"),
-    "share": ("1", "share of the deciding runs in which the claim holds"),
-    "deciding": ("1", "runs that decide, of those from moved starts"),
-    "relative_tolerance": ("1", "relative tolerance of ode45"),
-    "absolute_tolerance": ("rad", "absolute tolerance of ode45, also in rad/s"),
-    "remainder": ("N m", "moment of the weights at the start of Fig. 5, zero but for rounding"),
-    "angle": ("rad", "the number where it is an angle, else NaN"),
-    "rate": ("rad/s", "the number where it is a rate, else NaN"),
-    "reproduced": ("1", "1 where the number has the printed digits"),
+def _column(units: str, long_name: str, kind: str = "<f8") -> Column:
+    return Column(("run",), units, long_name, kind)
+
+
+_MESSAGE = Column(("run", CHARACTERS), "1", "why it did not end well", CHARACTER)
+_STATUS = _column("1", "how the run ended, from its state; -1 while it is missing", "i1")
+_CHECKSUM = _column("1", "CRC-32 of the row in all computed columns", "<u4")
+_ERRORS = {
+    "angle_error_max": _column("rad", "largest angle error up to the horizon"),
+    "angle_error_end": _column("rad", "angle error at the last sample"),
+    "tip_error_max": _column("m", "largest distance of a tip from the reference up to the horizon"),
+    "energy_drift_max": _column("1", "largest energy error over the run, of the energy scale"),
 }
+_FALSE = _column("1", "1 where the engine reported success and the state says otherwise", "i1")
+
+# The computed columns of each table of points.
+COLUMNS: Mapping[str, Mapping[str, Column]] = {
+    "bench": {
+        "status": _STATUS,
+        "message": _MESSAGE,
+        **_ERRORS,
+        "run_time_s": _column("s", "median run time of the integration alone"),
+        "run_time_min_s": _column("s", "shortest run time"),
+        "run_time_q1_s": _column("s", "lower quartile of the run times"),
+        "run_time_q3_s": _column("s", "upper quartile of the run times"),
+        "setup_time_s": _column("s", "building the model, everything compiled anew"),
+        "setup_again_time_s": _column("s", "building the model a second time"),
+        "output_time_s": _column("s", "reading out and computing the samples"),
+        "repeats": _column("1", "timed runs", "<i8"),
+        "steps": _column("1", "steps of one run", "<i8"),
+        "false_success": _FALSE,
+        "left_out": _column("1", "1 where the time budget left the point out", "i1"),
+        "horizon_s": _column("s", "horizon of the scene"),
+        "uncertainty_rad": _column("rad", "uncertainty of the reference up to the horizon"),
+        "samples": _column("1", "samples at which errors are taken", "<i8"),
+        "load_before": _column("1", "load of the machine before the scene was timed"),
+        "pinned_core": _column("1", "core that the runs were timed on, -1 for any", "<i8"),
+        "repeatable": _column("1", "1 where the last run of every point of the curve was bit for bit its first", "i1"),
+        "order": _column("1", "order of convergence of the curve, fitted above its round-off floor"),
+        "crc32": _CHECKSUM,
+    },
+    "stability": {
+        "status": _STATUS,
+        "message": _MESSAGE,
+        "angle_error_max": _ERRORS["angle_error_max"],
+        "energy_drift_max": _ERRORS["energy_drift_max"],
+        "false_success": _FALSE,
+        "step_for_target_s": _column("s", "step at which the ladder reaches 1e-6 rad"),
+        "crc32": _CHECKSUM,
+    },
+    "stability_limits": {
+        "status": _STATUS,
+        "message": _MESSAGE,
+        "largest_stable_step_s": _column("s", "largest stable step, by bisection"),
+        "theory_s": _column("s", "largest stable step by the stability function"),
+        "fastest_mode_per_s": _column("1/s", "largest eigenvalue of the pitches"),
+        "mode_damping_ratio": _column("1", "damping ratio of the fastest mode"),
+        "crc32": _CHECKSUM,
+    },
+    "symmetry": {
+        "status": _STATUS,
+        "message": _MESSAGE,
+        "mirror_error": _column("rad", "error of the mirrored scene's motion"),
+        "relabelling_error": _column("rad", "error of the motion with renumbered blades"),
+        "reversal_error": _column("rad", "error at the start after going there and back"),
+        "angular_momentum_drift": _column("1", "relative change of the angular momentum about the shaft"),
+        "crc32": _CHECKSUM,
+    },
+}
+_KNOWN = {
+    "scene": "scene",
+    "method_name": "method, model/integrator",
+    "curve": "method with its fixed choices",
+    "setting_kind": "what varies along the curve",
+    "settings": "settings of the point, JSON",
+    "options": "of the study, JSON",
+    "versions": "versions of what computed the point, JSON",
+    "scene_hash": "SHA-256 of the scene's numbers",
+}
+_UNITS = {"step": ("s", "fixed step"), "tolerance": ("1", "tolerance"), "order_expected": ("1", "order of the method")}
 
 
 @dataclass(frozen=True)
 class Record:
-    """What a study stores beside runs.
+    """A curve of a bench, a ladder of steps, or another group of arrays that belong together.
 
     Attributes
     ----------
-    kind : "bench", "steps", "limits", "conservation", "errata", "modes", "claims" or "comparison".
-    scene : "paper/fig05"; "" where the record belongs to no scene.
+    kind : "bench", "stability", "stability_limits", "symmetry", "modes" or "comparison".
+    scene : "paper/fig05".
     name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
-    attributes : plain values; the key of what decides the numbers among them.
+    attributes : plain values.
     arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
-    columns : what the arrays are, scales first, where they are not the ones of all studies; for writing alone.
+    columns : what the arrays are, scales first; for writing alone.
     """
 
     kind: str
@@ -100,18 +132,8 @@ class Record:
     columns: Mapping[str, Column] = field(default_factory=dict)
 
     @property
-    def path(self) -> str:
-        """The group in a results file."""
-        return "/".join(part for part in (_FOLDERS[self.kind], self.scene, self.name) if part)
-
-    @property
     def method(self) -> str:
         return str(self.attributes.get("method", self.name))
-
-    @property
-    def key(self) -> str:
-        """`Case.key` of what decides the record; "" where it has none."""
-        return key_of(self.attributes)
 
     @property
     def statuses(self) -> list[str]:
@@ -123,70 +145,122 @@ class Record:
         return [str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))]
 
 
-def write_records(path: Path, records: Sequence[Record]) -> None:
-    """A results file with these records alone, atomically. Raises StoreError."""
-    with files.new_file(path) as file:
-        for record in records:
-            _put_record(file, record)
+# Tables of points
 
 
-def _put_record(file: Any, record: Record) -> None:
-    group = files.new_group(file, record.path)
-    files.put_attributes(group, {"record": 1, **record.attributes})
-    for name, column in record.columns.items():
-        dataset = files.put(group, name, np.asarray(record.arrays[name]), column)
-        if f"{name}_labels" in record.attributes:
-            files.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
-    if record.columns:
-        return
-    dimension = _DIMENSIONS.get(record.kind, "row")
-    if dimension == "setting":
-        kind = str(record.attributes["setting_kind"])
-        scale = Column((dimension,), _SETTING_UNITS[kind], kind)
-        files.put_attributes(files.put(group, dimension, record.arrays[dimension], scale), {"kind": kind})
-    elif record.arrays:
-        rows = np.arange(len(next(iter(record.arrays.values()))))
-        files.put(group, dimension, rows, Column((dimension,), "1", "number of the row"))
-    for name, (units, long_name) in COLUMNS.items():
-        if name in record.arrays:
-            values = np.asarray(record.arrays[name])
-            values = values.astype(np.int64) if name in _INTEGERS else values
-            dataset = files.put(group, name, values, Column((dimension,), units, long_name))
-            if name == "status":
-                files.put_flags(dataset, STATUSES)
+def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
+    """The table of these points.
+
+    Parameters
+    ----------
+    group : a key of `COLUMNS`.
+    points : of each the known columns by name: texts ("run", its label, "scene", "method_name", ...), and numbers.
+    """
+    known: dict[str, tuple[Column, Any]] = {
+        name: (Column(("run",), "1", long_name), [str(point[name]) for point in points])
+        for name, long_name in _KNOWN.items()
+        if points and name in points[0]
+    }
+    for name, (units, long_name) in _UNITS.items():
+        if points and name in points[0]:
+            known[name] = Column(("run",), units, long_name), np.array([float(str(point[name])) for point in points])
+    scales = {CHARACTERS: (Column((CHARACTERS,), "1", ""), np.empty(_MESSAGE_LENGTH, np.int8))}
+    return Table(group, [str(point["run"]) for point in points], known, COLUMNS[group], scales)
+
+
+def row_of_point(place: Place, status: str, message: str, values: Mapping[str, object]) -> Rows:
+    """The row of a point; values: by column."""
+    row = blank_rows(1, place.row)
+    row["status"][0], row["message"][0] = code_of(status), characters(message, row["message"].shape[1])
+    for name, value in values.items():
+        if name in row:
+            row[name][0] = value
+    return row
 
 
 def read_records(path: Path, *kinds: str) -> list[Record]:
-    """The records of a results file, of these kinds or of all, in the order of the file. Raises StoreError."""
+    """The records of a file, of these kinds, in the order of the file. Raises StoreError.
+
+    A curve of which a point is missing is left out.
+    """
     with files.open_file(path) as file, files.reading(path):
-        return [read_record(name, group) for name, group in records_in(file, *kinds)]
+        there = [kind for kind in kinds if kind in file]
+        tables = [kind for kind in there if kind in COLUMNS]
+        groups = [record for kind in there if kind not in tables for record in _group_records(file, kind)]
+        has_points = {kind for kind in tables if "run" in file[kind]}
+    if not has_points:
+        return groups
+    stored = TableFile(path)
+    return [record for kind in kinds if kind in has_points for record in _point_records(stored, kind)] + groups
 
 
-def records_in(file: Any, *kinds: str) -> Iterator[tuple[str, Any]]:
-    """(path, group) of every record in an open file, of these kinds or of all."""
-    for kind in kinds or _FOLDERS:
-        folder = _FOLDERS[kind]
-        if folder in file:
-            yield from _leaves(file[folder], folder)
+def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
+    """The rows of a table that belong to one curve, one ladder, or one method and scene."""
+    stored = file.tables[kind]
+    rows: dict[tuple[str, str], list[int]] = {}
+    for i in range(len(stored.runs)):
+        known = file.known(kind, i)
+        rows.setdefault((known["scene"], known.get("curve", known["method_name"])), []).append(i)
+    for (scene, name), numbers in rows.items():
+        values = []
+        for i in numbers:
+            place = file.place(stored.runs[i], kind)
+            row = place.read()
+            if place.stored(row["status"])[0] == MISSING:
+                break
+            values.append({column: array[0] for column, array in row.items()})
+        if len(values) < len(numbers):
+            continue
+        points = [file.known(kind, i) for i in numbers]
+        known = points[0]
+        arrays = {column: np.array([row[column] for row in values]) for column in values[0]}
+        messages = [text_of(text) for text in arrays.pop("message")]
+        arrays |= {column: np.array([row[column] for row in points]) for column in _UNITS if column in known}
+        setting_kind = str(known.get("setting_kind", "step"))
+        if setting_kind in arrays:
+            arrays["setting"] = arrays[setting_kind]
+        if kind == "stability":  # steps that were not needed
+            used = [i for i, row in enumerate(values) if row["status"] != code_of("left_out")]
+            arrays = {column: array[used] for column, array in arrays.items()}
+        facts: dict[str, Any] = {}
+        for column in arrays:
+            value = values[0][column].item() if column in values[0] else float("nan")
+            if value == value and column != "status":
+                facts[column] = value
+        facts |= {"messages": messages, "method": known["method_name"], "setting_kind": setting_kind}
+        facts |= {column: known[column] for column in ("scene_hash", "order_expected") if column in known}
+        facts |= json.loads(known.get("options", "{}"))
+        if facts.get("order_expected") != facts.get("order_expected"):  # NaN: an adaptive method has none
+            del facts["order_expected"]
+        yield Record(kind, scene, name, facts, arrays)
 
 
-def _leaves(group: Any, path: str) -> Iterator[tuple[str, Any]]:
-    """A record has arrays, or says that it is one; the errata are one record."""
-    if "record" in group.attrs or path == "errata" or not all(files.is_group(item) for item in group.values()):
-        yield path, group
-    else:
-        for name, item in files.members(group):
-            yield from _leaves(item, f"{path}/{name}")
+# Groups of arrays
 
 
-def read_record(path: str, group: Any) -> Record:
-    """The record in a group of an open file, by its path in the file. Raises StoreError where it is damaged."""
-    damages = [part for part in damages_of(group) if part != DIGESTS]
-    if damages:
-        raise StoreError(f"{group.file.filename}: {path}: {', '.join(damages)} changed after they were written")
-    kind = next(kind for kind, folder in _FOLDERS.items() if path == folder or path.startswith(f"{folder}/"))
-    parts = path.removeprefix(_FOLDERS[kind]).strip("/").split("/")
-    arrays = {name: item[()] for name, item in group.items() if name != "row" and not files.is_group(item)}
-    if "status" in arrays:
-        arrays["status"] = recode(arrays["status"], group["status"].attrs)
-    return Record(kind, "/".join(parts[:-2]), "/".join(parts[-2:]), files.attributes_of(group), arrays)
+def write_records(path: Path, records: Sequence[Record]) -> None:
+    """A file with these records alone, atomically. Raises StoreError."""
+    with files.new_file(path) as file:
+        for record in records:
+            group = files.new_group(file, "/".join((record.kind, record.scene, record.name)))
+            files.put_attributes(group, {"record": 1, **record.attributes})
+            for name, column in record.columns.items():
+                dataset = files.put(group, name, np.asarray(record.arrays[name]), column)
+                if f"{name}_labels" in record.attributes:
+                    files.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
+        digests.seal_all(file)
+
+
+def _group_records(file: Any, kind: str) -> Iterator[Record]:
+    for group in files.groups_in(file[kind]):
+        if "record" not in group.attrs:
+            continue
+        damages = [part for part in digests.damages_of(group) if part != files.DIGESTS]
+        path = str(group.name).strip("/")
+        if damages:
+            raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")
+        parts = path.removeprefix(f"{kind}/").split("/")
+        arrays = {name: files.values_of(item) for name, item in group.items() if not files.is_group(item)}
+        yield Record(kind, "/".join(parts[:-2]), "/".join(parts[-2:]), files.attributes_of(group), arrays)
+
+

@@ -1,4 +1,4 @@
-"""What the results depend on besides scene and method: versions, machine, and the text of our own numerics."""
+"""What the results depend on besides scene and method: versions, machine, and the program's own code."""
 
 from __future__ import annotations
 
@@ -6,14 +6,24 @@ import functools
 import hashlib
 import importlib.metadata
 import platform
+import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import rotor_mbs
+from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.runs import cores
 
-_OWN = ("numpy", "h5py")
-NUMERICS = ("scenario", "solution", "methods", "models")  # sources that decide a run's numbers
+_LIBRARIES = ("numpy", "h5py")
+NUMERICS = ("scenario", "solution", "methods", "models")  # folders of the package that decide a run's numbers
+# Docstrings, and comments outside of strings.
+_WITHOUT_EFFECT = re.compile(
+    r'^[ \t]*[rR]?"""(?:[^\\]|\\.)*?"""[ \t]*$'
+    r'|("""(?:[^\\]|\\.)*?"""|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\')'
+    r"|[ \t]*#[^\n]*",
+    re.DOTALL | re.MULTILINE,
+)
 
 
 def versions() -> dict[str, str]:
@@ -24,13 +34,19 @@ def versions() -> dict[str, str]:
 @functools.cache
 def versions_with(*distributions: str) -> dict[str, str]:
     """Versions of this package, of Python, of the libraries that every method uses, and of `distributions`."""
-    found = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
-    for name in dict.fromkeys((*distributions, *_OWN)):
+    known = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
+    for name in dict.fromkeys((*distributions, *_LIBRARIES)):
         try:
-            found[name] = importlib.metadata.version(name)
+            known[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            known[name] = "not installed"
+    return known
+
+
+def row_versions(method: Method) -> dict[str, str]:
+    """What computes a run by this method: versions, a digest of the code, and one of a plug-in's own code."""
+    own = {"plug-in": code_digest(tuple(method.sources))} if method.sources else {}
+    return {**versions_with(*method.distributions), "code": numerics_digest(), **own}
 
 
 @functools.cache
@@ -49,17 +65,26 @@ def _processor() -> str:
 
 
 @functools.cache
-def fingerprint(*parts: str) -> str:
-    """sha256 over every file of this package in `parts`, which are folders or files: a changed model makes stored runs
-    stale.
-
-    Without what Python keeps of them: a process that compiles them has files of passing names there.
-    """
+def numerics_digest() -> str:
+    """Of the part of this package that decides a run's numbers."""
     package = Path(rotor_mbs.__file__).parent
+    return code_digest(tuple(path for part in NUMERICS for path in sorted((package / part).rglob("*.py"))))
+
+
+@functools.cache
+def code_digest(sources: tuple[Path, ...]) -> str:
+    """Twelve hexadecimal digits of a SHA-256 over source files, without comments, docstrings and empty lines."""
     digest = hashlib.sha256()
-    for part in parts:
-        for path in sorted({package / part, *(package / part).rglob("*")}):
-            if path.parent.name != "__pycache__" and path.is_file():
-                digest.update(str(path.relative_to(package)).encode())
-                digest.update(path.read_bytes())
+    for path in sources:
+        text = _WITHOUT_EFFECT.sub(lambda match: match[1] or "", path.read_text(encoding="utf-8", errors="replace"))
+        digest.update("\n".join(line.rstrip() for line in text.splitlines() if line.strip()).encode())
+    return digest.hexdigest()[:12]
+
+
+@functools.cache
+def files_digest(files: Iterable[Path]) -> str:
+    """SHA-256 over the bytes of files."""
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""Error against run time: each curve is a case, one method over its ladder of settings on one scene.
+"""Error against run time: curves of methods over ladders of settings, a row per point in the table /bench.
 
 The curves of a scene are timed together, in rounds over all their points, by one worker process on one core.
 """
@@ -9,10 +9,9 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -20,29 +19,96 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import ladders, settings_for
-from rotor_mbs.methods.ladders import STEP, Ladder
+from rotor_mbs.methods.catalogue import find_method, ladders, settings_for
+from rotor_mbs.methods.ladders import STEP, TOLERANCE, Ladder
 from rotor_mbs.runs import last_core
-from rotor_mbs.runs.case import Case
-from rotor_mbs.runs.layout import KEY_ATTRIBUTE
+from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
-from rotor_mbs.runs.records import Record, write_records
-from rotor_mbs.runs.results_file import ResultsStore
-from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress
-from rotor_mbs.runs.timing import Timings, conduct, statistics
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.runs.records import points_table, row_of_point
+from rotor_mbs.runs.results import TableFile, fit
+from rotor_mbs.runs.table import Place, Rows, Table
+from rotor_mbs.runs.versions import row_versions
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import horizon, horizon_samples
-from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.studies.bench_worker import ERRORS, Point, PointScenes, ask, prepared_scene, start_timer
-from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
+from rotor_mbs.studies.bench_timing import Timings, conduct, statistics
+from rotor_mbs.studies.bench_worker import ERRORS, Point, PointScenes, ask, prepared_scene, start_timer, thinned
+from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, is_stored, run_scenes
 
 BENCH = "bench"
-SOURCES = ("studies/bench.py", "studies/bench_worker.py", "runs/timing.py")
 
 _REFERENCE_LIMIT_S = 60.0
 # A run longer than this is ended: a hanging engine must not eat the budget of the others.
 _RUN_LIMIT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A method over its ladder of settings on one scene: consecutive rows of the table.
+
+    Attributes
+    ----------
+    scene, ladder : what is measured.
+    options : of the study, stored with each point.
+    """
+
+    scene: Scene
+    ladder: Ladder
+    options: Mapping[str, object]
+
+    @property
+    def label(self) -> str:
+        return f"{self.scene.name} {self.ladder.curve} bench"
+
+    @property
+    def first_run(self) -> str:
+        """The label of its first row."""
+        return str(self.rows[0]["run"])
+
+    @property
+    def rows(self) -> list[dict[str, object]]:
+        """The known columns of its points."""
+        method = find_method(self.ladder.method)
+        known: dict[str, object] = {
+            "scene": self.scene.name,
+            "method_name": method.name,
+            "curve": self.ladder.curve,
+            "setting_kind": self.ladder.kind,
+            "versions": json.dumps(row_versions(method), sort_keys=True),
+            "scene_hash": scene_hash(self.scene),
+            "options": json.dumps({**self.options, "duration_s": self.scene.duration}, sort_keys=True),
+            "order_expected": math.nan if self.ladder.order is None else self.ladder.order,
+        }
+        rows = []
+        short, _ = thinned(self.scene)
+        for setting, chosen in self.ladder.rungs(short.duration / (short.samples - 1)).items():
+            settings = method.settings.of(method.name, chosen).as_dict()
+            row = known | {"settings": json.dumps(settings, sort_keys=True)}
+            row |= {kind: setting if kind == self.ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
+            rows.append(row | {"run": f"{self.scene.name}/{self.ladder.curve} {self.ladder.kind}={setting:.6g}"})
+        return rows
+
+
+def bench_table(curves: Sequence[Curve]) -> Table:
+    """The table of the points of these curves."""
+    return points_table(BENCH, [row for curve in curves for row in curve.rows])
+
+
+def replaced_points(output: Path, curves: Sequence[Curve]) -> list[tuple[str, str]]:
+    """(group, run) of stored points of these curves that are no longer among them."""
+    if not output.exists():
+        return []
+    stored = TableFile(output).tables.get(BENCH)
+    if stored is None:
+        return []
+    labels = {(curve.scene.name, curve.ladder.curve): [row["run"] for row in curve.rows] for curve in curves}
+    owners = zip(stored.runs, stored.known["scene"][1], stored.known["curve"][1], strict=True)
+    return [(BENCH, run) for run, scene, name in owners if run not in labels.get((scene, name), [run])]
+
+
+def is_measured(file: TableFile, curve: Curve) -> bool:
+    """Whether every point of the curve is stored."""
+    return all(is_stored(file.place(str(row["run"]), BENCH)) for row in curve.rows)
 
 
 def run_bench(
@@ -58,33 +124,55 @@ def run_bench(
 ) -> tuple[list[Outcome], list[str]]:
     """The curves of every scene into the results file `output`; what it has already is kept.
 
-    Returns the curves measured by this call, and a line for each method that is left out on a scene.
+    Parameters
+    ----------
+    methods : whose ladders are measured; all where none is named.
+    repeats : timed runs of each point at most.
+    budget_s : s, for all curves of a scene.
+    workers : processes that compute references before the first curve is timed.
+    settings : of the methods that have them, the same at every point.
 
-    methods     whose ladders are measured; all where none is named
-    repeats     timed runs of each point at most
-    budget_s    s, for all curves of a scene
-    workers     processes that compute references before the first curve is timed
-    settings    of the methods that have them, the same at every point
+    Returns
+    -------
+    The curves measured by this call, and a line for each method that is left out on a scene.
 
-    Raises InputError for a method without a ladder and for a scene without a usable reference, StoreError.
+    Raises
+    ------
+    InputError
+        For a method without a ladder and for a scene without a usable reference.
+    StoreError
+        Where the file cannot be read or written.
     """
     chosen = with_settings(ladders(methods), settings or {})
-    _complete_references(scenes, output, workers)
-    for scene in scenes:  # refused before the first is measured
-        prepared_scene(scene, output)
-    cases: list[Case] = []
-    left_out: list[str] = []
-    for scene in scenes:
-        able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
-        cases += [_bench_case(scene, ladder, repeats, budget_s) for ladder in chosen if ladder.method in able]
-        left_out += refused
-    return execute(cases, _time_by_scene, ResultsStore(output), on_progress), left_out
+    with writing(output):
+        changed = _complete_references(scenes, output, workers)
+        # Refused before the first is measured.
+        prepared = {scene.name: prepared_scene(scene, output) for scene in scenes}
+        curves: list[Curve] = []
+        left_out: list[str] = []
+        options = {"repeats": repeats, "budget_s": budget_s}
+        for scene in scenes:
+            able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
+            curves += [Curve(scene, ladder, options) for ladder in chosen if ladder.method in able]
+            left_out += refused
+        file = fit(output, [bench_table(curves)], replaced_points(output, curves))
+        missing = [curve for curve in curves if curve.scene.name in changed or not is_measured(file, curve)]
+        made: list[Outcome] = []
+        for scene in scenes:
+            own = [curve for curve in missing if curve.scene.name == scene.name]
+            for outcome in _measure_scene(file, own, *prepared[scene.name], repeats, budget_s) if own else ():
+                made.append(replace(outcome, share=(len(made) + 1) / len(missing)))
+                on_progress(len(made), len(missing), made[-1])
+        return made, left_out
 
 
 def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> list[Ladder]:
     """The ladders with these settings fixed, where their methods have them and they are no choice of the ladder itself.
 
-    Raises InputError for a setting that no method has, that is not allowed, or that a ladder varies.
+    Raises
+    ------
+    InputError
+        For a setting that no method has, that is not allowed, or that a ladder varies.
     """
     own = settings_for(list(dict.fromkeys(ladder.method for ladder in chosen)), settings)
     varied = {name for ladder in chosen for name in ladder.fill(1.0) if name in own[ladder.method]}
@@ -93,68 +181,84 @@ def with_settings(chosen: Sequence[Ladder], settings: Mapping[str, object]) -> l
     return [replace(ladder, choices={**own[ladder.method], **ladder.choices}) for ladder in chosen]
 
 
-def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) -> None:
+def _complete_references(scenes: Sequence[Scene], output: Path, workers: int) -> set[str]:
+    """The names of the scenes whose reference this call computed or read."""
     none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
     report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
     failed = [*report.failures, *report.not_computed]
     if failed:
         raise InputError(
-            f"{one.case.scene.name}: no usable reference ({one.result.status}: {one.result.message}); a bench needs one"
-            for one in failed
+            f"{run.label.partition(' ')[0]}: no usable reference ({run.status}: {run.message}); a bench needs one"
+            for run in failed
         )
+    return {run.label.partition(" ")[0] for run in report.made}
 
 
-def _bench_case(scene: Scene, ladder: Ladder, repeats: int, budget_s: float) -> Case:
-    rungs = [[setting, sorted(settings.items())] for setting, settings in ladder.rungs(1.0).items()]
-    options = {"curve": ladder.curve, "rungs": rungs, "repeats": repeats, "budget_s": budget_s}
-    return Case(scene, ladder.method, ladder.choices, BENCH, options, reference_case(scene).key, SOURCES)
-
-
-def store_curve(job: Job, record: Record) -> Result:
-    """Writes the part of a curve; its points are counted in the message."""
-    write_records(job.part, [record])
-    failed = sum(status not in ("ok", "left_out") for status in record.statuses)
-    counts = f"{len(record.statuses)} points, {failed} failed, {record.statuses.count('left_out')} left out"
-    return Result("ok", counts)
-
-
-def _time_by_scene(waves: Iterable[Sequence[Job]]) -> Iterator[tuple[Job, Result]]:
-    """Times, judges and collects every point of the curves of one scene, then of the next."""
-    jobs = list(chain.from_iterable(waves))
-    for name in dict.fromkeys(job.case.scene.name for job in jobs):
-        yield from _measure_scene([job for job in jobs if job.case.scene.name == name])
-
-
-def _measure_scene(jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
+def _measure_scene(
+    file: TableFile, curves: Sequence[Curve], short: Scene, reference: Trajectory, repeats: int, budget_s: float
+) -> Iterator[Outcome]:
+    """Time, judge and store every point of the curves of one scene."""
     load_before = os.getloadavg()[0]
-    case, results = jobs[0].case, jobs[0].reference
-    assert results is not None  # every bench case has a reference
-    short, reference = prepared_scene(case.scene, results)
-    by_curve = {ladder.curve: ladder for ladder in ladders()}
-    own = [replace(by_curve[str(job.case.options["curve"])], choices=job.case.settings) for job in jobs]
-    points = [points_of(ladder, short.duration / (short.samples - 1)) for ladder in own]
-    scenes = {point: (short, reference) for curve in points for point in curve}
-    measured = measure_points(scenes, points, case.options)
-    shared = facts_of(case, short, reference) | {
-        "budget_s": case.options["budget_s"],
-        "load_before": load_before,
-        "load_after": os.getloadavg()[0],
-        "pinned_core": -1 if last_core() is None else last_core(),
-    }
-    for job, ladder, curve in zip(jobs, own, points, strict=True):
-        facts = shared | {"repeatable": measured.is_repeatable(curve)}
-        yield job, measured.lost(curve) or store_curve(job, curve_record(job.case, ladder, measured.rows(curve), facts))
+    points = [points_of(curve.ladder, short.duration / (short.samples - 1)) for curve in curves]
+    scenes = {point: (short, reference) for own in points for point in own}
+    measured = measure_points(scenes, points, repeats, budget_s)
+    core = last_core()
+    shared = facts_of(short, reference) | {"load_before": load_before, "pinned_core": -1 if core is None else core}
+    for curve, own in zip(curves, points, strict=True):
+        lost = measured.lost(own)
+        if lost:
+            yield Outcome(curve.label, curve.ladder.method, "worker_died", lost, is_stored=False)
+            continue
+        facts = shared | {"repeatable": int(measured.is_repeatable(own))}
+        yield store_curve(file, curve, measured.rows(own), facts)
 
 
-def facts_of(case: Case, short: Scene, reference: Trajectory) -> dict[str, Any]:
-    """Attributes that all curves of a scene have; the uncertainty over the samples that errors are taken at."""
+def store_curve(
+    file: TableFile, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]
+) -> Outcome:
+    """Store the points of a curve; they are counted in the message."""
+    place = file.place(curve.first_run, BENCH)
+    place.write(place.first, rows_of_curve(place, curve, points, facts))
+    return Outcome(curve.label, curve.ladder.method, "ok", counts_of(points))
+
+
+def rows_of_curve(
+    place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]
+) -> Rows:
+    """The rows of a curve, with its fitted order. facts: columns that all its points have in common."""
+    facts = {**facts, "order": curve_order(curve.ladder, points)}
+    rows = []
+    for point in points:
+        values = {name: value for name, value in point.items() if name not in ("status", "message")}
+        values |= {**facts, "left_out": int(point["status"] == "left_out")}
+        rows.append(row_of_point(place, str(point["status"]), str(point["message"]), values))
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+
+
+def counts_of(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How many points a curve has, in words."""
+    statuses = [row["status"] for row in rows]
+    failed = sum(status not in ("ok", "left_out") for status in statuses)
+    return f"{len(statuses)} points, {failed} failed, {statuses.count('left_out')} left out"
+
+
+def curve_order(ladder: Ladder, rows: Sequence[Mapping[str, Any]]) -> float:
+    """The order of convergence over the points that are ok; NaN where it cannot be fitted."""
+    ok = [row for row in rows if row["status"] == "ok"]
+    if ladder.kind != STEP:
+        return math.nan
+    errors = np.maximum(np.array([row["angle_error_max"] for row in ok]), SMALLEST_ERROR)
+    order = fitted_order(np.array([row["setting"] for row in ok]), errors)
+    return math.nan if order is None else order
+
+
+def facts_of(short: Scene, reference: Trajectory) -> dict[str, Any]:
+    """What all points of a scene have in common; the uncertainty over the samples that errors are taken at."""
     uncertainty = reference.angle_uncertainty
     compared = max(horizon_samples(reference), 1)
     return {
-        "scene_hash": case.scene_hash,
         "horizon_s": horizon(reference),
         "uncertainty_rad": 0.0 if uncertainty is None else float(uncertainty[:compared].max()),
-        "duration_s": case.scene.duration,
         "samples": short.samples,
     }
 
@@ -167,50 +271,27 @@ def points_of(ladder: Ladder, interval: float) -> list[Point]:
     ]
 
 
-def curve_record(case: Case, ladder: Ladder, rows: Sequence[Mapping[str, Any]], shared: Mapping[str, Any]) -> Record:
-    """The record of a curve from the rows of its points."""
-    arrays = arrays_of(rows)
-    attributes: dict[str, Any] = {
-        **shared,
-        "method": ladder.method,
-        "choices": json.dumps(dict(ladder.choices), sort_keys=True),
-        "setting_kind": ladder.kind,
-        KEY_ATTRIBUTE: case.key,
-        "messages": [str(row["message"]) for row in rows],
-    }
-    if ladder.order is not None:
-        attributes["order_expected"] = ladder.order
-    ok = arrays["status"] == code_of("ok")
-    errors = np.maximum(arrays["angle_error_max"][ok], SMALLEST_ERROR)
-    if ladder.kind == STEP and (order := fitted_order(arrays["setting"][ok], errors)) is not None:
-        attributes["order"] = order
-    return Record(BENCH, case.scene.name, ladder.curve, attributes, arrays)
-
-
-def arrays_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Arrays over the settings of a curve, from what was measured at each."""
-    return {name: np.array([row[name] for row in rows]) for name in rows[0] if name != "message"}
-
-
 @dataclass
 class Measured:
     """What was measured, by point.
 
-    answers      of the timer, by the names they are stored under
-    unanswered   status and message of a point that failed; "worker_died": its process died twice, nothing is known
+    Attributes
+    ----------
+    answers : of the timer, by the names they are stored under.
+    unanswered : status and message of a point that failed; "worker_died": its process died twice, nothing is known.
     """
 
     timings: Timings[Point] = field(default_factory=Timings)
     answers: dict[Point, dict[str, Any]] = field(default_factory=dict)
     unanswered: dict[Point, tuple[str, str]] = field(default_factory=dict)
 
-    def lost(self, points: Sequence[Point]) -> Result | None:
-        """Of a curve that is not stored, as one of its points is lost; None of others."""
+    def lost(self, points: Sequence[Point]) -> str:
+        """Why a curve is not stored: one of its points is lost; "" where none is."""
         for point in points:
             status, message = self.unanswered.get(point, ("", ""))
             if status == "worker_died":
-                return Result(status, f"{point.method} at {point.setting:g}: {message}")
-        return None
+                return f"{point.method} at {point.setting:g}: {message}"
+        return ""
 
     def is_repeatable(self, points: Sequence[Point]) -> bool:
         """Whether the last run of every point was bit for bit its first one."""
@@ -222,43 +303,47 @@ class Measured:
         self.timings.warm[point] = math.nan
 
     def rows(self, points: Sequence[Point]) -> list[dict[str, Any]]:
-        """Every dataset's value at each point; NaN and 0 where there is none."""
-        return [self._row(point) for point in points]
-
-    def _row(self, point: Point) -> dict[str, Any]:
-        names = ("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s")
+        """The columns of each point; NaN and 0 where there is nothing."""
+        times = ("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s")
         others = ("setup_time_s", "setup_again_time_s", "output_time_s")
-        row: dict[str, Any] = {"setting": point.setting, **dict.fromkeys((*ERRORS, *names, *others), np.nan)}
-        row |= {"repeats": 0, "steps": 0, "status": "left_out", "false_success": 0, "message": ""}
-        if point in self.timings.left_out:
-            row["message"] = self.timings.left_out[point]
-        elif point in self.unanswered:
-            row["status"], row["message"] = self.unanswered[point]
-            row["run_time_s"] = self.timings.warm[point]
-        else:
-            row |= self.answers[point] | statistics(self.timings.times[point])
-            del row["same"]
-        return row | {"status": code_of(row["status"])}
+        rows = []
+        for point in points:
+            row: dict[str, Any] = {"setting": point.setting, **dict.fromkeys((*ERRORS, *times, *others), np.nan)}
+            row |= {"repeats": 0, "steps": 0, "status": "left_out", "false_success": 0, "message": ""}
+            if point in self.timings.left_out:
+                row["message"] = self.timings.left_out[point]
+            elif point in self.unanswered:
+                row["status"], row["message"] = self.unanswered[point]
+                row["run_time_s"] = self.timings.warm[point]
+            else:
+                row |= self.answers[point] | statistics(self.timings.times[point])
+            rows.append(row)
+        return rows
 
 
-def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], options: Mapping[str, Any]) -> Measured:
+def measure_points(
+    scenes: PointScenes, points: Sequence[Sequence[Point]], repeats: int, budget_s: float
+) -> Measured:
     """Times all points in rounds, and judges the last run of each; in one worker process on one core.
 
-    points     by curve, each coarse to fine
-    options    `repeats` and `budget_s`
+    Parameters
+    ----------
+    points : by curve, each coarse to fine.
+    repeats, budget_s : timed runs of a point at most, and s for all of them.
     """
     methods = tuple(dict.fromkeys(point.method for point in scenes))
-    limit = min(_RUN_LIMIT_S, options["budget_s"])
-    found = Measured()
+    limit = min(_RUN_LIMIT_S, budget_s)
+    measured = Measured()
     with WorkerPool(1, partial(start_timer, methods, scenes), last_core()) as pool:
 
         def answer(task: str, point: Point) -> Any:
             """None where there is none."""
-            if point in found.unanswered:
+            if point in measured.unanswered:
                 return None
             (end,) = run_in(pool, ask, [(task, point)], limit)
             if end.failure:
-                found.unanswered[point] = "solver_failed" if end.failure == "error" else end.failure, end.message
+                status = "solver_failed" if end.failure == "error" else end.failure
+                measured.unanswered[point] = status, end.message
             return end.value
 
         def warm_up(point: Point) -> tuple[float, bool]:
@@ -266,14 +351,14 @@ def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], optio
             prepared = answer("prepare", point)
             if prepared is None:
                 return time.perf_counter() - start, False
-            found.answers[point] = prepared
+            measured.answers[point] = prepared
             return prepared["run_time_s"], True
 
         def repeat(point: Point) -> float:
             seconds = answer("repeat", point)
             return math.nan if seconds is None else float(seconds)
 
-        found.timings = conduct(points, warm_up, repeat, options["budget_s"], options["repeats"], time.perf_counter)
-        for point, known in found.answers.items():
+        measured.timings = conduct(points, warm_up, repeat, budget_s, repeats, time.perf_counter)
+        for point, known in measured.answers.items():
             known |= answer("judge", point) or {}
-    return found
+    return measured

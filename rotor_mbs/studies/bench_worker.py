@@ -16,13 +16,14 @@ import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Solver
-from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.catalogue import REFERENCE, find_method
+from rotor_mbs.runs.results import TableFile
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-from rotor_mbs.studies.stored_references import load_reference
+from rotor_mbs.studies.stored_references import reference_at
 
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
 # a bench would time the reading of samples.
@@ -129,7 +130,7 @@ def _status(status: str, message: str, metrics: Mapping[str, float]) -> tuple[st
     return "inaccurate", f"angle error {error:.1e} rad before the horizon: as large as the motion"
 
 
-_timer: PointTimer | None = None
+_timer = PointTimer({})
 
 
 def start_timer(methods: Sequence[str], scenes: PointScenes) -> None:
@@ -144,12 +145,19 @@ def start_timer(methods: Sequence[str], scenes: PointScenes) -> None:
 def ask(request: tuple[str, Point]) -> Any:
     """What the timer of this process answers: ("prepare", "repeat" or "judge", point)."""
     task, point = request
-    return getattr(_timer, task)(point)
+    if task == "prepare":
+        return _timer.prepare(point)
+    return _timer.repeat(point) if task == "repeat" else _timer.judge(point)
 
 
 def prepared_scene(scene: Scene, results: Path) -> tuple[Scene, Trajectory]:
     """The scene as it is benched, without loads, and its reference. Raises InputError where the file has none."""
-    reference = load_reference(results, scene)
+    reference = reference_at(TableFile(results).place(f"{scene.name}/{REFERENCE}"), scene)
+    return prepared(scene, reference)
+
+
+def prepared(scene: Scene, reference: Trajectory | None) -> tuple[Scene, Trajectory]:
+    """The scene as it is benched, and its reference at the same samples. Raises InputError where there is none."""
     if reference is None or len(reference.time) < scene.samples:
         raise InputError(f"{scene.name}: no usable reference (it does not reach the end); a bench needs one")
     short, k = thinned(scene)

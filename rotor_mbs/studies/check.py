@@ -18,9 +18,9 @@ from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.freeze import changed_arrays
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import is_sweep, open_results
-from rotor_mbs.runs.runner import OnProgress, ignore_progress
-from rotor_mbs.runs.sweep_columns import MISSING
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.studies.run import OnProgress, ignore_progress
+from rotor_mbs.runs.table import MISSING
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene

@@ -30,7 +30,7 @@ from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.records import write_records
 from rotor_mbs.runs.results_file import ResultsStore, refuse_other_kinds
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene

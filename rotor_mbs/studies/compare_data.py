@@ -25,7 +25,7 @@ from rotor_mbs.foreign.trajectory import ForeignData
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
-from rotor_mbs.runs.layout import Column
+from rotor_mbs.runs.files import Column
 from rotor_mbs.runs.records import Record
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.accuracy_bounds import Bound

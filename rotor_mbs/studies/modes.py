@@ -19,24 +19,21 @@ from numpy.typing import NDArray
 from rotor_mbs.analysis.campbell import REST, ROTATION, FloquetTable, LinearModes, SceneModes, StabilityChart
 from rotor_mbs.analysis.mode_records import to_records
 from rotor_mbs.analysis.modes import GROWTH, Complex, floquet, isotropic_modes, modes_of, track
-from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
-from rotor_mbs.runs.case import Case
-from rotor_mbs.runs.layout import KEY_ATTRIBUTE, TOGETHER
-from rotor_mbs.runs.records import write_records
-from rotor_mbs.runs.results_file import ResultsStore
-from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.pool import local_pool, run_in
+from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import Table, value_at
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.studies.run import OnProgress, Outcome, ignore_progress
 
 if TYPE_CHECKING:
     from rotor_mbs.models.lagrange.floquet import Turn
 
-# Whose text decides a record, besides what decides a run.
-_SOURCES = ("analysis/modes.py", "analysis/campbell.py", "analysis/mode_records.py", "studies/modes.py")
 # A source whose accelerations at the steady state are above this share of its largest stiffness is not steady there.
 _STEADY = 1e-7
 
@@ -60,22 +57,49 @@ def modes_of_scenes(
 
     Raises InputError for a negative or repeated speed or stiffness, StoreError, KeyboardInterrupt.
     """
-    options = {"speeds": _increasing(speeds, "speeds"), "stiffnesses": _increasing(stiffnesses, "stiffnesses")}
-    method = next(iter(linearizing_methods().values())).name  # a case names one; the study asks all of them
-    cases = [Case(scene, method, study="modes", options=options, sources=_SOURCES) for scene in scenes]
-    return execute(cases, in_pool(perform_modes, workers, timeout_s), ResultsStore(output), on_progress)
+    speeds, stiffnesses = _increasing(speeds, "speeds"), _increasing(stiffnesses, "stiffnesses")
+    made: list[Outcome] = []
+    names = {scene.name for scene in scenes}
+    with writing(output):
+        kept = [record for record in stored_records(output) if record.scene not in names]
+        records = []
+        with local_pool(workers) as pool:
+            tasks = [(scene, tuple(speeds), tuple(stiffnesses)) for scene in scenes]
+            for done, end in enumerate(run_in(pool, perform_modes, tasks, timeout_s), 1):
+                if isinstance(end.error, RotorError):
+                    raise end.error
+                scene = end.task[0]
+                label = f"{scene.name} modes"
+                if end.value is None:
+                    outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=done / len(tasks))
+                else:
+                    modes = end.value
+                    records += to_records(modes, {"scene_hash": scene_hash(scene)})
+                    status, message = "ok", "; ".join(modes.notes)
+                    if not modes.agrees:
+                        differ = f"frequencies of two models differ by {modes.disagreement:.1e} of their size"
+                        status, message = "inaccurate", differ
+                    outcome = Outcome(label, "", status, message, share=done / len(tasks))
+                made.append(outcome)
+                on_progress(done, len(tasks), outcome)
+        if records:
+            write_records(output, [*kept, *records])
+    return made
 
 
-def perform_modes(job: Job) -> Result:
-    """Computes and stores the modes of one scene, in a worker process. Raises StoreError."""
-    case = job.case
-    speeds, stiffnesses = (np.array(case.options[name], dtype=float) for name in ("speeds", "stiffnesses"))
-    found = compute_modes(case.scene, speeds, stiffnesses)
-    facts = {"scene_hash": case.scene_hash, KEY_ATTRIBUTE: case.key, TOGETHER: case.key}
-    write_records(job.part, to_records(found, facts))
-    if not found.agrees:
-        return Result("inaccurate", f"frequencies of two models differ by {found.disagreement:.1e} of their size")
-    return Result("ok", "; ".join(found.notes))
+def stored_records(output: Path) -> list[Record]:
+    """The modes that a file has. Raises InputError where it has something else."""
+    if not output.exists():
+        return []
+    records = read_records(output, "modes")
+    if not records:
+        raise InputError(f"{output}: is no file of modes; allowed: another output file")
+    return records
+
+
+def perform_modes(task: tuple[Scene, tuple[float, ...], tuple[float, ...]]) -> SceneModes:
+    """The modes of one scene, in a worker process."""
+    return compute_modes(*task)
 
 
 def compute_modes(

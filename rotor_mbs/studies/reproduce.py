@@ -1,7 +1,7 @@
-"""The main job: every scene of the paper by the default methods and with each erratum alone; the errata checked.
+"""The main job: every scene of the paper by the default methods and with each erratum alone.
 
 And error against run time of all methods on one scene, at a few settings each, in seconds: a bench takes one process on
-one core and rounds over all points; here each curve is a case beside the runs, and a point is run once. Its errors are
+one core and rounds over all points; here each curve is a task beside the runs, and a point is run once. Its errors are
 those of a bench, its times are good to a factor.
 """
 
@@ -9,34 +9,75 @@ from __future__ import annotations
 
 import hashlib
 import os
-from dataclasses import replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from rotor_mbs.analysis.claim_records import shipped_claims, stored_claims
+import rotor_mbs
+from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.errata import ERRATA, errata_record
 from rotor_mbs.analysis.finding import finding
-from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.analysis.run_tables import finding_lines, method_table
 from rotor_mbs.errors import RotorError
-from rotor_mbs.methods.catalogue import default_methods, errata_methods, ladders
-from rotor_mbs.runs.case import RUN, Case
-from rotor_mbs.runs.layout import KEY_ATTRIBUTE
+from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, find_method, ladders
 from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line
-from rotor_mbs.runs.read import in_memory, open_results
-from rotor_mbs.runs.records import write_records
-from rotor_mbs.runs.results_file import ResultsStore
-from rotor_mbs.runs.runner import Job, OnProgress, Result, ignore_progress
-from rotor_mbs.runs.versions import fingerprint, versions
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.results import Asked, TableFile
+from rotor_mbs.runs.table import Place, Rows
+from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies.bench import BENCH, SOURCES, Measured, curve_record, facts_of, points_of, store_curve
-from rotor_mbs.studies.bench_worker import PointTimer, prepared_scene
-from rotor_mbs.studies.run import RunReport, able_methods, perform_run, reference_case, run_scenes
+from rotor_mbs.studies.bench import (
+    BENCH,
+    Curve,
+    Measured,
+    bench_table,
+    facts_of,
+    is_measured,
+    points_of,
+    replaced_points,
+    rows_of_curve,
+)
+from rotor_mbs.studies.bench_worker import PointTimer, prepared
+from rotor_mbs.studies.run import OnProgress, RunReport, RunTask, able_methods, ignore_progress, perform_run, run_scenes
+from rotor_mbs.studies.stored_references import reference_at
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
 _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next one takes up to eight times as long
+
+
+@dataclass(frozen=True)
+class CurveTask:
+    """A short curve on its way to a worker process: consecutive rows of the table /bench."""
+
+    curve: Curve
+    place: Place
+    reference: Place
+    limit_s: float
+
+    @property
+    def asked(self) -> Asked:
+        """What is reported of it."""
+        return Asked(self.curve.scene, self.curve.ladder.method)
+
+    @property
+    def first(self) -> int:
+        return self.place.first
+
+    @property
+    def label(self) -> str:
+        return self.curve.label
+
+    @property
+    def work(self) -> float:
+        return 3.0 + find_method(self.curve.ladder.method).relative_cost * self.curve.scene.duration / 10.0
+
+    def split(self) -> Sequence[CurveTask]:
+        return ()
+
+    def failed(self, _status: str, _message: str) -> None:
+        """Nothing is stored of a curve whose process died: it is measured again."""
 
 
 def reproduce(
@@ -46,24 +87,29 @@ def reproduce(
     scenes, benched = find_scenes(["paper"]), find_scenes([BENCHED])[0]
     names = (*default_methods(), *errata_methods().values())
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
-    _complete_claims(output)  # before the runs: the whole file is written anew with each merge, and now it is small
+    curves = short_curves(benched)
+
+    def curve_tasks(file: TableFile, missing: Collection[str]) -> list[CurveTask]:
+        reference = f"{benched.name}/{REFERENCE}"
+        return [
+            CurveTask(curve, file.place(curve.first_run, BENCH), file.place(reference), 1.2 * timeout_s + 10.0)
+            for curve in curves
+            if reference in missing or not is_measured(file, curve)
+        ]
+
     return run_scenes(
         scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress,
-        beside=[errata_case(benched), *ladder_cases(benched)], perform=perform,
+        beside=curve_tasks, beside_tables=[bench_table(curves)],
+        dropped=replaced_points(output, curves), perform=perform,
     )  # fmt: skip
-
-
-def _complete_claims(output: Path) -> None:
-    """The shipped study of claims and numbers, whose thousands of runs take too long to be repeated here."""
-    shipped, results = shipped_claims(), ResultsStore(output)
-    if shipped.exists() and not ResultsStore(shipped).stored_keys() <= results.stored_keys():
-        results.merge([shipped])
 
 
 def made_from(results: Path, timeout_s: float) -> str:
     """A digest of the results file, code, versions, scenes, references and the time limit."""
-    digest = hashlib.sha256(f"{fingerprint('.')} {versions()} {timeout_s}".encode())
-    for path in (results, *sorted(scenarios_folder().rglob("*.toml")), *sorted(reference_folder().iterdir())):
+    package = Path(rotor_mbs.__file__).parent
+    sources = sorted(path for path in package.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
+    digest = hashlib.sha256(f"{versions()} {timeout_s}".encode())
+    for path in (results, *sources, *sorted(scenarios_folder().rglob("*.toml")), *sorted(reference_folder().iterdir())):
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     return digest.hexdigest()
@@ -71,71 +117,51 @@ def made_from(results: Path, timeout_s: float) -> str:
 
 def summary_of(path: Path) -> str:
     """Numbers and claims of the paper, and a line for each method over all its scenes."""
-    with open_results(path) as file:
-        results = in_memory(file)
+    with open_results(path) as results:
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        study = stored_claims(results)
+        study = stored_claims()
         facts = finding(results.scenes, claims(results.scenes))
         lines = finding_lines(facts, None if study is None else study.shares)
         return "\n".join([*lines, "", str(method_table(runs)), ""])
 
 
-def perform(job: Job) -> Result:
-    """A run, or what is computed beside the runs, in a worker process. Raises StoreError."""
-    return {RUN: perform_run, BENCH: perform_ladder, ERRATA: perform_errata}[job.case.study](job)
+def perform(task: RunTask | CurveTask) -> Rows:
+    """A run, or a curve beside the runs, in a worker process."""
+    return perform_curve(task) if isinstance(task, CurveTask) else perform_run(task)
 
 
-def errata_case(scene: Scene) -> Case:
-    """The check of every printed entry, at random states: of `scene` nothing counts."""
-    return Case(replace(scene, name="random states"), PRINTED, study=ERRATA, sources=("analysis/errata.py",))
-
-
-def perform_errata(job: Job) -> Result:
-    """Checks every printed entry and stores the outcome, in a worker process."""
-    from rotor_mbs.models.printed.errata import check_errata
-
-    write_records(job.part, [errata_record(check_errata(), {KEY_ATTRIBUTE: job.case.key})])
-    return Result("ok")
-
-
-def ladder_cases(scene: Scene) -> list[Case]:
-    """A short curve of each method on `scene`, judged by its reference."""
+def short_curves(scene: Scene) -> list[Curve]:
+    """A short curve of each method on `scene`."""
     chosen = [ladder.short for ladder in ladders() if not ladder.variant]
     able, _ = able_methods(scene, [ladder.method for ladder in chosen])
-    reference = reference_case(scene).key
-    sources = (*SOURCES, "studies/reproduce.py")
-    return [
-        Case(scene, one.method, {}, BENCH, {"curve": one.curve, "values": list(one.values)}, reference, sources)
-        for one in chosen
-        if one.method in able
-    ]
+    options = {"budget_s": _LONGEST_S, "is_short": True}
+    return [Curve(scene, ladder, options) for ladder in chosen if ladder.method in able]
 
 
-def perform_ladder(job: Job) -> Result:
-    """Runs, judges and stores one curve, in a worker process."""
-    assert job.reference is not None  # every case of a ladder has a reference
-    case = job.case
-    short, reference = prepared_scene(case.scene, job.reference)
-    ladder = next(one.short for one in ladders() if one.curve == case.options["curve"])
-    points = points_of(ladder, short.duration / (short.samples - 1))
+def perform_curve(task: CurveTask) -> Rows:
+    """Run and judge the points of one curve, in a worker process; their rows."""
+    curve = task.curve
+    short, reference = prepared(curve.scene, reference_at(task.reference, curve.scene))
+    points = points_of(curve.ladder, short.duration / (short.samples - 1))
     timer = PointTimer(dict.fromkeys(points, (short, reference)))
-    found, longest = Measured(), 0.0
+    measured, longest = Measured(), 0.0
     for point in points:
         if longest > _LONGEST_S:
-            found.timings.left_out[point] = f"not run: the setting before took {longest:.2g} s"
+            measured.timings.left_out[point] = f"not run: the setting before took {longest:.2g} s"
             continue
         try:
             seconds = timer.prepare(point)
-            found.timings.times[point] = [seconds["run_time_s"]]
-            found.answers[point] = seconds | timer.judge(point)
+            measured.timings.times[point] = [seconds["run_time_s"]]
+            measured.answers[point] = seconds | timer.judge(point)
             longest = seconds["run_time_s"]
         except OF_THE_MACHINE:
             raise
         except RotorError as exc:
-            found.fail(point, str(exc))
+            measured.fail(point, str(exc))
         except Exception as exc:
-            found.fail(point, one_line(exc))
-    shared = facts_of(case, short, reference) | {
-        "budget_s": _LONGEST_S, "load_before": os.getloadavg()[0], "pinned_core": -1, "is_short": True,
-    }  # fmt: skip
-    return store_curve(job, curve_record(case, ladder, found.rows(points), shared))
+            measured.fail(point, one_line(exc))
+    rows = measured.rows(points)
+    facts = facts_of(short, reference) | {"load_before": os.getloadavg()[0], "pinned_core": -1}
+    return rows_of_curve(task.place, curve, rows, facts)
+
+

@@ -1,9 +1,8 @@
-"""Runs of scenes: solved, judged against the reference of their scene, and stored."""
+"""Runs of scenes: solved, judged against the reference of their scene, and stored as rows of a results file."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,29 +23,107 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
-from rotor_mbs.runs.case import RUN, Case
-from rotor_mbs.runs.layout import KEY_ATTRIBUTE, LIMIT
 from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line
-from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results_file import ResultsStore
-from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.runs.write import write_run
+from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line, pool_of
+from rotor_mbs.runs.results import Asked, TableFile, fit, results_tables, row_of_run
+from rotor_mbs.runs.runner import Ended, Task, compute
+from rotor_mbs.runs.table import MISSING, Place, Rows, Table, text_of
+from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.toml_file import of_file
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.studies.stored_references import digest, frozen_file, frozen_solution, load_reference
+from rotor_mbs.studies.stored_references import digest, frozen_solution, reference_at, shipped_reference
 
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
+_FIXED_WORK = 3.0  # building, judging, storing
+
+
+@dataclass(frozen=True)
+class RunTask:
+    """A run on its way to a worker process.
+
+    Attributes
+    ----------
+    asked : the run.
+    place : where its row is.
+    reference : where the row of its reference is; None for the reference itself.
+    time_limit_s : after which it ends itself.
+    """
+
+    asked: Asked
+    place: Place
+    reference: Place | None
+    time_limit_s: float
+
+    @property
+    def first(self) -> int:
+        return self.place.first
+
+    @property
+    def limit_s(self) -> float:
+        # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
+        return 1.2 * self.time_limit_s + 10.0
+
+    @property
+    def label(self) -> str:
+        """In a line of progress."""
+        return f"{self.asked.scene.name} {self.asked.method}"
+
+    @property
+    def work(self) -> float:
+        """Roughly how much there is to compute: 1 is 10 s of a scene by the fastest method."""
+        return _FIXED_WORK + find_method(self.asked.method).relative_cost * self.asked.scene.duration / 10.0
+
+    def split(self) -> Sequence[RunTask]:
+        return ()
+
+    def failed(self, status: str, message: str) -> Rows:
+        """The row of a run that left no samples."""
+        asked = self.asked
+        run = without_samples(asked.scene, asked.method, asked.settings, status, message)
+        limit = self.time_limit_s if status == "timed_out" else np.nan
+        return row_of_run(run, self.place, {"false_success": 0, "time_limit_s": limit})
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run, or other rows of a study, that this call computed or tried to.
+
+    Attributes
+    ----------
+    label, method : what was computed.
+    status, message : of the run; of a task of which nothing is stored, why.
+    seconds : run time; NaN where nothing was timed.
+    is_stored : whether there is a row; else the same call tries again.
+    is_read : whether it was read from a shipped file and not computed.
+    share : how much of the work of the call was done when it ended, from 0 to 1.
+    """
+
+    label: str
+    method: str
+    status: str
+    message: str = ""
+    seconds: float = float("nan")
+    is_stored: bool = True
+    is_read: bool = False
+    share: float = 0.0
+
+
+OnProgress = Callable[[int, int, Outcome], None]
+
+
+def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
+    """For calls that report no progress."""
 
 
 @dataclass(frozen=True)
 class RunReport:
-    """What became of a list of cases: those that this call computed, and how many were stored already.
+    """What became of a list of runs: those that this call computed, and how many were stored already.
 
     stored_failures   a line for each of the latter that should have succeeded and did not
     """
@@ -58,20 +135,17 @@ class RunReport:
     @property
     def failures(self) -> list[Outcome]:
         """Runs that should have succeeded and did not. How far the printed equations get is data, not a failure."""
-        return [one for one in self._with_record() if is_corrected(one.case.method)]
+        return [run for run in self.made if run.is_stored and run.status != "ok" and is_corrected(run.method)]
 
     @property
     def broken_off(self) -> list[Outcome]:
         """Runs of the printed equations that did not reach the end."""
-        return [one for one in self._with_record() if not is_corrected(one.case.method)]
+        return [run for run in self.made if run.is_stored and run.status != "ok" and not is_corrected(run.method)]
 
     @property
     def not_computed(self) -> list[Outcome]:
         """Runs whose process died or could not start; nothing is stored, the same call tries them again."""
-        return [one for one in self.made if not one.is_computed]
-
-    def _with_record(self) -> list[Outcome]:
-        return [one for one in self.made if one.is_computed and one.result.status != "ok"]
+        return [run for run in self.made if not run.is_stored]
 
 
 def run_scenes(
@@ -84,56 +158,128 @@ def run_scenes(
     settings: Mapping[str, object] | None = None,
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
-    beside: Sequence[Case] = (),
-    perform: Callable[[Job], Result] | None = None,
+    beside: Callable[[TableFile, Collection[str]], Sequence[Task]] | None = None,
+    beside_tables: Sequence[Table] = (),
+    dropped: Collection[tuple[str, str]] = (),
+    perform: Callable[[Any], Rows] | None = None,
 ) -> RunReport:
     """Every scene's reference and runs into the results file `output`; what it has already is kept.
 
-    methods      by scene name
-    workers      parallel processes, or a pool that is open; 0: all in this process
-    timeout_s    a run over this ends itself, and is stored with the status timed_out
-    settings     of the methods that have them, in place of defaults and of the scene's own
-    use_frozen   whether a shipped reference may stand for a computed one
-    beside       cases of other studies, computed with the runs and not told of in the report
-    perform      what computes runs and those cases
+    Parameters
+    ----------
+    methods : by scene name.
+    workers : parallel processes, or a pool that is open; 0: all in this process.
+    timeout_s : a run over this ends itself, and is stored with the status timed_out.
+    settings : of the methods that have them, in place of defaults and of the scene's own.
+    use_frozen : whether a shipped reference may stand for a computed one.
+    beside, beside_tables, dropped, perform : of another study that is computed with the runs and not reported, its
+        tasks (from the file and the runs that are missing in it), its tables, rows that go, and what computes runs
+        and tasks.
 
-    Raises InputError, StoreError, KeyboardInterrupt; the same call then goes on where it stopped.
+    Raises
+    ------
+    InputError, StoreError, KeyboardInterrupt
+        The same call then goes on where it stopped.
     """
     settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings or {})
-    cases: list[Case] = []
+    asked: list[Asked] = []
     for scene in scenes:
-        reference = reference_case(scene, use_frozen=use_frozen)
-        own = {name: own_settings(scene, name, settings or {}) for name in methods[scene.name]}
-        cases += [reference, *(Case(scene, name, own[name], reference=reference.key) for name in own)]
-    runs = {case.key for case in cases}
+        asked.append(asked_reference(scene, use_frozen=use_frozen))
+        asked += [Asked(scene, name, own_settings(scene, name, settings or {})) for name in methods[scene.name]]
+    with writing(output):
+        file = fit(output, [*results_tables(asked), *beside_tables], dropped)
+        missing = missing_runs(file, asked, timeout_s)
+        others = list(beside(file, {run.run for run in missing})) if beside is not None else []
+        tasks = [_task(file, run, timeout_s) for run in missing]
+        for task in tasks:
+            task.place.mark_missing([0])
+        made: list[Outcome] = []
+        if tasks or others:
+            with pool_of(workers) as pool:
+                ends = compute_in_order(pool, perform or perform_run, tasks, others)
+                for done, outcome in enumerate(outcomes(ends, [*tasks, *others]), 1):
+                    made.append(outcome)
+                    on_progress(done, len(tasks) + len(others), outcome)
+        labels = {task.label for task in tasks}
+        made = [outcome for outcome in made if outcome.label in labels]
+        new = {run.run for run in missing}
+        kept = [run for run in asked if run.run not in new]
+        return RunReport(made, len(kept), _stored_failures(file, kept))
+
+
+def compute_in_order(
+    pool: Any, perform: Callable[[Any], Rows], tasks: Sequence[RunTask], others: Sequence[Any] = ()
+) -> Iterator[Ended]:
+    """References first; then, if their references are there, the other runs, the slowest first."""
+    yield from compute(pool, perform, [task for task in tasks if task.reference is None])
+    waiting = [task for task in (*tasks, *others) if task.reference is not None]
+    ready = [task for task in waiting if is_stored(task.reference)]
     # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
     # fastest, which are those that are compiled, so that two processes seldom compile the same code at once.
-    cases = sorted([*beside, *cases], key=lambda case: -case.work)
-    quarter, count = len(cases) // 4, len(cases)
-    turns = zip(cases[:quarter], cases[count - quarter :], strict=True)
-    cases = [*itertools.chain.from_iterable(turns), *cases[quarter : count - quarter]]
-    run = in_pool(perform or perform_run, workers, timeout_s, store_time_out)
-    with writing(output):
-        refuse_losses(output, cases)
-        made = execute(cases, run, ResultsStore(output, timeout_s), on_progress)
-        made = [one for one in made if one.case.key in runs]
-        asked = [case for case in cases if case.key in runs]
-        return RunReport(made, len(asked) - len(made), _stored_failures(output, asked, made))
+    ready.sort(key=lambda task: -task.work)
+    quarter, count = len(ready) // 4, len(ready)
+    turns = [task for pair in zip(ready[:quarter], ready[count - quarter :], strict=True) for task in pair]
+    yield from compute(pool, perform, [*turns, *ready[quarter : count - quarter]])
+    for task in waiting:
+        if task not in ready:
+            yield Ended(task, None, "no_reference", "its reference was not computed")
 
 
-def _stored_failures(output: Path, cases: Sequence[Case], made: Sequence[Outcome]) -> list[str]:
+def is_stored(place: Place) -> bool:
+    """Whether the row is there as it was written."""
+    marked = np.fromfile(place.path, np.int8, 1, offset=place.offsets["status"])
+    return bool(place.stored(marked)[0] != MISSING)
+
+
+def outcomes(ends: Iterable[Ended], tasks: Sequence[Any]) -> Iterator[Outcome]:
+    """What is reported of tasks that have ended."""
+    work, done = sum(task.work for task in tasks), 0.0
+    for end in ends:
+        task: Any = end.task
+        done += task.work
+        share = done / work
+        method = task.asked.method
+        if not isinstance(task, RunTask) and end.rows is not None:
+            yield Outcome(task.label, method, "ok", f"{len(end.rows['status'])} points", share=share)
+            continue
+        if end.rows is None:
+            yield Outcome(task.label, method, end.failure, end.message, is_stored=False, share=share)
+            continue
+        status, message = STATUSES[int(end.rows["status"][0])], text_of(end.rows["message"][0])
+        is_read = task.asked.is_read
+        seconds = float("nan") if is_read else float(end.rows["run_time_s"][0])
+        yield Outcome(task.label, method, status, message, seconds, is_read=is_read, share=share)
+
+
+def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list[Asked]:
+    """Those that the file lacks, that a shorter time limit ended, or whose reference is one of these."""
+    lacking: dict[str, Asked] = {}
+    for run in asked:  # the reference of a scene comes first
+        place = file.place(run.run)
+        reference = f"{run.scene.name}/{REFERENCE}"
+        is_missing = not is_stored(place) or reference in lacking
+        if not is_missing and not run.is_read:
+            row = place.read()
+            is_missing = int(row["status"][0]) == code_of("timed_out") and not row["time_limit_s"][0] >= timeout_s
+        if is_missing:
+            lacking[run.run] = run
+    return list(lacking.values())
+
+
+def _task(file: TableFile, run: Asked, timeout_s: float) -> RunTask:
+    reference = None if run.method == REFERENCE else file.place(f"{run.scene.name}/{REFERENCE}")
+    return RunTask(run, file.place(run.run), reference, timeout_s)
+
+
+def _stored_failures(file: TableFile, kept: Sequence[Asked]) -> list[str]:
     """Runs that this call found in the file, and that are no success."""
-    new = {one.case.key for one in made}
-    kept = {f"{case.scene.name}/{case.method}": case for case in cases if case.key not in new}
-    if not kept:
-        return []
-    with open_results(output, verify=False) as results:  # verified when the keys of what is kept were read
-        runs = {f"{scene.name}/{run.method}": run for scene in results.scenes.values() for run in scene.runs.values()}
-        return [
-            f"{case.label} {runs[name].status}: {runs[name].attributes.get('message', '')}"
-            for name, case in kept.items()
-            if name in runs and runs[name].status != "ok" and is_corrected(case.method)
-        ]
+    lines = []
+    for run in kept:
+        row = file.place(run.run).read()
+        status = STATUSES[int(row["status"][0])]
+        if status != "ok" and is_corrected(run.method):
+            lines.append(f"{run.scene.name} {run.method} {status}: {text_of(row['message'][0])}")
+    return lines
 
 
 def solve_judged(
@@ -149,49 +295,54 @@ def solve_judged(
     Arguments, errors raised and an example: `rotor_mbs.run`.
     """
     reference = None
-    scene_key = scene_hash(scene)
-    if frozen_file(scene_key) is not None:
-        reference = frozen_solution(scene, scene_key)[0].trajectory
+    if shipped_reference(scene_hash(scene)) is not None:
+        reference = frozen_solution(scene).trajectory
     elif compute_reference:
         reference = solve(REFERENCE, scene, {}).trajectory
     own = own_settings(scene, method, {}) | dict(settings or {})
     try:
         run, _ = _judged(solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s), reference)
     except OutOfTimeError as exc:
-        run = _without_samples(scene, method, own, "timed_out", str(exc))
+        run = without_samples(scene, method, own, "timed_out", str(exc))
     return run, reference
 
 
 def _judged(run: Solution, reference: Trajectory | None) -> tuple[Solution, bool]:
     """The run with status, message and metrics; and whether its engine claims a success that it is not."""
-    found = judge(run.scene, run, reference)
-    message = found.message + next_to_try(run.scene, run.method, run.settings, found.status)
-    return replace(run, status=found.status, message=message, metrics=found.metrics), found.false_success
+    judgement = judge(run.scene, run, reference)
+    message = judgement.message + next_to_try(run.scene, run.method, run.settings, judgement.status)
+    judged = replace(run, status=judgement.status, message=message, metrics=judgement.metrics)
+    return judged, judgement.false_success
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
     """What would make an inaccurate run better: the next rung of the method's ladder, or another method; else ""."""
-    found = look_up(method)
-    if status != "inaccurate" or found is None or not found.is_corrected:
+    known = look_up(method)
+    if status != "inaccurate" or known is None or not known.is_corrected:
         return ""
-    finer = found.finer(settings, scene.duration / (scene.samples - 1))
+    finer = known.finer(settings, scene.duration / (scene.samples - 1))
     if finer:
         return "; next to try: " + ", ".join(f"{name}={value:.3g}" for name, value in finer.items())
     others = [name for name in default_methods() if name != method and is_corrected(name)]
     return f"; as fine as its ladder goes, next to try: {others[0]}" if others else ""
 
 
-def reference_case(scene: Scene, *, use_frozen: bool = True) -> Case:
+def asked_reference(scene: Scene, *, use_frozen: bool = True) -> Asked:
     """The reference of a scene: the shipped one, where there is one and it may be used, or one to be computed."""
-    case = Case(scene, REFERENCE)
-    path = frozen_file(case.scene_hash) if use_frozen else None
-    return case if path is None else Case(scene, REFERENCE, options={"frozen": digest(path)})
+    shipped = shipped_reference(scene_hash(scene)) if use_frozen else None
+    if shipped is None:
+        return Asked(scene, REFERENCE)
+    source = {"frozen_with": shipped.frozen_with, "frozen_file": digest(shipped.path)[:12]}
+    return Asked(scene, REFERENCE, versions={**row_versions(find_method(REFERENCE)), **source})
 
 
 def own_settings(scene: Scene, method: str, given: Mapping[str, object]) -> dict[str, object]:
     """Those of the scene's settings that the method has, with those of the `given` ones in their place.
 
-    Raises InputError for a setting of the scene that no method at all has, or that is out of range.
+    Raises
+    ------
+    InputError
+        For a setting of the scene that no method at all has, or that is out of range.
     """
     of_scene: dict[str, dict[str, object]] = {}
     if scene.settings:
@@ -200,56 +351,38 @@ def own_settings(scene: Scene, method: str, given: Mapping[str, object]) -> dict
     return of_scene.get(method, {}) | {name: value for name, value in given.items() if name in allowed}
 
 
-def perform_run(job: Job) -> Result:
-    """Solves, judges and stores one run, in a worker process. Raises StoreError where it cannot be written."""
-    case = job.case
-    if case.method == REFERENCE and "frozen" in case.options:
-        run, attributes = frozen_solution(case.scene, case.scene_hash)
+def perform_run(task: RunTask) -> Rows:
+    """Solve and judge one run, in a worker process; its row."""
+    asked = task.asked
+    facts: dict[str, object] = {}
+    if asked.is_read:
+        run = frozen_solution(asked.scene)
     else:
-        attributes = {}
         try:
-            run = solve(case.method, case.scene, case.settings, _REPEATS, _REPEAT_BUDGET_S, job.time_limit_s)
+            run = solve(asked.method, asked.scene, asked.settings, _REPEATS, _REPEAT_BUDGET_S, task.time_limit_s)
         except OF_THE_MACHINE:
             raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
-            return store_failure("timed_out", job, str(exc))
+            return task.failed("timed_out", str(exc))
         except Exception as exc:
-            return store_failure("solver_failed", job, str(exc) if isinstance(exc, RotorError) else one_line(exc))
-    if case.method == REFERENCE:
+            return task.failed("solver_failed", str(exc) if isinstance(exc, RotorError) else one_line(exc))
+    if asked.method == REFERENCE:
         reference: Trajectory | None = run.trajectory
     else:
-        reference = load_reference(job.reference, case.scene) if job.reference is not None else None
+        reference = reference_at(task.reference, asked.scene) if task.reference is not None else None
     run, false_success = _judged(run, reference)
-    return _store(job, run, attributes | {"false_success": false_success})
+    facts["false_success"] = int(false_success)
+    if run.status == "timed_out" and not asked.is_read:
+        facts["time_limit_s"] = task.time_limit_s
+    return row_of_run(run, task.place, facts)
 
 
-def store_time_out(job: Job, message: str) -> Result:
-    """Stores a run that was ended at its time limit; other studies store nothing of such a case."""
-    return store_failure("timed_out", job, message) if job.case.study == RUN else Result("timed_out", message)
-
-
-def store_failure(status: str, job: Job, message: str) -> Result:
-    """Stores a run that left no samples."""
-    case = job.case
-    run = _without_samples(case.scene, case.method, case.settings, status, message)
-    return _store(job, run, {"false_success": False})
-
-
-def _without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:
+def without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:
+    """A run that left nothing but its end."""
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
     return Solution(scene, method, trajectory, Integration(False, message), chosen, status=status, message=message)
-
-
-def _store(job: Job, run: Solution, attributes: Mapping[str, Any]) -> Result:
-    """Writes a judged run; attributes: further ones. One with `frozen_with` was read, not computed."""
-    is_read = "frozen_with" in attributes
-    facts = {"status": run.status, "message": run.message, KEY_ATTRIBUTE: job.case.key, **run.metrics, **attributes}
-    if run.status == "timed_out" and not is_read:
-        facts[LIMIT] = job.time_limit_s
-    write_run(job.part, job.case.scene_hash, run, facts)
-    return Result(run.status, run.message, 0.0 if is_read else float(np.median(run.run_times_s)), is_read=is_read)
 
 
 def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[str]]:
@@ -260,23 +393,26 @@ def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[st
             find_method(name).items(scene)
             able.append(name)
         except MethodRefusal as exc:
-            refused.append(f"{scene.name}: not by {name}: {exc}")
+            refused.append(f"{scene.name}: skipped {name}: {exc}")
     return able, refused
 
 
 def asked_methods(scenes: Sequence[Scene], names: Sequence[str]) -> dict[str, list[str]]:
     """`names` for every scene. Raises InputError where one cannot represent a scene."""
-    found = {scene.name: able_methods(scene, names) for scene in scenes}
-    refused = [line for _, lines in found.values() for line in lines]
+    sorted_out = {scene.name: able_methods(scene, names) for scene in scenes}
+    refused = [line for _, lines in sorted_out.values() for line in lines]
     if refused:
         raise InputError(refused)
-    return {name: able for name, (able, _) in found.items()}
+    return {name: able for name, (able, _) in sorted_out.items()}
 
 
 def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], list[str]]:
     """The methods that each scene names itself, or that the rule selects, none where it refuses; and the reasons.
 
-    Raises InputError where a scene names a method that is unknown or cannot represent it.
+    Raises
+    ------
+    InputError
+        Where a scene names a method that is unknown or cannot represent it.
     """
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
@@ -295,20 +431,3 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
     return methods, reasons
 
 
-def refuse_losses(output: Path, cases: Sequence[Case]) -> None:
-    """Raises InputError where runs stored for a scene with other numbers would be dropped and not made anew."""
-    if not output.exists():
-        return
-    wanted = {(case.scene.name, case.method) for case in cases if case.study == RUN}
-    numbers = {case.scene.name: case.scene_hash for case in cases}
-    with open_results(output) as results:
-        lost = [
-            f"{output}: {scene.name}: has {run.method} of a scene of that name with other numbers, which this call "
-            "would drop; allowed: another output file, or a call that has this method too"
-            for scene in results.scenes.values()
-            if numbers.get(scene.name, scene.attributes["scene_hash"]) != scene.attributes["scene_hash"]
-            for run in scene.runs.values()
-            if (scene.name, run.method) not in wanted
-        ]
-    if lost:
-        raise InputError(lost)

@@ -1,69 +1,105 @@
-"""The stability suite: every corrected method on the stiff and extreme scenes, step limits, and conservation.
+"""The stability suite: every corrected method on the stiff and extreme scenes, step ladders and limits, symmetries.
 
 Step limits of a fixed-step method on a scene: a ladder of steps, and the largest stable step, seen and in theory, where
 |R(hλ)| <= 1 for the stability function R and every eigenvalue λ (Hairer & Wanner, Solving Ordinary Differential
-Equations II, IV.2). Conservation, on a scene without damping and without a load that changes: the scene, its images and
-itself backwards in time; perturbed starts for the energy drift.
+Equations II, IV.2). Symmetries, on a scene without damping and without a load that changes: the scene, its images and
+itself backwards in time.
 """
 
 from __future__ import annotations
 
 import cmath
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from rotor_mbs.analysis import exact as theory
 from rotor_mbs.analysis.stability import TARGET, SuiteRun, suite_runs
-from rotor_mbs.methods.catalogue import find_method, method_names, settings_for
+from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.runs.case import Case
-from rotor_mbs.runs.layout import KEY_ATTRIBUTE
-from rotor_mbs.runs.records import Record, read_records, write_records
-from rotor_mbs.runs.results_file import ResultsStore
-from rotor_mbs.runs.runner import Job, OnProgress, Outcome, Result, execute, ignore_progress, in_pool
-from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.pool import pool_of
+from rotor_mbs.runs.records import points_table, row_of_point
+from rotor_mbs.runs.results import Asked, TableFile, fit
+from rotor_mbs.runs.runner import compute
+from rotor_mbs.runs.table import Place, Rows
+from rotor_mbs.runs.versions import row_versions
+from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.impulse import angular_momentum
 from rotor_mbs.solution.judgement import Judgement, judge
-from rotor_mbs.solution.metrics import energy_scale
-from rotor_mbs.solution.quantities import energy_error
-from rotor_mbs.solution.status import COMPLETE, code_of
+from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.studies.run import able_methods, reference_case, run_scenes
-from rotor_mbs.studies.stored_references import load_reference
+from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, is_stored, outcomes, run_scenes
+from rotor_mbs.studies.stored_references import reference_at
 
 SUITE = ("stiff", "extreme")
 
 # The method that `run` relies on is given time for the longest scenes: a map of time-outs shows nothing.
 _PATIENT_METHOD, _PATIENT_S = "lagrange/taylor", 120.0
 # A ladder takes a few times its longest run; what is over this is stuck.
-_RECORD_LIMIT_S = 40.0
+_TASK_LIMIT_S = 40.0
 # Scenes on which conservation is looked at: one without gravity, one regular with it.
 _SYMMETRY_SCENES = ("extreme/zero-gravity", "extreme/light-1e-2")
-_DRIFT_CASE = ("extreme/zero-gravity", "lagrange/taylor")
-_SOURCES = ("studies/stability.py", "analysis/exact.py")
-STEPS, LIMIT, SYMMETRY, DRIFT = "steps", "limits", "symmetry", "drift"
+STEPS, LIMIT, SYMMETRY = "stability", "stability_limits", "symmetry"  # tables
 
 # A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to take this long.
 _FACTOR = 4
 _LONGEST_RUN_S = 1.5
 # A run that fails at once costs nothing, however small its step.
-_MOST_STEPS = 1e7
+_MAX_STEPS = 1e7
 # Bisection: a window of so many radians of the fastest mode; a pitch this many times its start has grown, not swung.
 _WINDOW_RADIANS = 5e3
 _GROWTH = 100.0
 _INTERVALS = 10
-# Conservation.
-_LIMIT_S = 30.0
-# Enough starts for an exponent to ±0.05, on a motion long enough for round-off to walk.
-STARTS = 64
-_LONG_S = 4000.0
-_PERTURBATION = 1e-3
-_SEED = 20200101  # any: the starts must be the same on every machine
+# s, of the runs that symmetries are seen by.
+_SYMMETRY_LIMIT_S = 30.0
+
+
+@dataclass(frozen=True)
+class StudyTask:
+    """Numbers of some runs of a scene by a method, on their way to a worker process: consecutive rows of a table.
+
+    Attributes
+    ----------
+    table, scene, method : STEPS, LIMIT or SYMMETRY, and of what.
+    place : where the first row is.
+    reference : where the row of the scene's reference is.
+    """
+
+    table: str
+    scene: Scene
+    method: str
+    place: Place
+    reference: Place | None
+    limit_s: float = _TASK_LIMIT_S
+
+    @property
+    def asked(self) -> Asked:
+        """What is reported of it."""
+        return Asked(self.scene, self.method)
+
+    @property
+    def first(self) -> int:
+        return self.place.first
+
+    @property
+    def label(self) -> str:
+        return f"{self.scene.name} {self.method} {self.table}"
+
+    @property
+    def work(self) -> float:
+        return 3.0 + find_method(self.method).relative_cost * self.scene.duration / 10.0
+
+    def split(self) -> Sequence[StudyTask]:
+        return ()
+
+    def failed(self, _status: str, _message: str) -> None:
+        """Nothing is stored: the same call tries again."""
 
 
 def run_suite(
@@ -95,58 +131,112 @@ def run_suite(
             scenes, chosen, output, workers=workers, timeout_s=limit_s, settings=own, on_progress=on_progress
         )
         made += report.made
-    return made + complete_records(scenes, asked, output, workers, on_progress)
+    return made + complete_studies(scenes, asked, output, workers, on_progress)
 
 
-def complete_records(
+def complete_studies(
     scenes: Sequence[Scene],
     methods: Mapping[str, Sequence[str]],
     output: Path,
     workers: int,
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
-    """Step ladders, step limits and conservation of these scenes, where the runs in `output` call for them."""
-    cases = _step_cases(scenes, suite_runs(output))
-    cases += [
-        Case(scene, method, study=DRIFT if (scene.name, method) == _DRIFT_CASE else SYMMETRY, sources=_SOURCES)
+    """Step ladders, step limits and symmetries of these scenes, where the runs in `output` call for them."""
+    wanted = _wanted(scenes, suite_runs(output))
+    wanted += [
+        (SYMMETRY, scene, method)
         for scene in scenes
         if scene.name in _SYMMETRY_SCENES
         for method in methods[scene.name]
     ]
-    store = ResultsStore(output)
-    made = execute(cases, in_pool(perform_record, workers, _RECORD_LIMIT_S), store, on_progress)
-    records = read_records(output, "steps", "limits", "conservation")
-    stale = {record.key for record in records if record.method in methods.get(record.scene, ())}
-    stale -= {case.key for case in cases}
-    if stale:
-        store.merge((), without=stale)
-    return made
+    points = {(table, scene.name, method): study_points(table, scene, method) for table, scene, method in wanted}
+    tables = [
+        points_table(table, [point for key, own in points.items() if key[0] == table for point in own])
+        for table in dict.fromkeys(table for table, _, _ in wanted)
+    ]
+    with writing(output):
+        file = fit(output, tables, _stale(output, points, methods))
+        tasks = []
+        for table, scene, method in wanted:
+            own = [file.place(str(point["run"]), table) for point in points[table, scene.name, method]]
+            if not all(map(is_stored, own)):
+                reference = None if table == SYMMETRY else file.place(f"{scene.name}/{REFERENCE}")
+                tasks.append(StudyTask(table, scene, method, own[0], reference))
+        made: list[Outcome] = []
+        if tasks:
+            with pool_of(workers) as pool:
+                for done, outcome in enumerate(outcomes(compute(pool, perform_study, tasks), tasks), 1):
+                    made.append(outcome)
+                    on_progress(done, len(tasks), outcome)
+        return made
 
 
-def _step_cases(scenes: Sequence[Scene], found: Sequence[SuiteRun]) -> list[Case]:
+def study_points(table: str, scene: Scene, method: str) -> list[dict[str, object]]:
+    """The known columns of the rows of a study: a row for each step of a ladder, else one."""
+    known: dict[str, object] = {
+        "run": f"{scene.name}/{method}",
+        "scene": scene.name,
+        "method_name": method,
+        "versions": json.dumps(row_versions(find_method(method)), sort_keys=True),
+        "scene_hash": scene_hash(scene),
+    }
+    if table != STEPS:
+        return [known]
+    return [known | {"run": f"{scene.name}/{method} step={step:.6g}", "step": step} for step in ladder_steps(scene)]
+
+
+def ladder_steps(scene: Scene) -> list[float]:
+    """s: the sample interval, then a quarter of the one before, as long as a run has not too many steps."""
+    steps = [scene.duration / (scene.samples - 1)]
+    while scene.duration <= _MAX_STEPS * steps[-1] / _FACTOR:
+        steps.append(steps[-1] / _FACTOR)
+    return steps
+
+
+def _stale(
+    output: Path, points: Mapping[tuple[str, str, str], object], methods: Mapping[str, Sequence[str]]
+) -> list[tuple[str, str]]:
+    """(table, run) of stored rows of these scenes and methods that the runs no longer call for."""
+    if not output.exists():
+        return []
+    stale = []
+    for table, stored in TableFile(output).tables.items():
+        if table in (STEPS, LIMIT, SYMMETRY):
+            owners = zip(stored.runs, stored.known["scene"][1], stored.known["method_name"][1], strict=True)
+            stale += [
+                (table, run)
+                for run, scene, method in owners
+                if method in methods.get(scene, ()) and (table, scene, method) not in points
+            ]
+    return stale
+
+
+def _wanted(scenes: Sequence[Scene], runs: Sequence[SuiteRun]) -> list[tuple[str, Scene, str]]:
     """Ladders where a fixed step may matter: the stiff and light scenes, and runs that failed at the default step."""
     by_name = {scene.name: scene for scene in scenes}
-    cases = []
-    for run in found:
+    wanted = []
+    for run in runs:
         scene = by_name.get(run.scene)
         if scene is None or not find_method(run.method).fixed_step or not run.has_reference:
             continue
-        reference = reference_case(scene).key
         if run.is_stiff_or_light or run.status in ("inaccurate", "diverged", "solver_failed"):
-            cases.append(Case(scene, run.method, study=STEPS, reference=reference, sources=_SOURCES))
+            wanted.append((STEPS, scene, run.method))
         if has_limit(scene, run.method):
-            cases.append(Case(scene, run.method, study=LIMIT, reference=reference, sources=_SOURCES))
-    return cases
+            wanted.append((LIMIT, scene, run.method))
+    return wanted
 
 
-def perform_record(job: Job) -> Result:
-    """Computes and stores one record, in a worker process."""
-    case = job.case
-    compute = {STEPS: ladder_record, LIMIT: limit_record, SYMMETRY: conservation_record, DRIFT: conservation_record}
-    record = compute[case.study](job)
-    attributes = {**record.attributes, "scene_hash": case.scene_hash, KEY_ATTRIBUTE: case.key}
-    write_records(job.part, [replace(record, attributes=attributes)])
-    return Result("ok")
+def perform_study(task: StudyTask) -> Rows:
+    """The rows of a study, in a worker process."""
+    if task.table == STEPS:
+        return ladder_rows(task)
+    if task.table == LIMIT:
+        return row_of_point(task.place, "ok", "", step_limit(task.scene, task.method))
+    try:
+        with time_limit(_SYMMETRY_LIMIT_S):
+            return row_of_point(task.place, "ok", "", symmetry_errors(task.scene, task.method))
+    except OutOfTimeError as exc:
+        return row_of_point(task.place, "timed_out", str(exc), {})
 
 
 def has_limit(scene: Scene, method: str) -> bool:
@@ -155,32 +245,40 @@ def has_limit(scene: Scene, method: str) -> bool:
     return has_function and bool(scene.bearing_stiffness) and min(scene.bearing_stiffness) >= 1e6
 
 
-def ladder_record(job: Job) -> Record:
-    """Errors in rad over steps in s, and the step that the target needs."""
-    scene, method = job.case.scene, job.case.method
-    reference = load_reference(job.reference, scene) if job.reference is not None else None
-    rows: list[tuple[float, Judgement]] = []
-    expected, step = 0.0, scene.duration / (scene.samples - 1)
-    while expected <= _LONGEST_RUN_S and scene.duration <= _MOST_STEPS * step:
+def ladder_rows(task: StudyTask) -> Rows:
+    """Errors in rad over steps in s, and the step that the target needs; steps that are not needed are left out."""
+    scene, method = task.scene, task.method
+    reference = reference_at(task.reference, scene) if task.reference is not None else None
+    steps = ladder_steps(scene)
+    judgements: list[Judgement] = []
+    expected = 0.0
+    for step in steps:
+        if expected > _LONGEST_RUN_S:
+            break
         judgement, seconds = _judged(scene, method, {"step": step}, reference)
-        rows.append((step, judgement))
+        judgements.append(judgement)
         if judgement.metrics.get("angle_error_max", np.inf) <= 0.1 * TARGET and judgement.status == "ok":
             break
-        expected, step = _FACTOR * seconds, step / _FACTOR
-    judgements = [judgement for _, judgement in rows]
+        expected = _FACTOR * seconds
     # A run that broke off has no error up to the horizon.
-    errors = [one.metrics.get("angle_error_max", np.nan) if one.status in COMPLETE else np.nan for one in judgements]
-    arrays = {
-        "step": np.array([step for step, _ in rows]),
-        "status": np.array([code_of(one.status) for one in judgements], dtype=np.int64),
-        "angle_error_max": np.array(errors),
-        "energy_drift_max": np.array([one.metrics.get("energy_drift_max", np.nan) for one in judgements]),
-    }
-    attributes: dict[str, object] = {"false_successes": sum(one.false_success for one in judgements)}
-    needed = step_for(TARGET, arrays["step"], arrays["angle_error_max"])
-    if needed is not None:
-        attributes["step_for_target_s"] = needed
-    return Record("steps", scene.name, method, attributes, arrays)
+    errors = [
+        judgement.metrics.get("angle_error_max", np.nan) if judgement.status in COMPLETE else np.nan
+        for judgement in judgements
+    ]
+    needed = step_for(TARGET, np.array(steps[: len(errors)]), np.array(errors))
+    rows = []
+    for i in range(len(steps)):
+        if i >= len(judgements):
+            rows.append(row_of_point(task.place, "left_out", "", {"false_success": 0}))
+            continue
+        values = {
+            "angle_error_max": errors[i],
+            "energy_drift_max": judgements[i].metrics.get("energy_drift_max", np.nan),
+            "false_success": int(judgements[i].false_success),
+            "step_for_target_s": np.nan if needed is None else needed,
+        }
+        rows.append(row_of_point(task.place, judgements[i].status, judgements[i].message, values))
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
 def step_for(target: float, steps: np.ndarray, errors: np.ndarray) -> float | None:
@@ -207,9 +305,8 @@ def _judged(
     return judge(scene, run, reference), run.run_times_s[0]
 
 
-def limit_record(job: Job) -> Record:
+def step_limit(scene: Scene, method: str) -> dict[str, float]:
     """The largest stable step by bisection on what becomes of the pitches, beside that of the theory."""
-    scene, method = job.case.scene, job.case.method
     function = find_method(method).stability_function
     assert function is not None  # see has_limit
     # Of a pitch about zero, the rotor fixed: gravity and rotation are negligible beside such a spring.
@@ -221,19 +318,18 @@ def limit_record(job: Job) -> Record:
     low = max(1, int(0.5 * window / theory / _INTERVALS))  # steps per interval: too few, enough
     high = 4 * low + 1
     if not _stays(short, method, high) or _stays(short, method, low):
-        found = float("nan")
+        stable = float("nan")
     else:
         while high - low > 1:
             middle = (low + high) // 2
             low, high = (low, middle) if _stays(short, method, middle) else (middle, high)
-        found = window / (_INTERVALS * high)
-    attributes = {
-        "largest_stable_step_s": found,
+        stable = window / (_INTERVALS * high)
+    return {
+        "largest_stable_step_s": stable,
         "theory_s": theory,
         "fastest_mode_per_s": max(abs(mode) for mode in modes),
         "mode_damping_ratio": min(1.0, *(abs(mode.real) / abs(mode) for mode in modes)),
     }
-    return Record("limits", scene.name, method, attributes)
 
 
 def _stays(scene: Scene, method: str, steps: int) -> bool:
@@ -277,54 +373,25 @@ def largest_stable_step(
     return low
 
 
-def conservation_record(job: Job) -> Record:
-    """What an exact run conserves: errors, relative or in rad; where a run fails, its message."""
-    scene, method = job.case.scene, job.case.method
-    try:
-        with time_limit(_LIMIT_S):
-            symmetry = _symmetry(scene, method)
-            if job.case.study != DRIFT:
-                return Record("conservation", scene.name, method, symmetry)
-            drift = drift_record(scene, method)
-            return replace(drift, attributes={**symmetry, **drift.attributes})
-    except OutOfTimeError as exc:
-        return Record("conservation", scene.name, method, {"message": str(exc)})
-
-
-def drift_record(scene: Scene, method: str) -> Record:
-    """Root mean square of the relative energy error over perturbed starts, over time, and its growth exponent."""
-    generator = np.random.default_rng(_SEED)
-    long = replace(scene, duration=_LONG_S, samples=401, outputs=("angles", "rates", "energy"))
-    squares = np.zeros(long.samples)
-    for _ in range(STARTS):
-        shift = _PERTURBATION * generator.standard_normal(len(long.initial_angles))
-        start = replace(long, initial_angles=tuple((np.array(long.initial_angles) + shift).tolist()))
-        run = _run(start, method)
-        error = energy_error(run)
-        assert error is not None  # the scene asks for energies
-        squares += (error / energy_scale(start, run)) ** 2
-        time = run.time
-    rms = np.sqrt(squares / STARTS)
-    attributes = {"exponent": theory.drift_exponent(time, rms), "starts": STARTS, "largest": float(rms.max())}
-    return Record("conservation", scene.name, method, attributes, {"time": time, "energy_drift_rms": rms})
-
-
 def _run(scene: Scene, method: str) -> Trajectory:
     return solve(method, scene, {}).trajectory
 
 
-def _symmetry(scene: Scene, method: str) -> dict[str, float]:
-    """rad, but for the angular momentum (relative); what does not exist for the scene is left out."""
+def symmetry_errors(scene: Scene, method: str) -> dict[str, float]:
+    """What an exact run conserves: errors in rad, of the angular momentum relative.
+
+    What does not exist for the scene is left out.
+    """
     there = _run(scene, method)
-    found = {
+    errors = {
         "mirror_error": theory.mirror_error(there.angles, _run(theory.mirrored(scene), method).angles),
         "relabelling_error": theory.relabelling_error(there.angles, _run(theory.relabelled(scene), method).angles),
     }
     # From the last sample on with all rates reversed it runs back to its start.
     end = tuple(there.angles[-1].tolist()), tuple((-there.rates[-1]).tolist())
     back = _run(replace(scene, initial_angles=end[0], initial_rates=end[1]), method)
-    found["reversal_error"] = float(np.abs(back.angles[-1] - np.array(scene.initial_angles)).max())
+    errors["reversal_error"] = float(np.abs(back.angles[-1] - np.array(scene.initial_angles)).max())
     if scene.gravity == 0.0 and not scene.has_torque:
         momentum = angular_momentum(scene, there.angles, there.rates)
-        found["angular_momentum_drift"] = float(np.abs(momentum - momentum[0]).max() / abs(momentum[0]))
-    return found
+        errors["angular_momentum_drift"] = float(np.abs(momentum - momentum[0]).max() / abs(momentum[0]))
+    return errors

@@ -4,41 +4,60 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rotor_mbs.analysis.claim_records import shipped_claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.read import StoredRun, open_results
+from rotor_mbs.runs.results import RUNS, TableFile
+from rotor_mbs.runs.table import MISSING, Place
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.quantities import LOADS
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution.quantities import LOADS, sample_times
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 
-_SHORT = 5001  # samples: at some 30 numbers each, twenty references take 25 MB at most
+# References that stay in memory: of so many samples, at some 30 numbers each, twenty of them take 25 MB at most.
+_SHORT, _MAX_RECENT = 5001, 20
+_recent: dict[tuple[object, ...], Trajectory] = {}
+# What cannot be computed again from angles and rates as precisely.
+_KEPT = ("work", "angle_uncertainty", "error_growth", *(load.name for load in LOADS))
 
 
 def shipped_files() -> list[Path]:
     """The files of frozen references."""
-    return sorted(set(reference_folder().glob("*.h5")) - {shipped_claims()})
+    return sorted(reference_folder().glob("*.h5"))
 
 
-def frozen_file(scene_hash: str) -> Path | None:
-    """The shipped file with the reference of the scene of that hash; None where there is none."""
-    return _files_by_hash(tuple(shipped_files())).get(scene_hash)
+class ShippedReference(NamedTuple):
+    """Where the shipped reference of a scene is, and what computed it."""
+
+    path: Path
+    scene: str
+    frozen_with: str
+
+
+def shipped_reference(scene_hash: str) -> ShippedReference | None:
+    """The shipped reference of the scene of that hash; None where there is none."""
+    return _shipped_by_hash(tuple(shipped_files())).get(scene_hash)
 
 
 @functools.cache
-def _files_by_hash(files: tuple[Path, ...]) -> dict[str, Path]:
-    found: dict[str, Path] = {}
+def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
+    by_hash: dict[str, ShippedReference] = {}
     for path in files:
-        with open_results(path) as results:
-            found |= {str(scene.attributes["scene_hash"]): path for scene in results.scenes.values()}
-    return found
+        file = TableFile(path)
+        for row in range(len(file.tables[RUNS].runs)):
+            known = file.known(RUNS, row)
+            frozen_with = json.loads(known["versions"])["frozen_with"]
+            by_hash[known["scene_hash"]] = ShippedReference(path, known["scene"], frozen_with)
+    return by_hash
 
 
 @functools.cache
@@ -47,50 +66,57 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def load_reference(path: Path, scene: Scene) -> Trajectory | None:
-    """The reference of `scene` in a results file, not to be changed; None where there is none, or where it is empty.
+def reference_at(place: Place, scene: Scene) -> Trajectory | None:
+    """The reference of `scene` at a place of a results file, not to be changed; None where it is missing or empty.
 
     Short ones stay in memory: a process judges runs of one scene by many methods.
     """
-    state = path.stat() if path.is_file() else None
-    load = _load_reference if scene.samples <= _SHORT else _load_reference.__wrapped__
-    return load(path, state and (state.st_ino, state.st_mtime_ns, state.st_size), scene)
-
-
-@functools.lru_cache(maxsize=20)
-def _load_reference(path: Path, _state: object, scene: Scene) -> Trajectory | None:
-    with open_results(path) as results:
-        stored = results.scenes[scene.name].reference if scene.name in results.scenes else None
-        if stored is None or not len(stored.array("time")):
-            return None
-        return rebuilt_reference(scene, stored)
+    row = place.read()
+    samples = int(row["samples"][0])
+    if int(row["status"][0]) == MISSING or samples <= 0:
+        return None
+    key = (place.path, place.inode, int(row["crc32"][0]), scene)
+    if key in _recent:
+        return _recent[key]
+    arrays = {name: row[name][0][:samples] for name in ("angles", "rates", *_KEPT) if name in row}
+    reference = _rebuilt(scene, {"time": sample_times(scene)[:samples], **arrays})
+    if scene.samples <= _SHORT:
+        if len(_recent) >= _MAX_RECENT:
+            _recent.pop(next(iter(_recent)))
+        _recent[key] = reference
+    return reference
 
 
 def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
     """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form."""
+    names = [name for name in ("time", "angles", "rates", *_KEPT) if name in stored]
+    return _rebuilt(scene, {name: stored.array(name) for name in names})
+
+
+def _rebuilt(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     from rotor_mbs.models.lagrange import samples
 
-    angles, rates = stored.array("angles"), stored.array("rates")
+    known = {name: values for name, values in arrays.items() if not np.isnan(values[:1]).all()}
     moving = scene.moving_coordinates
-    result = samples.trajectory(scene, stored.array("time"), np.hstack([angles[:, moving], rates[:, moving]]))
-    if "work" in stored:
-        result.work = stored.array("work")
-    result.angle_uncertainty = stored.array("angle_uncertainty")
-    result.error_growth = stored.get("error_growth")
-    result.quantities |= {load.name: stored.array(load.name) for load in LOADS if load.name in stored}
-    return result
+    states = np.hstack([known["angles"][:, moving], known["rates"][:, moving]])
+    reference = samples.trajectory(scene, known["time"], states)
+    reference.quantities |= {name: known[name] for name in _KEPT if name in known}
+    return reference
 
 
-def frozen_solution(scene: Scene, scene_hash: str) -> tuple[Solution, dict[str, Any]]:
-    """The shipped reference of a scene, with the settings and times of when it was computed; and who computed it.
+def frozen_solution(scene: Scene) -> Solution:
+    """The shipped reference of a scene, with the settings and times of when it was computed.
 
-    Raises StoreError where none is shipped.
+    Raises
+    ------
+    StoreError
+        Where none is shipped.
     """
-    path = frozen_file(scene_hash)
-    if path is None:
+    shipped = shipped_reference(scene_hash(scene))
+    if shipped is None:
         raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}; `rotor-mbs reference` makes one")
-    with open_results(path) as results:
-        stored = next(s for s in results.scenes.values() if s.attributes["scene_hash"] == scene_hash).reference
+    with open_results(shipped.path) as results:
+        stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene
         facts = stored.attributes
         trajectory = rebuilt_reference(scene, stored)
@@ -103,6 +129,4 @@ def frozen_solution(scene: Scene, scene_hash: str) -> tuple[Solution, dict[str, 
             out_of_time=facts["status"] == "timed_out",
         )
         times = (facts["setup_time_s"], [facts["run_time_s"]], facts["output_time_s"])
-        return Solution(scene, REFERENCE, trajectory, engine, stored.settings, *times), {
-            "frozen_with": facts["frozen_with"]
-        }
+        return Solution(scene, REFERENCE, trajectory, engine, stored.settings, *times)

@@ -7,34 +7,31 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, MethodRefusal, StoreError
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
-from rotor_mbs.runs.layout import KEYWORDS, SWEEP_IDENTITY
-from rotor_mbs.runs.pool import Finished, TaskPool, run_in
-from rotor_mbs.runs.sweep_columns import MISSING, Rows, RunColumns, row_type
-from rotor_mbs.runs.sweep_dataset import open_sweep
-from rotor_mbs.runs.versions import NUMERICS, fingerprint, machine, versions
+from rotor_mbs.runs.files import KEYWORDS
+from rotor_mbs.runs.pool import TaskPool
+from rotor_mbs.runs.runner import compute
+from rotor_mbs.runs.sweeps import IDENTITY, code_of_method, open_sweep, sweep_table
+from rotor_mbs.runs.table import MISSING, Place, Rows, Table
+from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.toml_file import of_file, shown_path
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.studies.sweep_work import Chunk, lost_rows, perform
+from rotor_mbs.studies.sweep_work import Chunk, perform
 
 # Runs handed to a worker at once where the method computes many side by side: by the fastest one an eighth of a second
 # of work, fewer towards the end, so that all workers end together. The least fills the lanes of any processor.
-_MOST_RUNS = 128
-_LEAST_RUNS = 8
+_MAX_RUNS = 128
+_MIN_RUNS = 8
 _CHUNK_BYTES = 1 << 23
 
-_FORMAT = 5  # of rows and columns: a sweep begun by another version is not continued
-_GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 # From (runs stored, runs in all, statuses of those that have just been stored).
 OnProgress = Callable[[int, int, Counter[str]], None]
@@ -63,14 +60,13 @@ class SweepPlan:
     def rows(self) -> int:
         return self.sweep.design.count
 
-    def opened(self, output: Path) -> AbstractContextManager[tuple[RunColumns, NDArray[np.int8]]]:
-        """Its dataset, and the statuses of its runs: `open_sweep`."""
-        numbers = range(self.first, self.last)
-        return open_sweep(output, self.sweep, self.methods, numbers, self._attributes(), self.time_limit_s)
+    def table(self) -> Table:
+        """The table of its runs."""
+        return sweep_table(self.sweep, self.methods, range(self.first, self.last))
 
-    def chunks(self, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
+    def chunks(self, place: Place, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
         """The runs of `gaps`, cut into what one of `workers` does at once, by one method."""
-        variants, row, design = self.sweep.variants(), row_type(self.sweep), self.sweep.design
+        variants, design = self.sweep.variants(), self.sweep.design
         for first, _ in gaps[:1]:
             variants.scene(design.rows(first, first + 1)[0].tolist())
         left = sum(last - first for first, last in gaps)
@@ -79,17 +75,17 @@ class SweepPlan:
                 number = first // self.rows
                 method, size = find_method(self.methods[number]), 1
                 if method.solve_many is not None:
-                    most = min(_CHUNK_BYTES // row.itemsize, left // (2 * workers), _MOST_RUNS)
-                    size = max(most // _LEAST_RUNS, 1) * _LEAST_RUNS
+                    most = min(_CHUNK_BYTES // place.row.itemsize, left // (2 * workers), _MAX_RUNS)
+                    size = max(most // _MIN_RUNS, 1) * _MIN_RUNS
                 end = min(first + size, last, (number + 1) * self.rows)
                 values, settings = design.rows(first, end), self.settings[method.name]
-                yield Chunk(variants, method.name, settings, row, first, values, self.time_limit_s)
+                code = code_of_method(method.name)
+                yield Chunk(variants, method.name, settings, place, first, values, self.time_limit_s, code)
                 first, left = end, left - (end - first)
 
     def _identity(self) -> str:
         sweep, table = self.sweep, self.sweep.table
         content = [
-            _FORMAT,
             scene_hash(sweep.base),
             sweep.keys,
             table.combine,
@@ -102,15 +98,13 @@ class SweepPlan:
             [table.validation, table.test],
             table.seed,
             [self.first, self.last],
-            versions(),
-            fingerprint(*NUMERICS),
         ]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
         for values in sweep.design.values:
             digest.update(values.tobytes())
         return digest.hexdigest()
 
-    def _attributes(self) -> dict[str, object]:
+    def attributes(self) -> dict[str, object]:
         sweep, table = self.sweep, self.sweep.table
         return {
             "title": table.title,
@@ -129,7 +123,8 @@ class SweepPlan:
             "test_share": table.test,
             "settings": json.dumps(table.settings, sort_keys=True),
             "runs_of_all_parts": self.rows * len(self.methods),
-            SWEEP_IDENTITY: self._identity(),
+            IDENTITY: self._identity(),
+            "methods": list(self.methods),
             "runs": self.runs,
             "parameter_keys": list(sweep.keys),
             **versions(),
@@ -162,6 +157,7 @@ class SweepResult:
     statuses     how many runs have each status
     seconds      of this call
     is_ok        whether every run is ok whose method claims the correct equations
+    older        how many stored runs other versions computed than those here
     lost         a line for each run whose process died or could not start, also when it was tried alone: not stored
     """
 
@@ -172,6 +168,7 @@ class SweepResult:
     seconds: float
     is_ok: bool
     lost: tuple[str, ...] = ()
+    older: int = 0
 
 
 def run_sweep(
@@ -179,38 +176,57 @@ def run_sweep(
     output: Path,
     pool: TaskPool,
     on_progress: OnProgress = lambda *_: None,
-    work: Callable[[Chunk], Rows | NDArray[np.int8]] = perform,
+    work: Callable[[Chunk], Rows] = perform,
+    *,
+    fresh: bool = False,
 ) -> SweepResult:
     """Computes the runs that `output` misses. However it is interrupted, the same call continues from there.
 
-    pool          what runs the chunks; it stays open
-    on_progress   called when runs have been stored, first with those that were there
-    work          what is done with a chunk of runs in a worker
+    Parameters
+    ----------
+    pool : what runs the chunks; it stays open.
+    on_progress : called when runs have been stored, first with those that were there.
+    work : what is done with a chunk of runs in a worker.
+    fresh : whether runs that are stored are computed again.
 
-    Raises InputError, MethodRefusal where the sweep cannot be done, or the output is another file; StoreError where the
-    output cannot be written: what was stored stays.
+    Raises
+    ------
+    InputError, MethodRefusal
+        Where the sweep cannot be done, or the output is another file.
+    StoreError
+        Where the output cannot be written: what was stored stays.
     """
     start = time.monotonic()
-    with plan.opened(output) as (dataset, statuses):
+    opened = open_sweep(output, plan.table(), plan.attributes(), plan.time_limit_s, fresh=fresh)
+    with opened as (place, statuses):
         missing, lost = int((statuses == MISSING).sum()), list[str]()
         done = plan.runs - missing
+        older = _older(plan, place, statuses)
         on_progress(done, plan.runs, Counter())
-        columns = dataset if pool.shares_disk else None
-        chunks = (replace(chunk, columns=columns) for chunk in plan.chunks(_gaps(plan, statuses), pool.workers))
-        for end in run_in(pool, work, chunks, _hard_limit, Chunk.split):
-            if end.failure == "worker_died":  # nothing is known of these runs: they stay missing
-                lost += [f"run {run}: {end.message}" for run in range(end.task.first, end.task.last)]
-                on_progress(done, plan.runs, Counter({end.failure: len(end.task.values)}))
+        for end in compute(pool, work, plan.chunks(place, _gaps(plan, statuses), pool.workers)):
+            chunk = end.task
+            assert isinstance(chunk, Chunk)
+            if end.rows is None:  # nothing is known of these runs: they stay missing
+                lost += [f"run {run}: {end.message}" for run in range(chunk.first, chunk.first + len(chunk.values))]
+                on_progress(done, plan.runs, Counter({end.failure: len(chunk.values)}))
                 continue
-            found = _found(end)
-            stored = dataset.write(end.task.first, found) if isinstance(found, dict) else found
-            statuses[end.task.first - plan.first : end.task.last - plan.first] = stored
+            stored = end.rows["status"]
+            statuses[chunk.first - plan.first : chunk.first - plan.first + len(stored)] = stored
             done += len(stored)
             on_progress(done, plan.runs, _counted(stored))
         seconds, made = time.monotonic() - start, missing - len(lost)
         failed = np.unique((np.flatnonzero(statuses != code_of("ok")) + plan.first) // plan.rows)
         is_ok = not any(is_corrected(plan.methods[number]) for number in failed)
-        return SweepResult(dataset.path, plan.runs, made, _counted(statuses), seconds, is_ok, tuple(lost))
+        counts = _counted(statuses)
+        return SweepResult(place.path, plan.runs, made, counts, seconds, is_ok, tuple(lost), older)
+
+
+def _older(plan: SweepPlan, place: Place, statuses: NDArray[np.int8]) -> int:
+    """How many stored runs other versions computed than those here."""
+    codes = np.fromfile(place.path, "<u4", plan.runs, offset=place.offsets["code"])
+    now = np.array([code_of_method(name) for name in plan.methods], np.uint32)
+    methods = (np.arange(plan.first, plan.last)) // plan.rows
+    return int(((statuses != MISSING) & (codes != now[methods])).sum())
 
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
@@ -221,23 +237,6 @@ def _gaps(plan: SweepPlan, statuses: NDArray[np.int8]) -> list[tuple[int, int]]:
     """(first, last) of every span of missing runs."""
     edges = np.flatnonzero(np.diff(statuses == MISSING, prepend=False, append=False))
     return [(int(first), int(last)) for first, last in plan.first + edges.reshape(-1, 2)]
-
-
-def _found(end: Finished[Chunk, Rows | NDArray[np.int8]]) -> Rows | NDArray[np.int8]:
-    """What a chunk left: rows to be written, or the statuses of those that its worker has written."""
-    if isinstance(end.error, InputError | MethodRefusal | StoreError):
-        raise end.error
-    if end.value is None:
-        status = "solver_failed" if end.failure == "error" else end.failure
-        rows = lost_rows(len(end.task.values), end.task.row, status, end.message)
-        rows["time_limit_s"][:] = end.task.time_limit_s if status == "timed_out" else np.nan
-        return rows
-    return end.value
-
-
-def _hard_limit(chunk: Chunk) -> float:
-    """When a worker is ended: a method that computes many runs side by side may do so one after the other."""
-    return chunk.time_limit_s * len(chunk.values) + _GRACE_S
 
 
 def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
@@ -251,7 +250,9 @@ def estimate_seconds(plan: SweepPlan, pool: TaskPool) -> float:
 
 
 def _seconds_per_run(plan: SweepPlan, first: int, pool: TaskPool) -> float:
-    chunk = next(plan.chunks([(first, first + min(plan.rows, _MOST_RUNS))]))
+    row = plan.table().row_type  # only its columns count: nothing is stored
+    nowhere = Place(Path(), 0, plan.first, {}, row)
+    chunk = next(plan.chunks(nowhere, [(first, first + min(plan.rows, _MAX_RUNS))]))
     try:
         # The first one loads and compiles, which all others find done.
         pool.submit(perform, chunk.part(0, 1), plan.time_limit_s).result()

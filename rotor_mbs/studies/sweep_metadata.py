@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.files import replace_file
-from rotor_mbs.runs.layout import KEYWORDS
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.files import KEYWORDS
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep_design import SPLITS
 from rotor_mbs.solution.status import code_of
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import error_growth
-from rotor_mbs.runs.sweep_columns import AMPLIFICATION, MESSAGE_BYTES, METRICS, Rows, RunColumns
+from rotor_mbs.runs.sweeps import AMPLIFICATION, METRICS
+from rotor_mbs.runs.table import Place, Rows, blank_rows, characters
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
@@ -27,38 +28,50 @@ from rotor_mbs.solution.status import code_of
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock, Trajectory
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
+_GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 
 @dataclass(frozen=True)
 class Chunk:
     """Runs first ... first + len(values) - 1 by one method.
 
-    values        (runs, keys) the varied numbers
-    row           the type of a stored row
-    time_limit_s  of one run
-    columns       where the rows are to be written; None where they are to be returned
+    Attributes
+    ----------
+    values : (runs, keys) the varied numbers.
+    place : where the rows of the table are.
+    code : of the versions that compute them, stored with each.
+    time_limit_s : of one run.
     """
 
     variants: Variants
     method: str
     settings: Mapping[str, object]
-    row: np.dtype[np.void]
+    place: Place
     first: int
     values: NDArray[np.float64]
     time_limit_s: float
-    columns: RunColumns | None = None
+    code: int
 
     @property
-    def last(self) -> int:
-        """The run after its last one."""
-        return self.first + len(self.values)
+    def limit_s(self) -> float:
+        """When its worker is ended: a method that computes many runs side by side may do so one after the other."""
+        return self.time_limit_s * len(self.values) + _GRACE_S
 
     def split(self) -> list[Chunk]:
         """Its runs one by one; [] where it is one run."""
         return [self.part(i, i + 1) for i in range(len(self.values))] if len(self.values) > 1 else []
 
     def part(self, start: int, end: int) -> Chunk:
+        """Some of its runs."""
         return replace(self, first=self.first + start, values=self.values[start:end])
+
+    def failed(self, status: str, message: str) -> Rows:
+        """The rows of runs whose process was ended, or that raised."""
+        rows = blank_rows(len(self.values), self.place.row)
+        put_end(rows, slice(None), status, message)
+        rows["time_reached"][:], rows["code"][:] = 0.0, self.code
+        rows["time_limit_s"][:] = self.time_limit_s if status == "timed_out" else np.nan
+        return rows
 
 
 def prepare() -> None:
@@ -66,14 +79,18 @@ def prepare() -> None:
     is_available()
 
 
-def perform(chunk: Chunk) -> Rows | NDArray[np.int8]:
-    """Computes the runs; returns their rows, or their statuses where the rows have been written.
+def perform(chunk: Chunk) -> Rows:
+    """(runs, ...) columns of all runs of a chunk.
 
-    Raises InputError, MethodRefusal, StoreError; a run's own failure is in its row.
+    Raises
+    ------
+    InputError, MethodRefusal
+        A run's own failure is in its row.
     """
     rows = rows_of(chunk)
     rows["time_limit_s"][rows["status"] == code_of("timed_out")] = chunk.time_limit_s
-    return rows if chunk.columns is None else chunk.columns.write(chunk.first, rows)
+    rows["code"][:] = chunk.code
+    return rows
 
 
 def rows_of(chunk: Chunk) -> Rows:
@@ -82,7 +99,7 @@ def rows_of(chunk: Chunk) -> Rows:
     if find_method(chunk.method).solve_many is not None and _has_all_of(scenes[0].outputs):
         rows = _side_by_side(chunk, scenes)
     else:
-        rows = empty_rows(len(scenes), chunk.row)
+        rows = blank_rows(len(scenes), chunk.place.row)
         for i, scene in enumerate(scenes):
             try:
                 run = solve(chunk.method, scene, chunk.settings, time_limit_s=chunk.time_limit_s)
@@ -97,25 +114,9 @@ def rows_of(chunk: Chunk) -> Rows:
     return rows
 
 
-def empty_rows(count: int, row: np.dtype[np.void], names: Iterable[str] | None = None) -> Rows:
-    """Runs that left nothing: NaN, -1 and no text. `names`: these columns only."""
-    blank = {"f": np.nan, "i": -1, "u": 0}
-    kinds = {name: row[name] for name in names or row.names or ()}
-    return {name: np.full((count, *kind.shape), blank[kind.base.kind], kind.base) for name, kind in kinds.items()}
-
-
 def put_end(rows: Rows, runs: int | slice, status: str, message: str) -> None:
     """How these runs ended."""
-    text = message.encode()[:MESSAGE_BYTES].ljust(MESSAGE_BYTES, b"\0")
-    rows["status"][runs], rows["message"][runs] = code_of(status), np.frombuffer(text, np.uint8)
-
-
-def lost_rows(count: int, row: np.dtype[np.void], status: str, message: str) -> Rows:
-    """Of runs whose process died, or was ended."""
-    rows = empty_rows(count, row)
-    put_end(rows, slice(None), status, message)
-    rows["time_reached"][:] = 0.0
-    return rows
+    rows["status"][runs], rows["message"][runs] = code_of(status), characters(message, rows["message"].shape[1])
 
 
 def _put_amplification(rows: Rows, i: int, scene: Scene) -> None:
@@ -180,11 +181,13 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     drifts = energy_drifts(scenes, kinetic, work, errors)
     angles = largest(found["angles"].reshape(len(scenes), -1))
     ok = clearly_ok(scenes, method.name, block.integrations, block.samples, drifts, angles, method.bounds)
-    rows = empty_rows(len(scenes), chunk.row, (METRICS | AMPLIFICATION).keys() & set(chunk.row.names or ()))
-    for name in chunk.row.names or ():
+    row = chunk.place.row
+    metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | AMPLIFICATION])
+    rows = blank_rows(len(scenes), metrics)
+    for name in row.names or ():
         if name not in rows:
             values = errors if name == "energy_error" else _quantity(block, scenes, method, name)
-            rows[name] = np.ascontiguousarray(values, chunk.row[name].base)
+            rows[name] = np.ascontiguousarray(values, row[name].base)
     rows["status"][ok] = code_of("ok")
     rows["energy_drift_max"] = drifts
     _put_extremes(rows, slice(None), found["angles"], found["rates"])

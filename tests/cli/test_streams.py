@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from support.sweeps import made_sweep
 
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep
 
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="closes and fills streams as Unix has them")
 RUN = [sys.executable, "-m", "rotor_mbs"]

@@ -18,8 +18,8 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.runs.runner import Job
-from rotor_mbs.runs.sweep_columns import MISSING
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.table import MISSING
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.scene_file import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.status import STATUSES

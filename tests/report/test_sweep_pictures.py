@@ -16,7 +16,7 @@ from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_expo
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core.elements import Section
 from rotor_mbs.report.pages.sweep import map_panels, response, save_picture, spread_panels, sweep_page
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 
 

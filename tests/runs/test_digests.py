@@ -20,7 +20,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.digests import seal
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.results_file import ResultsStore
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep import load_sweep
 
 METHOD = "lagrange/dop853"

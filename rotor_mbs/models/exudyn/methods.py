@@ -118,6 +118,11 @@ def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
     return scheme
 
 
+def _chain_arrays(settings: ChainAlphaSettings | ChainNewmarkSettings) -> tuple[str, ...]:
+    """The error that joints make, and where the run is extrapolated a bound on its own error."""
+    return ("constraint_error", "angle_uncertainty") if settings.extrapolation == RICHARDSON else ("constraint_error",)
+
+
 def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
     """What all six have in common."""
     in_tree = model == "exudyn_tree"
@@ -130,6 +135,7 @@ def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
         label=f"Exudyn {'tree' if in_tree else 'chain'}, {label}",
         build=_build_tree if in_tree else _build_chain,
         items=items,
+        arrays=(lambda _: ()) if in_tree else _chain_arrays,
         distributions=("exudyn",),
         relative_cost=10.0 if in_tree else 100.0,
         load=lambda: import_module("rotor_mbs.models.exudyn.adapter"),

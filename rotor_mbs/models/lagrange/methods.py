@@ -133,6 +133,7 @@ METHODS = (
         look=Look(_BLUE, "-.", "*"),
         settings=ReferenceSettings,
         build=reference.build,
+        arrays=lambda _: ("angle_uncertainty", "error_growth"),
         items=equation_items,
     ),
 )  # fmt: skip

@@ -23,7 +23,7 @@ from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.text_table import listed
 
 _FOLDERS = ("stiff", "extreme")
-_SUITE = ("steps", "limits", "conservation")
+_SUITE = ("stability", "stability_limits", "symmetry")
 NOT_COMPARED = "horizon before the second sample"
 _FAMILIES = {"needle": "on a needle", "scale": "out of scale"}  # headings that are not the family's name
 _CONSERVED = {
@@ -51,7 +51,7 @@ def stability_pages(opened: OpenResults, main: str, site: Site) -> dict[str, str
     pages = {main: render("stability", _map(found, records, files, titles), site, main)}
     for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
         own = [cell for cell in found if cell.scene == name]
-        ladders = [record for record in records if record.kind == "steps" and record.scene == name]
+        ladders = [record for record in records if record.kind == "stability" and record.scene == name]
         around = {"previous": files.get(previous, ""), "next": files.get(following, "")}
         page = _scene_page(opened.scenes[name], own, ladders) | around
         pages[files[name]] = render("stability_scene", page, site)
@@ -109,7 +109,7 @@ def _limits(records: Sequence[Record]) -> Section:
     rows = []
     for record in records:
         facts = record.attributes
-        if record.kind == "limits" and math.isfinite(facts["largest_stable_step_s"]):
+        if record.kind == "stability_limits" and math.isfinite(facts["largest_stable_step_s"]):
             step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
             numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
             numbers.append(f"{facts['mode_damping_ratio']:.3g}")

@@ -1,0 +1,448 @@
+"""Results files as they are written: a row per run in the table /runs, its arrays in a table of its scene.
+
+    /runs           run (text), scene, method_name, settings, versions; status, message, metrics, times
+    /paper/fig11    run (text), time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
+                    error_growth, angle_uncertainty (time): of the reference
+    /bench, /stability ...   tables of other studies, each row with a status of its own
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
+from rotor_mbs.runs import files, table
+from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column
+from rotor_mbs.runs.table import MISSING, Place, Rows, StoredTable, Table, blank_rows, characters
+from rotor_mbs.runs.versions import machine, row_versions, versions
+from rotor_mbs.scenario.catalogue import natural_key
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution.quantities import SCALES, quantities, scale_values
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.status import code_of
+
+RUNS = "runs"
+_OF_REFERENCE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
+# What a method that is no reference says of itself under such a name: its name in the file.
+OF_METHODS = {"angle_uncertainty": "own_uncertainty"}
+_TEXT_LENGTH = 600  # characters of a message
+
+_COMPUTED = {
+    "status": Column(("run",), "1", "how the run ended, from its state; -1 while it is missing", "i1"),
+    "message": Column(("run", CHARACTERS), "1", "why the run did not end well", table.CHARACTER),
+    "samples": Column(("run",), "1", "finite samples", "<i8"),
+    "time_reached": Column(("run",), "s", "time of the last sample"),
+    "time_limit_s": Column(("run",), "s", "time limit that ended the run, NaN where none did"),
+    "steps": Column(("run",), "1", "integration steps, -1 where not known", "<i8"),
+    "rhs_evaluations": Column(("run",), "1", "evaluations of the right-hand side, -1 where not known", "<i8"),
+    "setup_time_s": Column(("run",), "s", "building the model"),
+    "run_time_s": Column(("run",), "s", "median run time of the integration alone"),
+    "run_time_min_s": Column(("run",), "s", "shortest run time"),
+    "output_time_s": Column(("run",), "s", "reading out and computing the samples"),
+    "repeats": Column(("run",), "1", "timed runs", "<i8"),
+    "engine_success": Column(("run",), "1", "1 where the engine reported success, -1 where there is no report", "i1"),
+    "engine_message": Column(("run", CHARACTERS), "1", "what the engine reported", table.CHARACTER),
+    "false_success": Column(("run",), "1", "1 where the engine reported success and the state says otherwise", "i1"),
+    "energy_scale_J": Column(("run",), "J", "what energy errors are relative to"),
+    "energy_drift_max": Column(("run",), "1", "largest energy error over the run, of the energy scale"),
+    "energy_gain_J": Column(("run",), "J", "largest energy gained without work"),
+    "angle_error_max": Column(("run",), "rad", "largest angle error up to the horizon"),
+    "angle_error_per_growth": Column(("run",), "1", "largest relative angle error per unit of error growth"),
+    "angle_error_whole": Column(("run",), "rad", "largest angle error over the run"),
+    "angle_error_end": Column(("run",), "rad", "angle error at the last sample"),
+    "horizon_s": Column(("run",), "s", "last sample before the error growth reaches 1e5, or the end"),
+    "angular_impulse_error_max": Column(("run",), "1", "error of the angular momentum balance, of its scale"),
+    "linear_impulse_error_max": Column(("run",), "1", "error of the linear momentum balance, of its scale"),
+    "zero_pitch_max": Column(("run",), "rad", "largest angle of a pitch that is zero in the reference"),
+    "zero_pitch_left_s": Column(("run",), "s", "when such a pitch left zero"),
+    "zero_pitch_growth_per_s": Column(("run",), "1/s", "growth rate of such a pitch"),
+    "rotor_angle_min": Column(("run",), "rad", "smallest rotor angle, at the integrator's own output points"),
+    "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, at the integrator's own output points"),
+    "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate either way, at the integrator's own output points"),
+}
+_CHECKSUM = Column(("run",), "1", "CRC-32 of the row in all computed columns", "<u4")
+_TEXTS = {
+    "scene": "scene",
+    "method_name": "method, model/integrator",
+    "settings": "settings of the method, JSON",
+    "versions": "versions of what computed the run, JSON",
+    "scene_hash": "SHA-256 of the scene's numbers",
+}
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A run as it is asked for: a row of the design.
+
+    Attributes
+    ----------
+    scene, method, settings : settings in place of the method's defaults.
+    versions : of what computes it, by default those of this installation; of a reference that is read from a shipped
+        file also who computed it (`frozen_with`).
+    """
+
+    scene: Scene
+    method: str
+    settings: Mapping[str, object] = field(default_factory=dict)
+    versions: Mapping[str, str] | None = None
+
+    @property
+    def is_read(self) -> bool:
+        """Whether it is read from a shipped file and not computed."""
+        return self.versions is not None and "frozen_with" in self.versions
+
+    @property
+    def run(self) -> str:
+        """The label of its row, "paper/fig11/lagrange/taylor"."""
+        return f"{self.scene.name}/{self.method}"
+
+    @property
+    def known(self) -> dict[str, str]:
+        """The columns of /runs that follow from the design."""
+        method = find_method(self.method)
+        settings = method.settings.of(self.method, self.settings).as_dict()
+        return {
+            "scene": self.scene.name,
+            "method_name": self.method,
+            "settings": json.dumps(settings, sort_keys=True),
+            "versions": json.dumps(dict(self.versions or row_versions(method)), sort_keys=True),
+            "scene_hash": scene_hash(self.scene),
+        }
+
+
+def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
+    """The computed columns of /runs for scenes that ask for these outputs."""
+    columns = dict(_COMPUTED)
+    for quantity in quantities(outputs):
+        if quantity.judgement is not None:
+            unit = "1" if quantity.judgement.per_growth_of else quantity.units
+            columns[quantity.judgement.metric] = Column(("run",), unit, f"largest error of {quantity.long_name}")
+        if quantity.has_peak:
+            columns[f"{quantity.name}_max"] = Column(("run",), quantity.units, f"largest {quantity.long_name}")
+            columns[f"{quantity.name}_max_time_s"] = Column(("run",), "s", f"time of the largest {quantity.long_name}")
+            if quantity.dimensions[1:2] == ("blade",):
+                columns[f"{quantity.name}_max_blade"] = Column(("run",), "1", "its blade, from 1")
+    return columns | {"crc32": _CHECKSUM}
+
+
+def runs_table(asked: Sequence[Asked]) -> Table:
+    """The table /runs of these runs."""
+    known = [run.known for run in asked]
+    texts = {
+        name: (Column(("run",), "1", long_name), [row[name] for row in known]) for name, long_name in _TEXTS.items()
+    }
+    outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
+    return Table(RUNS, [run.run for run in asked], texts, metric_columns(outputs), {CHARACTERS: _characters()})
+
+
+def _characters() -> tuple[Column, np.ndarray[Any, Any]]:
+    return Column((CHARACTERS,), "1", ""), np.empty(_TEXT_LENGTH, np.int8)
+
+
+def arrays_of(run: Asked) -> dict[str, Column]:
+    """The arrays over time that a run stores, by their name in the file."""
+    method = find_method(run.method)
+    own = method.arrays(method.settings.of(run.method, run.settings))
+    # A reference is read back by its angles and rates, whatever the scene asks for.
+    outputs = (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
+    columns = {}
+    for quantity in quantities(outputs):
+        if not quantity.is_over_time or not (quantity.required or quantity.name in own):
+            continue
+        if quantity.name in _OF_REFERENCE and run.method == REFERENCE:
+            columns[quantity.name] = Column(quantity.dimensions, quantity.units, quantity.long_name)
+        else:
+            name = OF_METHODS.get(quantity.name, quantity.name)
+            columns[name] = Column(("run", *quantity.dimensions), quantity.units, quantity.long_name)
+    return columns
+
+
+def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) -> Table:
+    """The table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
+    scene = runs[0].scene
+    filled = {
+        name: column
+        for run in runs
+        for name, column in arrays_of(run).items()
+        if arrays is None or name in arrays
+    }
+    used = {"time"}.union(*(column.dimensions for column in filled.values()))
+    values = scale_values(scene)
+    scales = {
+        name: (Column((name,), scale.units, scale.long_name), values[name])
+        for name, scale in SCALES.items()
+        if name in used
+    }
+    attributes = {
+        "title": scene.title,
+        "figures": ", ".join(scene.figures),
+        "blades": len(scene.blades),
+        "scene_toml": scene.text,
+        "scene_hash": scene_hash(scene),
+        "NX_class": "NXdata",
+        "signal": "angles",
+        "axes": ["run", "time", "coordinate"],
+    }
+    labels = {"coordinate": scene.coordinate_labels} if "coordinate" in used else {}
+    return Table(scene.name, [run.method for run in runs], {}, filled, scales, labels, attributes)
+
+
+def results_tables(asked: Sequence[Asked]) -> list[Table]:
+    """The tables of a results file with these runs."""
+    asked = sorted(asked, key=lambda run: _order(run.run))
+    by_scene: dict[str, list[Asked]] = {}
+    for run in asked:
+        by_scene.setdefault(run.scene.name, []).append(run)
+    return [
+        runs_table(asked),
+        *(scene_table(runs) for runs in by_scene.values()),
+    ]
+
+
+# Making a file fit what is asked
+
+
+class TableFile:
+    """A file of tables whose rows are read and written by their places.
+
+    Attributes
+    ----------
+    path : of the file.
+    tables : by group.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.tables = table.stored_tables(path)
+
+    def place(self, run: str, group: str = RUNS) -> Place:
+        """Where a row is; of a run, together with its arrays."""
+        stored = self.tables[group]
+        row = stored.runs.tolist().index(run)
+        place = stored.place(row)
+        if group != RUNS:
+            return place
+        scene = str(stored.known["scene"][1][row])
+        arrays = self.tables[scene]
+        label = run.removeprefix(f"{scene}/")
+        others = arrays.place(arrays.runs.tolist().index(label))
+        offsets, kinds = dict(others.offsets), [(name, others.row[name]) for name in others.row.names or ()]
+        for name, column in arrays.filled.items():
+            if label == REFERENCE and "run" not in column.column.dimensions:
+                offsets[name] = column.offset
+                kinds.append((name, np.dtype((column.kind, column.shape))))
+        own = [(name, place.row[name]) for name in place.row.names or ()]
+        return replace(place, offsets={**place.offsets, **offsets}, row=np.dtype([*own, *kinds]))
+
+    def known(self, group: str, row: int) -> dict[str, Any]:
+        """What the design says of a row."""
+        return {name: values[row] for name, (_, values) in self.tables[group].known.items()}
+
+    def is_stored(self, run: str, group: str = RUNS) -> bool:
+        """Whether a row is there as it was written."""
+        place = self.place(run, group)
+        marked = np.fromfile(self.path, np.int8, 1, offset=place.offsets["status"])
+        return bool(place.stored(marked)[0] != MISSING)
+
+
+def fit(
+    path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = (), *, fresh: bool = False
+) -> TableFile:
+    """Make the file hold the rows of `wanted` tables, beside those that it has.
+
+    Where it has all of them as they are asked for, nothing is written. Else a file is laid out beside it, the rows that
+    stay are copied, and it takes the place of the old one. A row of which anything in the design differs (settings,
+    versions, the scene's numbers) is missing afterwards.
+
+    Parameters
+    ----------
+    dropped : (group, run) of rows that go.
+    fresh : whether all wanted rows are to be missing afterwards.
+
+    Raises
+    ------
+    InputError
+        Where runs of a scene that has other numbers by now would be dropped and not computed again.
+    StoreError
+        Where the file cannot be read or written, or is a sweep's.
+    """
+    if not path.exists():
+        _write_tables(path, wanted, [])
+        return TableFile(path)
+    old = TableFile(path)
+    if "" in old.tables:
+        raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
+    _refuse_losses(old, wanted)
+    merged, kept = _merged(old, wanted, set(dropped), fresh=fresh)
+    is_same = merged.keys() == old.tables.keys() and all(
+        list(made.runs) == old.tables[group].runs.tolist() and made.filled.keys() == old.tables[group].filled.keys()
+        for group, made in merged.items()
+    )
+    if not is_same or len(kept) < sum(len(stored.runs) for stored in _with_status(old)):
+        rows = [(group, run, old.place(run, group).read()) for group, run in kept if old.is_stored(run, group)]
+        _write_tables(path, list(merged.values()), rows)
+        return TableFile(path)
+    return old
+
+
+def _refuse_losses(old: TableFile, wanted: Sequence[Table]) -> None:
+    """Raises InputError where stored runs of a scene with other numbers would be dropped and not computed again."""
+    made = next((table_ for table_ in wanted if table_.group == RUNS), None)
+    if made is None or RUNS not in old.tables:
+        return
+    hashes = dict(zip(made.known["scene"][1], made.known["scene_hash"][1], strict=True))
+    lost = []
+    for i, run in enumerate(old.tables[RUNS].runs.tolist()):
+        known = old.known(RUNS, i)
+        scene = known["scene"]
+        if hashes.get(scene, known["scene_hash"]) != known["scene_hash"] and run not in made.runs:
+            lost.append(
+                f"{old.path}: {scene}: has {known['method_name']} of a scene of that name with other numbers, which "
+                "this call would drop; allowed: another output file, or a call that has this method too"
+            )
+    if lost:
+        raise InputError(lost)
+
+
+def _with_status(file: TableFile) -> list[StoredTable]:
+    return [stored for stored in file.tables.values() if "status" in stored.filled]
+
+
+def _merged(
+    old: TableFile, wanted: Sequence[Table], dropped: set[tuple[str, str]], *, fresh: bool
+) -> tuple[dict[str, Table], list[tuple[str, str]]]:
+    """The tables by group, and (group, run) of the rows that stay."""
+    new = {made.group: made for made in wanted}
+    kept: list[tuple[str, str]] = []
+    merged: dict[str, Table] = {}
+    for stored in _with_status(old):
+        group = stored.group
+        made = new.get(group)
+        rows = {run: old.known(group, i) for i, run in enumerate(stored.runs.tolist()) if (group, run) not in dropped}
+        asked = {} if made is None else {run: _known_of(made, i) for i, run in enumerate(made.runs)}
+        kept += [(group, run) for run in rows if run not in asked or (rows[run] == asked[run] and not fresh)]
+        rows |= asked
+        runs = sorted(rows, key=_order) if group == RUNS else list(rows)
+        if not runs:
+            continue
+        base = stored.as_table()
+        columns = {name: column for name, (column, _) in (made or base).known.items()}
+        known = {name: (column, [rows[run][name] for run in runs]) for name, column in columns.items()}
+        merged[group] = replace(base, runs=runs, known=known, filled=_joined(base, made))
+    merged |= {group: made for group, made in new.items() if "status" in made.filled and group not in merged}
+    scenes = dict.fromkeys(str(scene) for scene in merged[RUNS].known["scene"][1]) if RUNS in merged else {}
+    for scene in scenes:
+        labels = [run.removeprefix(f"{scene}/") for run in merged[RUNS].runs if _scene_of(merged[RUNS], run) == scene]
+        before, asked_for = old.tables.get(scene), new.get(scene)
+        base = before.as_table() if before is not None and _same_scene(before, asked_for) else new[scene]
+        merged[scene] = replace(asked_for or base, runs=labels, filled=_joined(base, asked_for))
+    return merged, kept
+
+
+def _same_scene(stored: StoredTable, made: Table | None) -> bool:
+    return made is None or bool(stored.attributes["scene_hash"] == made.attributes["scene_hash"])
+
+
+def _scene_of(runs: Table, run: str) -> str:
+    return str(runs.known["scene"][1][list(runs.runs).index(run)])
+
+
+def _known_of(made: Table, row: int) -> dict[str, Any]:
+    return {name: values[row] for name, (_, values) in made.known.items()}
+
+
+def _joined(base: Table, made: Table | None) -> dict[str, Column]:
+    """The computed columns of both, the checksum last."""
+    columns = {**base.filled, **(made.filled if made is not None else {})}
+    checksum = columns.pop("crc32", None)
+    return columns if checksum is None else {**columns, "crc32": checksum}
+
+
+def _order(run: str) -> tuple[Any, ...]:
+    """Scenes in natural order; of each the reference, then methods in the order of the catalogue."""
+    scene, method = (run.removesuffix(f"/{REFERENCE}"), REFERENCE) if run.endswith(f"/{REFERENCE}") else (
+        "/".join(run.split("/")[:-2]), "/".join(run.split("/")[-2:])
+    )  # fmt: skip
+    names = [REFERENCE, *method_names()]
+    return natural_key(scene), names.index(method) if method in names else len(names), method
+
+
+def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str, str, Rows]]) -> None:
+    """A new file with these tables; of its rows those that are given, the others blank."""
+    created = datetime.now(UTC).isoformat(timespec="seconds")
+    attributes = {**_description(tables), **versions(), **machine(), "created": created, "date_created": created}
+    with table.laid_out(path, tables, attributes) as temporary:
+        file = TableFile(temporary)
+        given = {(group, run): values for group, run, values in rows}
+        for stored in _with_status(file):
+            for run in stored.runs.tolist():
+                place = file.place(run, stored.group)
+                values = given.get((stored.group, run))
+                if values is None:
+                    place.clear()
+                else:
+                    blank = blank_rows(1, place.row)
+                    place.write(place.first, {name: values.get(name, blank[name]) for name in place.row.names or ()})
+    files.sync_folder(path.parent)
+
+
+def _description(tables: Sequence[Table]) -> dict[str, object]:
+    """Title, summary and keywords as the ACDD conventions ask for them."""
+    runs = next((made for made in tables if made.group == RUNS), None)
+    scenes = set(runs.known["scene"][1]) if runs is not None else set()
+    count = len(runs.runs) if runs is not None else 0
+    summary = f"{count} runs of {len(scenes)} scenes: trajectories, energies, status and errors of each"
+    others = sorted(made.group for made in tables if made.group != RUNS and "status" in made.filled)
+    if others:
+        summary += f"; tables {', '.join(others)}"
+    return {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}
+
+
+# The rows of a run
+
+
+def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows:
+    """The row of a run: status, metrics, times, arrays. facts: further columns by name."""
+    row = blank_rows(1, place.row)
+    integration = run.integration
+    values: dict[str, object] = {
+        "samples": len(run.time),
+        "time_reached": integration.time_reached,
+        "engine_success": int(integration.success),
+        "setup_time_s": run.setup_time_s,
+        "run_time_s": float(np.median(run.run_times_s)),
+        "run_time_min_s": min(run.run_times_s),
+        "output_time_s": run.output_time_s,
+        "repeats": len(run.run_times_s),
+        **run.metrics,
+        **facts,
+    }
+    for name, count in (("steps", integration.steps), ("rhs_evaluations", integration.rhs_evaluations)):
+        if count is not None:
+            values[name] = count
+    for name, value in values.items():
+        if name in row:
+            row[name][0] = value
+    for name, text in (("message", run.message), ("engine_message", integration.message)):
+        row[name][0] = characters(text, row[name].shape[1])
+    row["status"][0] = code_of(run.status)
+    arrays = dict(run.quantities)
+    if run.method == REFERENCE:
+        arrays |= {"angles": run.angles, "rates": run.rates}
+    for name, array in arrays.items():
+        column = name if run.method == REFERENCE else OF_METHODS.get(name, name)
+        if column in row:
+            row[column][0, : len(array)] = array
+    return row
+
+
+
+

@@ -1,0 +1,228 @@
+"""The file of a sweep: one table at its root.
+
+    run, variant, method_code, split   (run) which run this is
+    bearing_stiffness ...              (run) a variable for each varied parameter, in its own unit
+    status, steps, message ...         (run) metrics
+    code                               (run) which versions computed it
+    angles ...                         (run, time, coordinate) trajectories, as asked for; NaN after a run broke off
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs import files
+from rotor_mbs.runs.files import CHARACTERS, Column
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, lay_out, stored_table
+from rotor_mbs.runs.versions import row_versions
+from rotor_mbs.scenario.sweep import Sweep
+from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
+from rotor_mbs.solution import quantities
+from rotor_mbs.solution.quantities import SCALES, scale_values
+from rotor_mbs.solution.status import code_of
+
+MESSAGE_LENGTH = 120  # characters
+IDENTITY = "sweep_identity"  # the attribute with a hash of all that the design says
+
+METRICS = {
+    "status": Column(("run",), "1", "how the run ended, -1 while it is missing", "i1"),
+    "steps": Column(("run",), "1", "integration steps, -1 where not known", "<i8"),
+    "rhs_evaluations": Column(("run",), "1", "evaluations of the right-hand side, -1 where not known", "<i8"),
+    "time_reached": Column(("run",), "s", "time of the last finite sample"),
+    "energy_drift_max": Column(("run",), "1", "largest energy error of the run, of its energy scale"),
+    "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, either way"),
+    "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate, either way"),
+    "pitch_max": Column(("run",), "rad", "largest pitch angle of any blade, either way"),
+    "time_limit_s": Column(("run",), "s", "time limit that ended the run, NaN where none did"),
+    "message": Column(("run", CHARACTERS), "1", "why the run did not end well", CHARACTER),
+    "code": Column(("run",), "1", "CRC-32 of the versions that computed the run, as `rotor-mbs sweep` tells", "<u4"),
+    "crc32": Column(("run",), "1", "CRC-32 of the row in all computed columns", "<u4"),
+}
+# Asked for by `amplification = true`: the variational equations cost a hundred times the run itself.
+AMPLIFICATION = {
+    "error_growth": Column(("run",), "1", "largest amplification of a small error of the initial state"),
+    "horizon_s": Column(("run",), "s", "last sample before the amplification reaches 1e5, or the end"),
+}
+
+
+def parameter_name(key: str) -> str:
+    """The variable of a varied parameter.
+
+    >>> parameter_name("bearing.stiffness"), parameter_name("initial.angles[1]")
+    ('bearing_stiffness', 'initial_angles_1')
+    """
+    return re.sub(r"[.\[]", "_", key).replace("]", "")
+
+
+def code_of_method(method: str) -> int:
+    """CRC-32 of the versions that a run by this method has now."""
+    return zlib.crc32(json.dumps(row_versions(find_method(method)), sort_keys=True).encode())
+
+
+def sweep_table(
+    sweep: Sweep, methods: Sequence[str], numbers: range, attributes: Mapping[str, object] | None = None
+) -> Table:
+    """The table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by method r div rows."""
+    runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.table
+    known: dict[str, tuple[Column, Any]] = {}
+    values = sweep.design.rows(numbers.start, numbers.stop)
+    for i, (key, unit) in enumerate(zip(sweep.keys, sweep.units, strict=True)):
+        column = Column(("run",), unit, f"varied parameter {key}")
+        known[parameter_name(key)] = column, np.ascontiguousarray(values[:, i])
+    known["variant"] = Column(("run",), "1", "row of the design, the same for every method"), runs % rows
+    known["method_code"] = Column(("run",), "1", "by which method"), (runs // rows).astype(np.int8)
+    flags = {"method_code": methods}
+    if options.validation or options.test:
+        splits = split_rows(rows, options.validation, options.test, options.seed)
+        known["split"] = Column(("run",), "1", "for training, validation or testing"), splits[runs % rows]
+        flags["split"] = SPLITS
+    kind = {"float64": "<f8", "float32": "<f4"}[options.precision]
+    asked = [quantity for quantity in quantities.quantities(sweep.outputs) if quantity.output and quantity.required]
+    trajectories = {
+        quantity.name: Column(("run", *quantity.dimensions), quantity.units, quantity.long_name, kind)
+        for quantity in asked
+    }
+    used = {"time"}.union(*(quantity.dimensions for quantity in asked))
+    lengths = scale_values(sweep.base)
+    scales: dict[str, tuple[Column, NDArray[Any]]] = {
+        name: (Column((name,), scale.units, scale.long_name), lengths[name])
+        for name, scale in SCALES.items()
+        if name in used
+    }
+    scales[CHARACTERS] = Column((CHARACTERS,), "1", ""), np.empty(MESSAGE_LENGTH, np.int8)
+    labels = {"coordinate": sweep.base.coordinate_labels} if "coordinate" in used else {}
+    filled = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
+    return Table("", runs, known, filled, scales, labels, attributes or {}, flags)
+
+
+@contextmanager
+def open_sweep(
+    output: Path, table: Table, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
+) -> Iterator[tuple[Place, NDArray[np.int8]]]:
+    """The file `output`, laid out where it is not there, which no other process writes in the block.
+
+    Parameters
+    ----------
+    attributes : of the file; `sweep_identity` is a hash of all that the design says.
+    time_limit_s : runs that a shorter limit ended are missing.
+    fresh : whether all runs are.
+
+    Returns
+    -------
+    Where its runs are, and (runs,) their statuses, MISSING where none is stored.
+
+    Raises
+    ------
+    InputError
+        Where the output holds something else, or another process is writing it.
+    StoreError
+        Where it cannot be read or written, or the disk has no room for all runs.
+    """
+    with writing(output):
+        path = output.resolve() if output.is_symlink() else output  # a link stays one
+        if not path.exists():
+            lay_out(path, [table], attributes)
+        with files.open_file(path) as file, files.reading(path):
+            if files.plain(file.attrs.get(IDENTITY)) != attributes[IDENTITY]:
+                raise InputError(
+                    f"{path}: holds something else than this sweep; allowed: another output file, or remove that one"
+                )
+            stored = stored_table(file)
+        place, marked = stored.place(number=int(stored.runs[0]) if len(stored.runs) else 0), stored.statuses()
+        statuses = place.stored(marked)
+        if fresh:
+            statuses[:] = MISSING
+        limit = stored.filled["time_limit_s"]
+        limits = np.memmap(path, limit.kind, "r", limit.offset, limit.shape) if len(marked) else np.empty(0)
+        statuses[(statuses == code_of("timed_out")) & (limits < time_limit_s)] = MISSING
+        place.mark_missing(np.flatnonzero((marked != MISSING) & (statuses == MISSING)).tolist())  # readers see it, too
+        try:
+            yield place, statuses
+        finally:
+            if (statuses == MISSING).all():
+                path.unlink(missing_ok=True)  # a sweep that stored nothing leaves nothing
+
+
+class StoredSweep:
+    """A dataset that `rotor-mbs sweep` wrote, complete or not.
+
+    Attributes
+    ----------
+    attributes : of the file.
+    columns : every dataset, scales included.
+    keys : of the varied parameters.
+    damaged_runs : numbers of the stored runs that are not what was written, by their checksums.
+
+    Raises
+    ------
+    StoreError
+        Where it is none, or is damaged; with allow_damaged_runs, not where only runs are.
+    """
+
+    def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
+        self._path = path
+        with files.open_file(path) as file, files.reading(path):
+            self.attributes = files.attributes_of(file)
+            if IDENTITY not in self.attributes:
+                raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
+            self._table: StoredTable = stored_table(file)
+        table = self._table
+        self.columns: dict[str, Column] = {
+            "run": Column(("run",), "1", "run number, from 0"),
+            **{name: column for name, (column, _) in {**table.scales, **table.known}.items() if name != CHARACTERS},
+            **{name: stored.column for name, stored in table.filled.items()},
+        }
+        self.keys: list[str] = self.attributes["parameter_keys"]
+        first = int(table.runs[0]) if len(table.runs) else 0
+        with files.reading(path):
+            marked = table.statuses()
+            statuses = table.place(number=first).stored(marked)
+        self.damaged_runs = first + np.flatnonzero((marked != MISSING) & (statuses == MISSING))
+        if len(self.damaged_runs) and not allow_damaged_runs:
+            which = ", ".join(map(str, self.damaged_runs[:5])) + (" ..." if len(self.damaged_runs) > 5 else "")
+            raise StoreError(
+                f"{path}: runs {which} changed after they were written; allowed: the sweep's own command, which "
+                "computes them again"
+            )
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of the methods, by their code."""
+        names: list[str] = self.attributes["methods"]
+        return names
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A dataset, such as `status` or `angles`; computed ones as they lie in the file, read where they are indexed.
+
+        Raises
+        ------
+        StoreError
+            Where there is none of that name.
+        """
+        table = self._table
+        if name == "run":
+            return table.runs
+        if name in table.filled:
+            stored = table.filled[name]
+            if not all(stored.shape):
+                return np.empty(stored.shape, stored.kind)
+            with files.reading(self._path, name):
+                values: NDArray[Any] = np.memmap(self._path, stored.kind, "r", stored.offset, stored.shape)
+            return values
+        if name in table.known or name in table.scales:
+            return {**table.scales, **table.known}[name][1]
+        raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")
+
+

@@ -1,0 +1,376 @@
+"""Tables of runs in an HDF5 file, each its own journal: laid out first, rows filled in place, the status of a row last.
+
+    /runs                 a row per run of the file: scene, method, settings, status, metrics
+    /paper/fig11          the arrays of a scene: dimensions run, time, ...
+    /bench, /stability    a row per point
+    /                     of a sweep's file: one table
+
+All space is taken when a file is laid out. From then on no HDF5 metadata changes, so that the file is valid and can be
+read at every moment. The bytes of a row are written to their offsets, its status after a sync: a row is stored where
+its status is not -1 and its checksum is right. What the design says of a row (its scene, method, settings, versions) is
+written with the layout and covered by the digests of its group.
+
+An HDF5 handle that is open while rows are written reads old values, and one that writes would destroy them: nothing is
+written by the HDF5 library after the layout.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import zlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.errors import StoreError, saving
+from rotor_mbs.runs import digests, files
+from rotor_mbs.runs.files import Column
+from rotor_mbs.solution.status import STATUSES
+
+# (rows, ...) arrays by the name of their dataset.
+Rows = dict[str, NDArray[Any]]
+
+MISSING = -1  # status of a row that is not stored
+CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
+STATUS_FLAGS = {
+    "flag_values": np.arange(MISSING, len(STATUSES), dtype=np.int8),
+    "flag_meanings": " ".join(("missing", *STATUSES)),
+}
+_HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
+_READ_BYTES = 1 << 25  # read at once when checksums are verified
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table before its rows are computed.
+
+    Attributes
+    ----------
+    group : where it stands in the file; "" for the root.
+    runs : (rows,) the scale `run`: texts that tell the rows apart, or their numbers.
+    known : by name, column and values of what the design says of each row.
+    filled : columns that are computed. One without the dimension `run` belongs to the reference.
+    scales : by name, column and values of the other dimensions.
+    labels : texts for the entries of a scale, by its name.
+    attributes : of the group.
+    flags : names that the codes of a known column stand for, by its name.
+    """
+
+    group: str
+    runs: Sequence[str] | NDArray[np.int64]
+    known: Mapping[str, tuple[Column, Any]]
+    filled: Mapping[str, Column]
+    scales: Mapping[str, tuple[Column, NDArray[Any]]] = field(default_factory=dict)
+    labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    attributes: Mapping[str, object] = field(default_factory=dict)
+    flags: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    @property
+    def row_type(self) -> np.dtype[np.void]:
+        """The computed columns of one row, in the order in which its checksum covers them."""
+        lengths = {name: len(values) for name, (_, values) in self.scales.items()}
+        shapes = {
+            name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
+            for name, column in self.filled.items()
+        }
+        return np.dtype([(name, column.kind, shapes[name]) for name, column in self.filled.items()])
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where consecutive rows lie in a file. Worker processes that see the file write them by it.
+
+    Attributes
+    ----------
+    path, inode : the file, and its number: another file of that name is not written to.
+    first : number of the first row; its checksum begins with it.
+    offsets : bytes from the beginning of the file to the first row, by column.
+    row : type of a row, its columns in the order in which the checksum covers them.
+    """
+
+    path: Path
+    inode: int
+    first: int
+    offsets: Mapping[str, int]
+    row: np.dtype[np.void]
+
+    def write(self, first: int, rows: Rows) -> None:
+        """Store the rows from number `first` on, their statuses last.
+
+        Raises
+        ------
+        StoreError
+            Where the file cannot be written, or is another one by now.
+        """
+        columns = rows | {"crc32": checksums(first, rows, self.row)}
+        status = columns.pop("status")
+        with saving(self.path), self.path.open("r+b") as file:
+            if os.fstat(file.fileno()).st_ino != self.inode:
+                raise StoreError(f"{self.path}: is another file by now")
+            for name, values in columns.items():
+                file.seek(self.offsets[name] + (first - self.first) * self.row[name].itemsize)
+                file.write(np.ascontiguousarray(values).data)
+            file.flush()
+            os.fsync(file.fileno())
+            file.seek(self.offsets["status"] + first - self.first)
+            file.write(np.ascontiguousarray(status, np.int8).data)
+
+    def read(self, count: int = 1, start: int = 0, file: IO[bytes] | None = None) -> Rows:
+        """(count, ...) The columns of the rows from `start` on; file: one that is open.
+
+        Raises
+        ------
+        OSError, ValueError
+            Where the file cannot be read, or ends before.
+        """
+        with nullcontext(file) if file is not None else self.path.open("rb") as source:
+            rows = {}
+            for name in self.row.names or ():
+                kind = self.row[name]
+                source.seek(self.offsets[name] + start * kind.itemsize)
+                content = source.read(count * kind.itemsize)
+                rows[name] = np.frombuffer(content, kind.base).reshape(count, *kind.shape)
+        return rows
+
+    def stored(self, marked: NDArray[np.int8]) -> NDArray[np.int8]:
+        """(rows,) The statuses `marked` in the file; MISSING where a checksum is wrong."""
+        statuses = np.full_like(marked, MISSING)
+        step = max(_READ_BYTES // self.row.itemsize, 1)
+        for start in range(0, len(marked), step):
+            status = marked[start : start + step]
+            if (status == MISSING).all():
+                continue
+            rows = self.read(len(status), start)
+            is_right = checksums(self.first + start, rows, self.row) == rows["crc32"]
+            statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
+        return statuses
+
+    def clear(self) -> None:
+        """Write a blank row, which a reader of an unfinished file sees; its status stays as it is."""
+        with saving(self.path), self.path.open("r+b") as file:
+            for name, values in blank_rows(1, self.row).items():
+                if name != "status":
+                    file.seek(self.offsets[name])
+                    file.write(values.data)
+
+    def mark_missing(self, rows: Collection[int]) -> None:
+        """Take back the statuses of some rows, counted from the first, before they are computed again."""
+        with saving(self.path), self.path.open("r+b") as file:
+            for row in rows:
+                file.seek(self.offsets["status"] + row)
+                file.write(np.int8(MISSING).tobytes())
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
+    """Return a CRC-32 for each row, over its number and its columns.
+
+    Returns
+    -------
+    ndarray of uint32, shape (rows,)
+    """
+    sums = [first + i & 0xFFFFFFFF for i in range(len(rows["status"]))]
+    for name in (name for name in row.names or () if name != "crc32"):
+        contents: Any = np.ascontiguousarray(rows[name], row[name].base).reshape(len(sums), -1)
+        sums = [zlib.crc32(content, so_far) for content, so_far in zip(contents, sums, strict=True)]
+    return np.array(sums, np.uint32)
+
+
+def blank_rows(count: int, row: np.dtype[np.void]) -> Rows:
+    """Rows of which nothing is known: NaN, -1, no text."""
+    blanks = {"f": np.nan, "i": -1, "u": 0, "S": b""}
+    kinds = {name: row[name] for name in row.names or ()}
+    return {name: np.full((count, *kind.shape), blanks[kind.base.kind], kind.base) for name, kind in kinds.items()}
+
+
+def characters(text: str, length: int) -> NDArray[np.bytes_]:
+    """(length,) The text as UTF-8 characters, cut or filled up with zeros."""
+    return np.frombuffer(text.encode()[:length].ljust(length, b"\0"), CHARACTER)
+
+
+def text_of(values: NDArray[np.bytes_]) -> str:
+    """The text in an array of `characters`."""
+    return values.tobytes().rstrip(b"\0").decode(errors="ignore")
+
+
+# Laying out
+
+
+def lay_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> None:
+    """A new file with room for all rows; complete under its name, or not there. Raises StoreError."""
+    with laid_out(path, tables, attributes):
+        pass
+    files.sync_folder(path.parent)
+
+
+@contextmanager
+def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[Path]:
+    """The new file under a temporary name, which takes the place of `path` after the block.
+
+    The space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins.
+    """
+    with files.replacing(path) as temporary:
+        rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
+        _reserve(temporary, _HEAD_BYTES + rows)
+        with files.begin_file(temporary) as file:
+            files.put_attributes(file, attributes)
+            for table in tables:
+                _put_table(file, table)
+            digests.seal_all(file)
+        _reserve(temporary, temporary.stat().st_size)
+        yield temporary
+
+
+def _reserve(path: Path, size: int) -> None:
+    """Takes the space on the disk, where the system and the file system can: not on macOS and Windows, where a disk
+    that fills up is reported by the row that finds it full. Raises OSError."""
+    with path.open("ab") as file:
+        try:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+        except OSError as exc:
+            if exc.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
+                raise OSError(exc.errno, f"{exc.strerror} ({size:.2g} bytes for all runs)") from exc
+        os.fsync(file.fileno())
+
+
+def _put_table(file: Any, table: Table) -> None:
+    group = files.new_group(file, table.group) if table.group else file
+    files.put_attributes(group, table.attributes)
+    files.put(group, "run", table.runs, Column(("run",), "1", "run"))
+    for name, (column, values) in table.scales.items():
+        if name == files.CHARACTERS:
+            files.put_dimension(group, name, len(values))
+            continue
+        dataset = files.put(group, name, values, column)
+        if name in table.labels:
+            files.put_attributes(dataset, {"labels": list(table.labels[name])})
+        if name == "time":
+            files.put_attributes(dataset, {"standard_name": "time"})
+    for name, (column, values) in table.known.items():
+        dataset = files.put(group, name, values, column)
+        if name in table.flags:
+            codes = np.arange(len(table.flags[name]), dtype=np.int8)
+            files.put_attributes(dataset, {"flag_values": codes, "flag_meanings": " ".join(table.flags[name])})
+    row = table.row_type
+    for name, column in table.filled.items():
+        kind = row[name].base
+        shape = (len(table.runs), *row[name].shape) if "run" in column.dimensions else row[name].shape
+        dataset = files.put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
+        if name == "status":
+            files.put_attributes(dataset, STATUS_FLAGS)
+    digests.seal(group, later=table.filled.keys())
+
+
+# Reading
+
+
+class StoredColumn(NamedTuple):
+    """A computed column in a file: what it is, the type of its values, its shape, and where it begins."""
+
+    column: Column
+    kind: np.dtype[Any]
+    shape: tuple[int, ...]
+    offset: int
+
+
+@dataclass(frozen=True)
+class StoredTable:
+    """A table in a file as it was laid out; rows are read by their `Place`.
+
+    Attributes
+    ----------
+    path, inode, group : where it stands.
+    runs : (rows,) texts or numbers of the rows.
+    known : by name, column and values of what the design says of each row.
+    scales : by name, column and values of the other dimensions; labels of their entries.
+    filled : the computed columns by name, in the order of the checksum.
+    attributes : of the group.
+    """
+
+    path: Path
+    inode: int
+    group: str
+    runs: NDArray[Any]
+    known: Mapping[str, tuple[Column, NDArray[Any]]]
+    scales: Mapping[str, tuple[Column, NDArray[Any]]]
+    labels: Mapping[str, Sequence[str]]
+    filled: Mapping[str, StoredColumn]
+    attributes: Mapping[str, Any]
+
+    def statuses(self) -> NDArray[np.int8]:
+        """(rows,) as they stand in the file now."""
+        return np.fromfile(self.path, np.int8, len(self.runs), offset=self.filled["status"].offset)
+
+    def place(self, row: int = 0, number: int | None = None) -> Place:
+        """Where the rows from `row` on are; `number` is what the checksum of the first begins with."""
+        columns = {name: stored for name, stored in self.filled.items() if "run" in stored.column.dimensions}
+        kinds = np.dtype([(name, stored.kind, stored.shape[1:]) for name, stored in columns.items()])
+        offsets = {name: stored.offset + row * kinds[name].itemsize for name, stored in columns.items()}
+        return Place(self.path, self.inode, row if number is None else number, offsets, kinds)
+
+    def as_table(self) -> Table:
+        """What would lay it out anew."""
+        filled = {name: stored.column._replace(kind=stored.kind.str) for name, stored in self.filled.items()}
+        attributes = {name: value for name, value in self.attributes.items() if self.group}
+        return Table(self.group, self.runs.tolist(), self.known, filled, self.scales, self.labels, attributes)
+
+
+def stored_table(file: Any, group: str = "") -> StoredTable:
+    """A table in an open file. Raises StoreError where what was laid out has changed since."""
+    path, item = Path(file.filename), file[group] if group else file
+    changed = [part for part in digests.damages_of(item) if part != files.DIGESTS]
+    if changed:
+        raise StoreError(f"{path}: {group or 'file'}: {', '.join(changed)} changed after the file was laid out")
+    filled_names = digests.unfilled_in(digests.stored_digests(item.attrs))
+    known: dict[str, tuple[Column, NDArray[Any]]] = {}
+    scales: dict[str, tuple[Column, NDArray[Any]]] = {}
+    labels: dict[str, Sequence[str]] = {}
+    filled: dict[str, StoredColumn] = {}
+    for name, dataset in item.items():
+        if files.is_group(dataset):
+            continue
+        if files.is_dimension_only(dataset):
+            scales[name] = (Column((name,), "1", ""), np.empty(len(dataset), np.int8))
+            continue
+        dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
+        column = Column(dimensions, str(dataset.attrs["units"]), str(dataset.attrs["long_name"]), dataset.dtype.str)
+        if name in filled_names:
+            offset = dataset.id.get_offset()
+            if offset is None and dataset.size:
+                raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
+            filled[name] = StoredColumn(column, dataset.dtype, dataset.shape, offset or 0)
+        elif dimensions == (name,):
+            scales[name] = (column, _values(dataset))
+            if "labels" in dataset.attrs:
+                labels[name] = files.plain(dataset.attrs["labels"])
+        else:
+            known[name] = (column, _values(dataset))
+    _, runs = scales.pop("run")
+    attributes = files.attributes_of(item)
+    return StoredTable(path, path.stat().st_ino, group, runs, known, scales, labels, filled, attributes)
+
+
+def _values(dataset: Any) -> NDArray[Any]:
+    return files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
+
+
+def stored_tables(path: Path) -> dict[str, StoredTable]:
+    """All tables of a file by their group. Raises StoreError where it is damaged or another program's."""
+    with files.open_file(path) as file, files.reading(path):
+        return {group: stored_table(file, group) for group in _groups_with_runs(file, "")}
+
+
+def _groups_with_runs(group: Any, path: str) -> Iterator[str]:
+    if "run" in group:
+        yield path
+    for name, item in files.members(group):
+        if files.is_group(item):
+            yield from _groups_with_runs(item, f"{path}/{name}" if path else name)
