@@ -7,11 +7,10 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from rotor_mbs.cli.terminal import print_doubts
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps
 
-if TYPE_CHECKING:  # numpy behind it is too heavy for `list`
+if TYPE_CHECKING:
     from rotor_mbs.methods.base import Method
 
 
@@ -58,6 +57,7 @@ def new(arguments: argparse.Namespace) -> int:
 
 def show(arguments: argparse.Namespace) -> int:
     """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
+    from rotor_mbs.cli.terminal import print_doubts
     from rotor_mbs.methods.catalogue import look_up
     from rotor_mbs.studies.scene_overview import models_of, scene_data
 
