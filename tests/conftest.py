@@ -1,4 +1,4 @@
-"""For every test and what it starts: Ctrl-C arrives, compiled code stays out of the user's cache; a shared results file."""
+"""For all tests: Ctrl-C arrives, compiled code stays out of the user's cache; a results file to read."""
 
 from __future__ import annotations
 

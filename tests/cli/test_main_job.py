@@ -1,4 +1,4 @@
-"""The main job, `reproduce`, on two scenes of the paper: every default method, errata, a bench, report, a second call."""
+"""The main job, `reproduce`, on two scenes: every default method, errata, a bench, the report, a second call."""
 
 from __future__ import annotations
 
