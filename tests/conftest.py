@@ -1,10 +1,13 @@
-"""What holds for every test and for what it starts: Ctrl-C arrives, and compiled code stays out of the user's cache."""
+"""For all tests: Ctrl-C arrives, compiled code stays out of the user's cache; a results file to read."""
 
 from __future__ import annotations
 
 import os
 import signal
 from pathlib import Path
+
+import pytest
+from support.commands import rotor_mbs
 
 # A CI runner or `nohup ... &` may have it ignored, which processes inherit: a test of interrupts would wait in vain.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -13,3 +16,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # The mutants alone leave hundreds of integrators, and every process that compiles reads through all that is there:
 # 0.08 s with 240 MB. heyoka looks for its cache here when it is first imported.
 os.environ["XDG_CACHE_HOME"] = str(Path(__file__).parents[1] / ".pytest_cache" / "compiled")
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A results file of two scenes of the paper by two methods and their references, made once; for reading only."""
+    path = tmp_path_factory.mktemp("results") / "results.h5"
+    methods = ("-m", "lagrange/dop853", "-m", "exudyn_tree/rk67")
+    ended = rotor_mbs("run", "paper/fig08", "paper/fig11", *methods, "-o", path, "-j", "1")
+    assert ended.status == 0, ended.err
+    path.chmod(0o444)
+    return path

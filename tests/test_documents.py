@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+import rotor_mbs as rm
 from rotor_mbs.cli.arguments import parse
 from rotor_mbs.scenario.scene_file import load_scene
 
@@ -60,29 +59,26 @@ def test_lines_fit_an_editor(path: Path) -> None:
     assert not long
 
 
-def test_the_readmes_python_runs(tmp_path: Path) -> None:
-    """As a script: first the API, then the data example on a results file with the scene that it reads."""
+def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """First the API, then the data example on a results file with the scene that it reads."""
     first, second = re.findall(r"```python\n(.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
-    setup = (
-        "import rotor_mbs as rm\n"
-        "scene = rm.scene('paper/fig11').replace(samples=101)\n"
-        "rm.compare(scene, ['lagrange/taylor']).save('rotor-mbs-out/results.h5')\n"
-    )
-    for code in (first, setup, second):
-        script = tmp_path / "example.py"
-        script.write_text(code)
-        done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    exec(first, {})
+    rm.compare(rm.scene("paper/fig11"), ["lagrange/taylor"]).save("rotor-mbs-out/results.h5")
+    exec(second, {})
 
 
-def test_the_tour_prints_what_it_says(tmp_path: Path) -> None:
+def test_the_tour_prints_what_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("heyoka")
     tour = (ROOT / "docs" / "tour.md").read_text()
     (scene,) = re.findall(r"```toml\n(title.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
     (code,) = re.findall(r"```python\n(.*?)```", tour, re.DOTALL)
-    (tmp_path / "my.toml").write_text(scene)
-    (tmp_path / "tour.py").write_text(code)
-    done = subprocess.run([sys.executable, "tour.py"], capture_output=True, text=True, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
-    assert set(done.stdout.split("\n")) <= {line.removeprefix("    ") for line in tour.split("\n")}
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(scene)
+    exec(code, {})
+    printed = capsys.readouterr().out
+    assert printed
+    assert set(printed.split("\n")) <= {line.removeprefix("    ") for line in tour.split("\n")}

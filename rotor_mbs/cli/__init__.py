@@ -1,4 +1,4 @@
-"""The command line: the only layer that knows all the others. Loads a command's code when that command is given.
+"""The command line: runs a command, and turns errors and interrupts into its exit status.
 
 Standard output and standard error are plain: a title or a message that comes from a file may have escape sequences, and
 a closed standard error must not end a batch.
@@ -7,11 +7,11 @@ a closed standard error must not end a batch.
 from __future__ import annotations
 
 import _thread
+import importlib
 import os
 import signal
 import sys
 import threading
-from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, TextIO
@@ -24,48 +24,54 @@ _ONLY_PRINT = ("list", "show")
 
 # C0 but for tab and line feed, DEL, C1, and the marks that change the direction of writing.
 _CONTROLS = (*range(0x20), *range(0x7F, 0xA0), *range(0x200E, 0x2010), *range(0x202A, 0x202F), *range(0x2066, 0x206A))
-_received: list[int] = []  # signals that this call was to end by
-_SHOWN = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\t\n"}
+_ESCAPES = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not in "\t\n"}
+
+_received_signals: list[int] = []  # that this call was to end by
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs a command; returns the exit status of the contract (0, 1, 2, 130)."""
+    """Run a command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The words after `rotor-mbs`; by default those of this process.
+
+    Returns
+    -------
+    int
+        0 done and all well; 1 done, but a check failed or a run did not succeed; 2 bad input; 130 interrupted.
+    """
     words = sys.argv[1:] if argv is None else list(argv)
     with plain_streams():
         try:
-            with _ended_in_order():
+            with _signals_as_interrupts():
                 status = _run(words)
             sys.stdout.flush()
+            return status
         except (KeyboardInterrupt, SystemError, ImportError) as exc:
-            if not _is_interrupt(exc):  # without memory for a library, its loading raises either
-                show(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
-                return EXIT_FAILED
-            show("interrupted; what was finished is kept, the same command goes on from there", sys.stderr)
-            return EXIT_INTERRUPTED
+            if _is_interrupt(exc):
+                show("interrupted; finished runs are stored, the same command continues", sys.stderr)
+                return EXIT_INTERRUPTED
+            # Without memory for a library, its loading raises either.
+            show(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
+            return EXIT_FAILED
         except BrokenPipeError:
-            drop_what_is_left()
+            discard_output()
             return EXIT_OK if words[:1] and words[0] in _ONLY_PRINT else EXIT_FAILED
         except OSError as exc:
-            drop_what_is_left()
+            discard_output()
             show(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
-        return status
-
-
-def _is_interrupt(error: BaseException) -> bool:
-    """Inside compiled code of a library, or while it loads, an interrupt becomes another error, or its cause."""
-    found: BaseException | None = error
-    while found is not None and not isinstance(found, KeyboardInterrupt):
-        found = found.__cause__ or found.__context__
-    return found is not None or bool(_received)
 
 
 def _run(words: Sequence[str]) -> int:
     from rotor_mbs.cli.arguments import parse
 
-    arguments: Namespace = parse(words)
+    arguments = parse(words)
+    module, _, function = arguments.command.partition(":")
     try:
-        return int(arguments.command(arguments))
+        return int(getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)(arguments))
     except RotorError as exc:
         if _is_interrupt(exc):
             raise KeyboardInterrupt from exc
@@ -76,36 +82,47 @@ def _run(words: Sequence[str]) -> int:
         return EXIT_FAILED
 
 
+def _is_interrupt(error: BaseException) -> bool:
+    """Inside compiled code of a library, or while it loads, an interrupt becomes another error, or its cause."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, KeyboardInterrupt):
+            return True
+        cause = cause.__cause__ or cause.__context__
+    return bool(_received_signals)
+
+
 @contextmanager
-def _ended_in_order() -> Iterator[None]:
+def _signals_as_interrupts() -> Iterator[None]:
     """SIGTERM, as a cluster sends it before it kills, and SIGHUP, of a terminal that is closed, end as Ctrl-C does."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def interrupt(number: int, _frame: object) -> None:
-        _received.append(number)
+        _received_signals.append(number)
         raise KeyboardInterrupt
 
-    def interrupt_again(ignored: sys.UnraisableHookArgs) -> None:
+    def interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
         """One that came where Python ignores exceptions, as in a weak reference's callback, comes a moment later."""
-        if isinstance(ignored.exc_value, KeyboardInterrupt):
+        if isinstance(unraisable.exc_value, KeyboardInterrupt):
             threading.Timer(0.01, _thread.interrupt_main).start()
         else:
-            hook(ignored)
+            hook(unraisable)
 
     hook, sys.unraisablehook = sys.unraisablehook, interrupt_again
-    _received.clear()
-    names = ("SIGINT", "SIGTERM", "SIGHUP")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    # One that is ignored (nohup) stays so.
-    usual = (signal.SIG_DFL, signal.default_int_handler)
-    before = {one: signal.signal(one, interrupt) for one in numbers if signal.getsignal(one) in usual}
+    _received_signals.clear()
+    handlers = {}
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # SIGHUP: not on Windows
+        # A signal that is ignored (nohup) stays so.
+        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            handlers[number] = signal.signal(number, interrupt)
     try:
         yield
     finally:
         sys.unraisablehook = hook
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 
@@ -115,7 +132,7 @@ def printable(text: str) -> str:
     >>> printable("\x1b[2J")
     '\\x1b[2J'
     """
-    return text.translate(_SHOWN)
+    return text.translate(_ESCAPES)
 
 
 class PlainStream:
@@ -134,11 +151,11 @@ class PlainStream:
 
 @contextmanager
 def plain_streams() -> Iterator[None]:
-    """In the block, standard output and standard error are plain; one that is closed is a device that takes all."""
+    """In the block, standard output and standard error are plain; in place of a closed one stands the null device."""
     before = sys.stdout, sys.stderr
     with ExitStack() as stack:
-        streams: list[TextIO] = [one or stack.enter_context(open(os.devnull, "w")) for one in before]  # noqa: PTH123  (a device)
-        sys.stdout, sys.stderr = (PlainStream(stream) for stream in streams)
+        null = stack.enter_context(open(os.devnull, "w"))  # noqa: PTH123  (a device)
+        sys.stdout, sys.stderr = (PlainStream(stream or null) for stream in before)
         try:
             yield
         finally:
@@ -146,12 +163,12 @@ def plain_streams() -> Iterator[None]:
 
 
 def show(text: str, stream: TextIO) -> None:
-    """Prints a line of which nothing depends: where nobody reads it any more, or the disk is full, it is dropped."""
+    """Print a line that may be lost: where nobody reads it any more, or the disk is full, it is dropped."""
     with suppress(OSError, ValueError):
         print(text, file=stream, flush=True)
 
 
-def drop_what_is_left() -> None:
+def discard_output() -> None:
     """After a failed write: what is still in the buffer must not fail again when the interpreter ends."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno())  # type: ignore[union-attr]

@@ -1,32 +1,32 @@
-"""The commands and their arguments as one table, and how each value is read from its text, or refused.
+"""The commands with their arguments, and how the text of each value is read or refused.
 
-Loads the code of no command: the others would wait for it.
+A command's code is imported when the command is called.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import rotor_mbs
 from rotor_mbs.errors import nearest
 from rotor_mbs.runs import cores
 
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
-_LONGEST_SPAN = 10_000
-_LONGEST_NAME = 200  # bytes of a file's name; file systems allow 255, and temporary names are longer
-_LARGEST = 1e9  # of a count; of seconds: thirty years
-EXPORT_FORMATS = ("mjcf", "exudyn", "csv", "sympy", "iftomm")
+EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
+
+_MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
+_MAX_NAME_BYTES = 200  # of a file's name; file systems allow 255, and temporary names are longer
+_MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
 
 
 def default_results() -> Path:
     """The results file that is read where none is named: `run`'s in this folder, else `reproduce`'s."""
-    here = Path("results.h5")
-    return here if here.exists() else REPRODUCED / here
+    results = Path("results.h5")
+    return results if results.exists() else REPRODUCED / results
 
 
 def pages_beside(results: Path) -> Path:
@@ -35,7 +35,7 @@ def pages_beside(results: Path) -> Path:
 
 
 def path(text: str) -> Path:
-    """A path that the system can look up, whether there is something or not."""
+    """A path that the system can look up, whether something is there or not."""
     try:
         Path(text).stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -48,22 +48,22 @@ def path(text: str) -> Path:
 
 
 def file(text: str) -> Path:
-    """Where a file is to be written: neither nothing, nor a folder that is there; with room for a longer name."""
-    found = path(text)
-    if not found.name or found.name == ".." or found.is_dir():
+    """An output file: neither an empty name, nor an existing folder, and short enough for temporary names."""
+    output = path(text)
+    if not output.name or output.name == ".." or output.is_dir():
         raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a file's name, not a folder")
-    if len(os.fsencode(found.name)) > _LONGEST_NAME:
-        raise argparse.ArgumentTypeError(f"{_short(text)}: allowed: a file's name of at most {_LONGEST_NAME} bytes")
-    return found
+    if len(os.fsencode(output.name)) > _MAX_NAME_BYTES:
+        raise argparse.ArgumentTypeError(f"{_short(text)}: allowed: a file's name of at most {_MAX_NAME_BYTES} bytes")
+    return output
 
 
 def folder(text: str) -> Path:
-    """Where files are to be written: a folder that is there, or that can be made."""
-    found = path(text)
-    there = next((one for one in (found, *found.parents) if one.exists()), found)
-    if not (there.is_dir() and os.access(there, os.W_OK)):
+    """An output folder: one that exists, or that can be made."""
+    output = path(text)
+    existing = next((place for place in (output, *output.parents) if place.exists()), output)
+    if not (existing.is_dir() and os.access(existing, os.W_OK)):
         raise argparse.ArgumentTypeError(f"{text!r} given, allowed: a folder that can be written")
-    return found
+    return output
 
 
 def _short(text: str) -> str:
@@ -73,13 +73,14 @@ def _short(text: str) -> str:
 def span(text: str) -> tuple[float, ...]:
     """COUNT numbers from FROM to TO, both included, of "FROM:TO:COUNT"."""
     try:
-        first, last, count = (kind(part) for kind, part in zip((float, float, int), text.split(":"), strict=True))
-        if 0.0 <= first < last < float("inf") and 2 <= count <= _LONGEST_SPAN:
-            return tuple(first + (last - first) * i / (count - 1) for i in range(int(count)))
+        start, end, number = text.split(":")
+        first, last, count = float(start), float(end), int(number)
+        if 0.0 <= first < last < float("inf") and 2 <= count <= _MAX_SPAN:
+            return tuple(first + (last - first) * i / (count - 1) for i in range(count))
     except ValueError:
         pass
     raise argparse.ArgumentTypeError(
-        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO and COUNT from 2 to {_LONGEST_SPAN}"
+        f"{text!r} given, allowed: FROM:TO:COUNT with 0 <= FROM < TO and COUNT from 2 to {_MAX_SPAN}"
     )
 
 
@@ -93,7 +94,7 @@ def part(text: str) -> tuple[int, int]:
 
 def setting(text: str) -> tuple[str, object]:
     """(name, value) of "name=value": a number where it is one."""
-    name, equals, value = (part.strip() for part in text.partition("="))
+    name, equals, value = (piece.strip() for piece in text.partition("="))
     if not (name and equals and value):
         raise argparse.ArgumentTypeError(f"{text!r} given, allowed: NAME=VALUE")
     for kind in (int, float):
@@ -104,271 +105,269 @@ def setting(text: str) -> tuple[str, object]:
     return name, value
 
 
-def positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], float]:
+def _positive(kind: type[int] | type[float], allowed: str) -> Callable[[str], float]:
     def read(text: str) -> float:
         try:
             value = kind(text)
         except ValueError:
             value = kind(0)
-        if not 0 < value <= _LARGEST:
+        if not 0 < value <= _MAX_NUMBER:
             raise argparse.ArgumentTypeError(f"{text!r} given, allowed: {allowed}")
         return value
 
     return read
 
 
-COUNT = positive(int, "a whole number from 1 to 1e9")
-SECONDS = positive(float, "seconds, more than 0, at most 1e9")
-POSITIVE = positive(float, "a number more than 0, at most 1e9")
-
-Argument = tuple[tuple[str, ...], dict[str, Any]]  # names and options of `ArgumentParser.add_argument`
-
-
-class Command(NamedTuple):
-    """function: "module:name" in this package, imported when it is called; examples: what may follow the name."""
-
-    name: str
-    text: str
-    function: str
-    examples: tuple[str, ...]
-    arguments: tuple[Argument, ...]
-
-    def __call__(self, arguments: argparse.Namespace) -> int:
-        module, _, name = self.function.partition(":")
-        return int(getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), name)(arguments))
-
-
-def _argument(*names: str, **options: Any) -> Argument:
-    return names, options
-
-
-def _flag(*names: str, help: str) -> Argument:
-    return names, {"action": "store_true", "help": help}
-
-
-def _output(kind: Any, metavar: str, default: object = None, help: str = "to write (default: %(default)s)") -> Argument:
-    return _argument("-o", "--output", type=kind, default=default, metavar=metavar, help=help)
-
-
-def _method(help: str = "model/integrator, as in rotor-mbs list") -> Argument:
-    return _argument("-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated")
-
-
-def _timeout(seconds: float = 60.0) -> Argument:
-    text = "a run longer than this is ended and recorded as timed_out (default: %(default)g)"
-    return _argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
-
-
-# What several commands have.
-_SCENE, _SCENES = "a name (paper/fig05) or a TOML file", "a name (paper/fig05), a folder (paper), a TOML file"
-_PAGES = "(default: beside FILE, its name with -report; of results.h5: report)"
-# fmt: off
-_AS_JSON = _flag("--json", help="as JSON, for a script")
-_RESULTS = (
-    _argument("file", nargs="?", type=path, metavar="FILE",
-              help="a results file (default: results.h5 of this folder, else that of reproduce)"),
-    _argument("--results", type=path, help=argparse.SUPPRESS),  # as it was called before; it stays for scripts
-)
-_SET = _argument("--set", action="append", type=setting, metavar="NAME=VALUE",
-                 help="of the methods that have it, in place of the default; may be repeated "
-                      "(see rotor-mbs show METHOD)")
-_JOBS = _argument("-j", "--jobs", type=COUNT, default=cores(), metavar="N",
-                  help="parallel processes (default: the cores, %(default)s)")
-_REPORT = _argument("--report", type=folder, metavar="DIR", help=f"its pages {_PAGES}")
-_SOME_SCENES = _argument("scenes", nargs="+", metavar="SCENE", help=_SCENES)
-
-_COMMANDS = (
-    Command("list", "scenes, sweeps and methods, a line each", "scenes:list_all", ("", "--json"), (_AS_JSON,)),
-    Command("show", "one scene: its data and its methods; or one method: its settings", "scenes:show",
-            ("paper/fig11", "paper/fig11 --build"), (
-        _argument("scene", metavar="SCENE", help=f"{_SCENE}; or a method (lagrange/taylor)"),
-        _flag("--build", help="also the items that each model builds"),
-        _AS_JSON,
-    )),
-    Command("new", "a commented scene file to start from", "scenes:new", ("my.toml",), (
-        _argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet"),
-    )),
-    Command("reproduce", "every scene of the paper by every model, and the report", "runs:reproduce",
-            ("", "-o out -j 4"), (_output(folder, "DIR", REPRODUCED), _JOBS, _timeout())),
-    Command("run", "scenes by methods, into one results file", "runs:run",
-            ("my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3"),
-            (_SOME_SCENES, _method(), _SET, _output(file, "FILE", Path("results.h5")), _JOBS, _timeout())),
-    Command("compare", "another program's trajectory against a scene's reference; exit status 1 where it differs",
-            "studies:compare", ("mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml"), (
-        _argument("data", type=Path, metavar="DATA",
-                  help="text with a header, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"),
-        _argument("--scene", required=True, metavar="SCENE", help=_SCENE),
-        _argument("--columns", type=Path, metavar="MAP.toml",
-                  help="column, unit, sign, zero of each channel (default: guessed)"),
-        _argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X",
-                  help="rad per unit of error growth that still agree (default: %(default)g)"),
-        _output(folder, "DIR", Path("comparison"), "of the page (default: %(default)s)"),
-        _flag("--json", help="the verdict as JSON, for a script"),
-    )),
-    Command("bench", "error against run time, method by method", "studies:bench",
-            ("paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5"), (
-        _argument("scenes", nargs="*", metavar="SCENE", help=_SCENES),
-        _method(),
-        _SET,
-        _output(file, "FILE", Path("bench.h5")),
-        _flag("--growth", help="also how cost grows with blades and with duration"),
-        _argument("--repeats", type=COUNT, default=20, metavar="N",
-                  help="timed runs of each point (default: %(default)s; 5 at most for runs over 0.5 s)"),
-        # The paper's seventeen scenes in eight minutes.
-        _argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS",
-                  help="for each scene (default: %(default)g)"),
-    )),
-    Command("reference", "quad precision references, computed anew, as they are frozen", "runs:reference",
-            ("paper/fig08 -o reference.h5",), (
-        _SOME_SCENES,
-        _argument("-o", "--output", type=file, required=True, metavar="FILE"),
-        _JOBS,
-        _timeout(),
-    )),
-    Command("check", "accuracy verdicts; exit status 1 where one fails", "check:check",
-            ("", "rotor-mbs-out/results.h5 --junit check.xml"), (
-        _argument("file", nargs="?", type=path, metavar="FILE", help="a results file (default: a quick set, computed)"),
-        _argument("--bounds", type=path, metavar="TOML", help="own bounds, read before reference/accuracy.toml"),
-        _argument("--require", action="append", metavar="METHOD",
-                  help="fail where a scene of FILE has no run of it; may be repeated"),
-        _argument("--against", type=path, metavar="OLD",
-                  help="also fail where a verdict on this earlier results file passed by more, or its run is gone"),
-        _argument("--shrink", type=POSITIVE, default=10.0, metavar="FACTOR",
-                  help="with --against: by how much a margin may shrink (default: %(default)g)"),
-        _argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML"),
-        _argument("--json", type=file, metavar="FILE", help="verdicts as JSON; - for standard output"),
-        _argument("--trend", type=file, metavar="FILE", help="shares of the bounds as JSON, for charts over time"),
-        _argument("--badge", type=file, metavar="FILE", help="the outcome as JSON for shields.io"),
-        _flag("--github", help="the ten worst failures as annotations, a table as job summary"),
-        _flag("--speed", help="run times too, against a calibration run"),
-        _flag("-v", "--verbose", help="print verdicts that pass, too"),
-        _flag("--margins", help="a table: largest value seen, bound, ratio, by method"),
-        _JOBS,
-    )),
-    Command("sweep", "a parameter study into one dataset", "sweep:sweep",
-            ("sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run"), (
-        _argument("file", type=path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread"),
-        _method("in place of the file's"),
-        _output(file, "FILE", help="(default: the sweep's name with its ending)"),
-        _argument("--format", choices=("h5", "nc"), default="h5",
-                  help="ending of the default FILE (default: h5); one content"),
-        _flag("--metadata", help="RO-Crate, Croissant and statistics for normalization beside FILE, as JSON"),
-        _argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port"),
-        _argument("--part", type=part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array"),
-        _flag("--fresh", help="compute stored runs again"),
-        _flag("--dry-run", help="how many runs, about how long, how much"),
-        _flag("--yes", help="start a sweep of over a million runs"),
-        _flag("--json", help="progress and summary as JSON lines"),
-        _JOBS,
-        _timeout(),
-    )),
-    Command("stability", "stiff and extreme scenes by every method: where each holds, and the map of it",
-            "studies:stability", ("", "stiff/bearing-1e8 -o stiff.h5"), (
-        _argument("scenes", nargs="*", metavar="SCENE", help="some of them (default: stiff extreme)"),
-        _method(),
-        _SET,
-        _output(file, "FILE", Path("stability.h5")),
-        _REPORT,
-        _JOBS,
-        # The suite has many runs that would reach any limit: with a shorter one it ends in minutes.
-        _timeout(8.0),
-    )),
-    Command("modes", "natural frequencies at rest and over rotor speed, multipliers of a turn under gravity",
-            "studies:modes", ("stiff/nrel-5mw --speeds 0:3:31",), (
-        _SOME_SCENES,
-        _argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT",
-                  help="rad/s, equally spaced: Campbell diagram and Floquet multipliers, as 0:3:31 "
-                       "(default: at rest alone)"),
-        _argument("--stiffness", type=span, default=(), metavar="FROM:TO:COUNT",
-                  help="N m/rad of every bearing: the stability chart over speed and stiffness"),
-        _output(file, "FILE", Path("modes.h5")),
-        _REPORT,
-        _flag("--json", help="the table as JSON, for a script"),
-        _JOBS,
-        _timeout(600.0),
-    )),
-    Command("claims", "the paper's claims in words as shares of many runs, its numbers under other conditions",
-            "studies:claims", ("--runs 20",), (
-        _output(file, "FILE", Path("claims.h5")),
-        _argument("--runs", type=COUNT, default=100, metavar="N",
-                  help="starts moved by up to 1e-15 rad, for each scene, method and duration (default: %(default)s)"),
-        _argument("--seed", type=COUNT, default=2020, metavar="N", help="of the moved starts (default: %(default)s)"),
-        _JOBS,
-    )),
-    Command("report", "HTML pages from any file of this program", "studies:report", ("my.h5 --open",), (
-        *_RESULTS,
-        _output(folder, "DIR", help=_PAGES),
-        _flag("--open", help="show the index in the browser"),
-    )),
-    Command("figures", "the paper's figures as files for a manuscript, from a results file", "studies:figures",
-            ("--format svg --figure 11",), (
-        *_RESULTS,
-        _output(folder, "DIR", Path("figures")),
-        _argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)"),
-        _argument("--figure", action="append", metavar="N", help="this one alone; may be repeated"),
-    )),
-    Command("animate", "a scene moving, from a results file", "studies:animate",
-            ("paper/fig11", "mine my.h5 -o mine.gif"), (
-        _argument("scene", metavar="SCENE", help="its name in the results file"),
-        *_RESULTS,
-        _output(file, "FILE", help="FILE.gif, FILE.webp, or FILE.mp4 where ffmpeg is installed "
-                                   "(default: the scene's name with .webp)"),
-        _argument("--offset", type=POSITIVE, metavar="TIMES",
-                  help="how many times the tip's distance from its pitch axis is drawn "
-                       "(default: to a tenth of the blade)"),
-    )),
-    Command("export", "a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark", "studies:export",
-            ("paper/fig11 --to mjcf", "my.toml --to csv -o my.csv"), (
-        _argument("scene", metavar="SCENE", help=_SCENE),
-        _argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT",
-                  help="mjcf: a MuJoCo model; exudyn: a script without this package; csv: the reference trajectory; "
-                       "sympy: the equations; iftomm: a folder with description, error definition, acceptance and "
-                       "results"),
-        _output(path, "FILE", help="or folder (default: the scene's name with an ending)"),
-    )),
-)
-# fmt: on
+COUNT = _positive(int, "a whole number from 1 to 1e9")
+SECONDS = _positive(float, "seconds, more than 0, at most 1e9")
+POSITIVE = _positive(float, "a number more than 0, at most 1e9")
 
 
 class _Parser(argparse.ArgumentParser):
-    """Bad usage is one clear line, as all bad input is, without the usage above it."""
+    """Bad usage is one line, as all bad input is, without the usage above it."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
+    def flag(self, *names: str, help: str) -> None:
+        self.add_argument(*names, action="store_true", help=help)
+
+    # What several commands have.
+
+    def scenes(self, **options: Any) -> None:
+        text = "a name (paper/fig05), a folder (paper), a TOML file"
+        self.add_argument("scenes", metavar="SCENE", **{"nargs": "+", "help": text} | options)
+
+    def method(self, help: str = "model/integrator, as in rotor-mbs list") -> None:
+        self.add_argument("-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated")
+
+    def settings(self) -> None:
+        text = "method setting, ignored by methods without it; may be repeated (see rotor-mbs show METHOD)"
+        self.add_argument("--set", action="append", type=setting, metavar="NAME=VALUE", help=text)
+
+    def output(self, kind: Any, metavar: str, default: Path | None = None, help: str = "") -> None:
+        help = help or f"output {kind.__name__} (default: %(default)s)"
+        self.add_argument("-o", "--output", type=kind, default=default, metavar=metavar, help=help)
+
+    def pages(self, *names: str) -> None:
+        text = "folder of the pages (default: beside FILE, its name with -report; of results.h5: report)"
+        self.add_argument(*names, type=folder, metavar="DIR", help=text)
+
+    def results(self) -> None:
+        text = "results file (default: results.h5 of this folder, else that of reproduce)"
+        self.add_argument("file", nargs="?", type=path, default=default_results(), metavar="FILE", help=text)
+
+    def jobs(self) -> None:
+        text = "parallel processes (default: the cores, %(default)s)"
+        self.add_argument("-j", "--jobs", type=COUNT, default=cores(), metavar="N", help=text)
+
+    def timeout(self, seconds: float = 60.0) -> None:
+        text = "longer runs are stopped and recorded as timed_out (default: %(default)g)"
+        self.add_argument("--timeout", type=SECONDS, default=seconds, metavar="SECONDS", help=text)
+
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """The arguments, with `command` set to the function that carries them out. Ends with status 2 on bad usage."""
-    parser, known = _parser(), [command.name for command in _COMMANDS]
-    if argv and not argv[0].startswith("-") and argv[0] not in known:
-        parser.error(f"no command {argv[0]!r}{nearest(argv[0], known)}; allowed: {', '.join(known)}")
+    """Parse the words after `rotor-mbs`; ends with status 2 on bad usage.
+
+    Returns
+    -------
+    argparse.Namespace
+        The arguments; `command` is the place of the function to call, "module:function" in `rotor_mbs.cli`.
+    """
+    parser, commands = _parser()
+    if argv and not argv[0].startswith("-") and argv[0] not in commands:
+        parser.error(f"no command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")
     arguments, unknown = parser.parse_known_args(argv or ["--help"])
     if unknown:
-        parser.prog += f" {arguments.command.name}"
-        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
-    if hasattr(arguments, "results"):
-        arguments.file = arguments.results or arguments.file or default_results()
+        commands.get(argv[0], parser).error(f"unrecognized arguments: {' '.join(unknown)}")
     return arguments
 
 
-def _parser() -> _Parser:
-    raw = argparse.RawDescriptionHelpFormatter
+def _parser() -> tuple[_Parser, dict[str, _Parser]]:
+    """The parser, and those of the commands by name."""
+    formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
         description="Scenes of a rotor by independent models, compared with each other and with a published paper.",
         epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run paper/fig11\n"
-        "rotor-mbs COMMAND --help tells the options of a command and has an example.\n"
+        "rotor-mbs COMMAND --help shows the options of a command and an example.\n"
         "exit status: 0 all well; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted",
-        formatter_class=raw,
+        formatter_class=formatter,
     )
     parser.add_argument("--version", action="version", version=f"rotor-mbs {rotor_mbs.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in _COMMANDS:
-        shown = "".join(f"\n  rotor-mbs {command.name} {one}".rstrip() for one in command.examples)
+
+    def command(name: str, text: str, function: str, *examples: str) -> _Parser:
+        """function: "module:function" in `rotor_mbs.cli`; examples: what may follow the name."""
+        lines = ["example:", *(f"  rotor-mbs {name} {example}".rstrip() for example in examples)]
         own = commands.add_parser(
-            command.name, help=command.text, description=command.text, epilog=f"example:{shown}", formatter_class=raw
-        )
-        own.set_defaults(command=command)
-        for names, options in command.arguments:
-            own.add_argument(*names, **options)
-    return parser
+            name, help=text, description=text, epilog="\n".join(lines), formatter_class=formatter
+        )  # fmt: skip
+        own.set_defaults(command=function)
+        return own
+
+    own = command("list", "scenes, sweeps and methods, a line each", "scenes:list_all", "", "--json")
+    own.flag("--json", help="as JSON, for a script")
+
+    own = command(
+        "show", "one scene: its data and its methods; or one method: its settings", "scenes:show",
+        "paper/fig11", "paper/fig11 --build",
+    )  # fmt: skip
+    own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05), a TOML file, or a method (lagrange/taylor)")
+    own.flag("--build", help="also the items that each model builds")
+    own.flag("--json", help="as JSON, for a script")
+
+    own = command("new", "a commented scene file to start from", "scenes:new", "my.toml")
+    own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
+
+    own = command(
+        "reproduce", "every scene of the paper by every model, and the report", "runs:reproduce", "", "-o out -j 4"
+    )
+    own.output(folder, "DIR", REPRODUCED)
+    own.jobs()
+    own.timeout()
+
+    own = command(
+        "run", "scenes by methods, into one results file", "runs:run",
+        "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
+    )  # fmt: skip
+    own.scenes()
+    own.method()
+    own.settings()
+    own.output(file, "FILE", Path("results.h5"))
+    own.jobs()
+    own.timeout()
+
+    own = command(
+        "compare", "another program's trajectory against a scene's reference; exit status 1 where it differs",
+        "studies:compare", "mine.csv --scene paper/fig11", "OpenFAST.out --scene my.toml --columns map.toml",
+    )  # fmt: skip
+    text = "text with a header, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out or .outb"
+    own.add_argument("data", type=Path, metavar="DATA", help=text)
+    own.add_argument("--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file")
+    text = "column, unit, sign and zero of each channel (default: guessed)"
+    own.add_argument("--columns", type=Path, metavar="MAP.toml", help=text)
+    text = "largest error that agrees, rad per unit of error growth (default: %(default)g)"
+    own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
+    own.output(folder, "DIR", Path("comparison"), "folder of the page (default: %(default)s)")
+    own.flag("--json", help="the verdict as JSON, for a script")
+
+    own = command(
+        "bench", "error against run time, method by method", "studies:bench",
+        "paper/fig11", "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
+    )  # fmt: skip
+    own.scenes()
+    own.method()
+    own.settings()
+    own.output(file, "FILE", Path("bench.h5"))
+    text = "timed runs of each point (default: %(default)s; 5 at most for runs over 0.5 s)"
+    own.add_argument("--repeats", type=COUNT, default=20, metavar="N", help=text)
+    # At this default the paper's seventeen scenes take eight minutes.
+    text = "time for each scene (default: %(default)g)"
+    own.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
+
+    own = command("reference", "quad precision references, recomputed", "runs:reference", "paper/fig08 -o reference.h5")
+    own.scenes()
+    own.add_argument("-o", "--output", type=file, required=True, metavar="FILE", help="output file")
+    own.jobs()
+    own.timeout()
+
+    own = command(
+        "check", "accuracy verdicts; exit status 1 where one fails", "check:check",
+        "", "rotor-mbs-out/results.h5 --junit check.xml",
+    )  # fmt: skip
+    own.add_argument("file", nargs="?", type=path, metavar="FILE", help="results file (default: a quick set, computed)")
+    own.add_argument("--bounds", type=path, metavar="TOML", help="own bounds; they precede reference/accuracy.toml")
+    text = "fail where a scene of FILE has no run of it; may be repeated"
+    own.add_argument("--require", action="append", metavar="METHOD", help=text)
+    text = "also fail where a verdict of this earlier results file passed with a larger margin, or its run is gone"
+    own.add_argument("--against", type=path, metavar="OLD", help=text)
+    text = "with --against: by how much a margin may shrink (default: %(default)g)"
+    own.add_argument("--shrink", type=POSITIVE, default=10.0, metavar="FACTOR", help=text)
+    own.add_argument("--junit", type=file, metavar="XML", help="verdicts as JUnit XML")
+    own.add_argument("--json", type=file, metavar="FILE", help="verdicts as JSON; - for standard output")
+    own.flag("--github", help="the ten worst failures as annotations, a table as job summary")
+    own.flag("-v", "--verbose", help="print verdicts that pass, too")
+    own.jobs()
+
+    own = command(
+        "sweep", "a parameter study into one dataset", "sweep:sweep",
+        "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
+    )  # fmt: skip
+    own.add_argument("file", type=path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
+    own.method("in place of the file's methods")
+    own.output(file, "FILE", help="output file (default: the sweep's name with its ending)")
+    text = "ending of the default FILE (default: h5); contents identical"
+    own.add_argument("--format", choices=("h5", "nc"), default="h5", help=text)
+    own.flag("--metadata", help="Croissant metadata and statistics for normalization beside FILE, as JSON")
+    own.add_argument("--engine", default="local", metavar="ENGINE", help="local, or dask:tcp://host:port")
+    own.add_argument("--part", type=part, default=(1, 1), metavar="K/N", help="part K of N alone, for a job array")
+    own.flag("--fresh", help="recompute stored runs")
+    own.flag("--dry-run", help="print run count, estimated time, disk space")
+    own.flag("--yes", help="start a sweep of over a million runs")
+    own.flag("--json", help="progress and summary as JSON lines")
+    own.jobs()
+    own.timeout()
+
+    own = command(
+        "stability", "stiff and extreme scenes by every method: where each is stable and accurate, as a map",
+        "studies:stability", "", "stiff/bearing-1e8 -o stiff.h5",
+    )  # fmt: skip
+    own.scenes(nargs="*", help="some of them (default: stiff extreme)")
+    own.method()
+    own.settings()
+    own.output(file, "FILE", Path("stability.h5"))
+    own.pages("--report")
+    own.jobs()
+    own.timeout(8.0)  # many runs of the suite would reach any limit: with a short one it ends in minutes
+
+    own = command(
+        "modes", "natural frequencies at rest and over rotor speed, multipliers of a turn under gravity",
+        "studies:modes", "stiff/nrel-5mw --speeds 0:3:31",
+    )  # fmt: skip
+    own.scenes()
+    text = "rad/s, equally spaced: Campbell diagram and Floquet multipliers, as 0:3:31 (default: at rest alone)"
+    own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
+    text = "N m/rad of every bearing: the stability chart over speed and stiffness"
+    own.add_argument("--stiffness", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
+    own.output(file, "FILE", Path("modes.h5"))
+    own.pages("--report")
+    own.flag("--json", help="the table as JSON, for a script")
+    own.jobs()
+    own.timeout(600.0)
+
+    own = command("report", "HTML pages from any file of this program", "studies:report", "my.h5 --open")
+    own.results()
+    own.pages("-o", "--output")
+    own.flag("--open", help="show the index in the browser")
+
+    own = command(
+        "figures", "the paper's figures as files for a manuscript, from a results file", "studies:figures",
+        "--format svg --figure 11",
+    )  # fmt: skip
+    own.results()
+    own.output(folder, "DIR", Path("figures"))
+    own.add_argument("--format", choices=("pdf", "svg", "png"), default="pdf", help="(default: %(default)s)")
+    own.add_argument("--figure", action="append", metavar="N", help="this one alone; may be repeated")
+
+    own = command(
+        "animate", "an animation of a scene, from a results file", "studies:animate",
+        "paper/fig11", "mine my.h5 -o mine.gif",
+    )  # fmt: skip
+    own.add_argument("scene", metavar="SCENE", help="its name in the results file")
+    own.results()
+    text = "FILE.gif, FILE.webp, or FILE.mp4 where ffmpeg is installed (default: the scene's name with .webp)"
+    own.output(file, "FILE", help=text)
+    text = "factor on the tip's distance from its pitch axis as drawn (default: scaled to 10 %% of blade length)"
+    own.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)
+
+    own = command(
+        "export", "a scene for MuJoCo, for Exudyn, or as CSV", "studies:export",
+        "paper/fig11 --to mjcf", "my.toml --to csv -o my.csv",
+    )  # fmt: skip
+    own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
+    text = "mjcf: a MuJoCo model; exudyn: a script without this package; csv: the reference trajectory"
+    own.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
+    own.output(path, "FILE", help="output file (default: the scene's name with an ending)")
+
+    return parser, dict(commands.choices)

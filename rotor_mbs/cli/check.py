@@ -6,9 +6,7 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import TextIO
 
-from rotor_mbs.analysis.verdicts import Verdict
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import check_names
@@ -26,55 +24,43 @@ def check(arguments: argparse.Namespace) -> int:
     required = check_names(arguments.require or ())
     earlier = None if arguments.against is None else study.judge_file(arguments.against, bounds)
     if arguments.file is not None:
-        found = study.check_file(arguments.file, bounds, required)
+        verdicts = study.check_file(arguments.file, bounds, required)
     else:
         with ProgressLine() as progress:
-            found = study.check_default_set(bounds, arguments.jobs, progress)
-    if arguments.speed:
-        found += study.check_speed(bounds)
-    if found and earlier is not None:
-        found += study.regressions(found, earlier, arguments.shrink)
-    _write(arguments, found)
-    # With --json - the standard output is the JSON's alone.
-    stream = sys.stderr if arguments.json == _STANDARD_OUTPUT else sys.stdout
-    failed = [verdict for verdict in found if not verdict.passed]
-    for verdict in found if arguments.verbose else failed:
-        print(formats.line(verdict), file=stream)
-    if arguments.margins:
-        print(formats.margins(found), file=stream)
-    if arguments.github:
-        _tell_github(found, stream)
-    runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(found).items())
-    print(f"runs judged: {runs or 'none'}", file=stream)
-    print(f"{len(found) - len(failed)} passed, {len(failed)} failed", file=stream)
-    return 1 if failed or not found else 0
+            verdicts = study.check_default_set(bounds, arguments.jobs, progress)
+    if verdicts and earlier is not None:
+        verdicts += study.regressions(verdicts, earlier, arguments.shrink)
 
-
-def _tell_github(found: list[Verdict], stream: TextIO) -> None:
-    """The worst failures as annotations; a table into the job's summary, where a job has one."""
-    failed = [verdict for verdict in formats.worst_first(found) if not verdict.passed]
-    for verdict in failed[: formats.WORST]:
-        print(formats.github(verdict), file=stream)
-    place = os.environ.get("GITHUB_STEP_SUMMARY")
-    if place:
-        try:
-            with Path(place).open("a", encoding="utf-8") as file:
-                file.write(formats.summary(found))
-        except OSError as exc:
-            raise StoreError(f"{place} (GITHUB_STEP_SUMMARY): cannot be written: {exc.strerror}") from exc
-
-
-def _write(arguments: argparse.Namespace, found: list[Verdict]) -> None:
     if arguments.junit is not None:
-        replace_file(arguments.junit, formats.junit(found))
-    for path, text in (
-        (arguments.json, formats.as_json),
-        (arguments.trend, formats.trend),
-        (arguments.badge, formats.badge),
-    ):
-        if path == _STANDARD_OUTPUT:
-            print(text(found))
-        elif path is not None:
-            replace_file(path, text(found).encode())
-    if not found:
+        replace_file(arguments.junit, formats.junit(verdicts))
+    stream = sys.stdout
+    if arguments.json == _STANDARD_OUTPUT:
+        print(formats.as_json(verdicts))
+        stream = sys.stderr  # standard output is the JSON's alone
+    elif arguments.json is not None:
+        replace_file(arguments.json, formats.as_json(verdicts).encode())
+
+    if not verdicts:
         print("nothing to check: the file has no run", file=sys.stderr)
+    failures = [verdict for verdict in verdicts if not verdict.passed]
+    for verdict in verdicts if arguments.verbose else failures:
+        print(formats.line(verdict), file=stream)
+    if arguments.github:
+        for verdict in formats.worst_first(failures)[: formats.WORST]:
+            print(formats.github(verdict), file=stream)
+        _append_job_summary(formats.summary(verdicts))
+    runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(verdicts).items())
+    print(f"runs judged: {runs or 'none'}", file=stream)
+    print(f"{len(verdicts) - len(failures)} passed, {len(failures)} failed", file=stream)
+    return 1 if failures or not verdicts else 0
+
+
+def _append_job_summary(text: str) -> None:
+    """Into the file that GitHub names in the environment of a job's step; nothing elsewhere."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    if path:
+        try:
+            with Path(path).open("a", encoding="utf-8") as file:
+                file.write(text)
+        except OSError as exc:
+            raise StoreError(f"{path} (GITHUB_STEP_SUMMARY): cannot be written: {exc.strerror}") from exc

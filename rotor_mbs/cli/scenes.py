@@ -1,4 +1,4 @@
-"""`list`, `show` and `new`: what there is, what each model would build for a scene, and a file for one of your own."""
+"""`list`, `show` and `new`: what is available, what each model builds for a scene, and a new scene file."""
 
 from __future__ import annotations
 
@@ -7,33 +7,31 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from rotor_mbs.cli.terminal import print_doubts
 from rotor_mbs.errors import InputError
-from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, list_sweeps
+from rotor_mbs.scenario.catalogue import list_scenes, list_sweeps, only_scene
 
-if TYPE_CHECKING:  # numpy behind it is too heavy for `list`
+if TYPE_CHECKING:
     from rotor_mbs.methods.base import Method
+    from rotor_mbs.scenario.scene import Scene
 
 
 def list_all(arguments: argparse.Namespace) -> int:
     """Name and title of every shipped scene and sweep, name and label of every method."""
     from rotor_mbs.methods.catalogue import methods
 
-    found: dict[str, list[tuple[str, str]]] = {}
-    for name, title in list_scenes():
-        found.setdefault(f"scenes: {name.partition('/')[0]}", []).append((name, title))
-    found["sweeps"] = list_sweeps()
-    found["methods"] = [(method.name, method.label) for method in methods()]
+    scenes, sweeps = list_scenes(), list_sweeps()
+    labels = [(method.name, method.label) for method in methods()]
     if arguments.json:
-        rows = [
-            {"name": name, "title": title, "kind": heading.partition(":")[0].removesuffix("s")}
-            for heading, entries in found.items()
-            for name, title in entries
-        ]
+        kinds = {"scene": scenes, "sweep": sweeps, "method": labels}
+        rows = [{"name": name, "title": title, "kind": kind} for kind in kinds for name, title in kinds[kind]]
         print(json.dumps(rows, ensure_ascii=False))
         return 0
-    width = max(len(name) for entries in found.values() for name, _ in entries)
-    for heading, entries in found.items():
+    headings: dict[str, list[tuple[str, str]]] = {}
+    for name, title in scenes:
+        headings.setdefault(f"scenes: {name.partition('/')[0]}", []).append((name, title))
+    headings |= {"sweeps": sweeps, "methods": labels}
+    width = max(len(name) for entries in headings.values() for name, _ in entries)
+    for heading, entries in headings.items():
         print(heading, *(f"  {name:{width}}  {title}" for name, title in entries), "", sep="\n")
     print("next: rotor-mbs show NAME; rotor-mbs run SCENE [-m METHOD]; rotor-mbs sweep SWEEP; rotor-mbs new FILE.toml")
     return 0
@@ -50,7 +48,7 @@ def new(arguments: argparse.Namespace) -> int:
             file.write(new_scene_text())
     except OSError as exc:
         raise InputError(
-            f"{arguments.file}: cannot be created: {exc.strerror}; allowed: a file that is not there yet"
+            f"{arguments.file}: cannot be created: {exc.strerror}; allowed: a file that does not exist yet"
         ) from exc
     print(f"{arguments.file}: edit it, then: rotor-mbs run {arguments.file}")
     return 0
@@ -59,31 +57,40 @@ def new(arguments: argparse.Namespace) -> int:
 def show(arguments: argparse.Namespace) -> int:
     """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
     from rotor_mbs.methods.catalogue import look_up
-    from rotor_mbs.studies.scene_overview import models_of, scene_data
 
     method = look_up(arguments.scene)
-    if method is not None:
-        if arguments.json:
-            allowed = {name: {"allowed": str(one), "doc": one.doc} for name, one in method.settings.allowed().items()}
-            facts = {"name": method.name, "label": method.label, "settings": method.defaults, "allowed": allowed}
-            print(json.dumps(facts, ensure_ascii=False, indent=1))
-        else:
-            print(f"{method.name}: {method.label}\n", *_settings_lines(method), sep="\n")
-        return 0
-    found = find_scenes([arguments.scene])
-    if len(found) != 1:
-        raise InputError(f"{arguments.scene}: {len(found)} scenes; allowed: one scene's name or file")
-    scene = found[0]
-    models = models_of(scene)
+    if method is None:
+        _show_scene(only_scene(arguments.scene), arguments)
+    else:
+        _show_method(method, arguments)
+    return 0
+
+
+def _show_method(method: Method, arguments: argparse.Namespace) -> None:
+    allowed, defaults = method.settings.allowed(), method.defaults
     if arguments.json:
-        built = {model.name: asdict(model) for model in models}
-        print(
-            json.dumps({"name": scene.name, "scene": scene_data(scene), "models": built}, ensure_ascii=False, indent=1)
-        )
-        return 0
-    print_doubts(found)
+        rules = {name: {"allowed": str(rule), "doc": rule.doc} for name, rule in allowed.items()}
+        facts = {"name": method.name, "label": method.label, "settings": defaults, "allowed": rules}
+        print(json.dumps(facts, ensure_ascii=False, indent=1))
+        return
+    print(f"{method.name}: {method.label}\n")
+    for name, rule in allowed.items():
+        print(f"  {name:26} {defaults[name]!s:>16}  {rule}; {rule.doc}".rstrip("; "))
+    print(f"\nset one: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE" if allowed else "no settings")
+
+
+def _show_scene(scene: Scene, arguments: argparse.Namespace) -> None:
+    from rotor_mbs.cli.terminal import print_doubts
+    from rotor_mbs.studies.scene_overview import models_of, scene_data
+
+    data, models = scene_data(scene), models_of(scene)
+    if arguments.json:
+        facts = {"name": scene.name, "scene": data, "models": {model.name: asdict(model) for model in models}}
+        print(json.dumps(facts, ensure_ascii=False, indent=1))
+        return
+    print_doubts([scene])
     print(f"{scene.name}: {scene.title}\n")
-    for key, value in scene_data(scene).items():
+    for key, value in data.items():
         if isinstance(value, dict):
             print(f"  {key}", *(f"    {part:24} {_readable(number)}" for part, number in value.items()), sep="\n")
         else:
@@ -93,14 +100,6 @@ def show(arguments: argparse.Namespace) -> int:
         print(f"  {model.line}")
         for item in model.items if arguments.build else ():
             print(f"    {item.kind:9} {item.name:28} {item.detail}".rstrip())
-    return 0
-
-
-def _settings_lines(method: Method) -> list[str]:
-    """A line for each setting: name, default, what is allowed, what it does."""
-    allowed, defaults = method.settings.allowed(), method.defaults
-    lines = [f"  {name:26} {defaults[name]!s:>16}  {one}; {one.doc}".rstrip("; ") for name, one in allowed.items()]
-    return [*lines, "", f"set one: rotor-mbs run SCENE -m {method.name} --set NAME=VALUE"] if lines else ["no settings"]
 
 
 def _readable(value: object) -> str:

@@ -14,7 +14,6 @@ from pathlib import Path
 
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
-from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.runs import cores
 from rotor_mbs.scenario.catalogue import find_scenes, only_scene
@@ -25,22 +24,15 @@ def bench(arguments: argparse.Namespace) -> int:
     from rotor_mbs.analysis.run_tables import bench_table
     from rotor_mbs.runs.records import read_records
     from rotor_mbs.studies.bench import run_bench
-    from rotor_mbs.studies.cost_scaling import run_cost_scaling
 
-    if not arguments.scenes and not arguments.growth:
-        raise InputError("bench: nothing to measure; allowed: SCENE..., or --growth")
-    scenes = find_scenes(arguments.scenes) if arguments.scenes else []
-    methods, output = check_names(arguments.method or ()), arguments.output
-    settings = dict(arguments.set or ())
+    scenes, output = find_scenes(arguments.scenes), arguments.output
     print_doubts(scenes)
-    limits = {"repeats": arguments.repeats, "budget_s": arguments.budget}
     with ProgressLine() as progress:
         made, left_out = run_bench(
-            scenes, methods, output, workers=cores(), settings=settings, on_progress=progress, **limits
-        )
-        measured = len({outcome.label.partition(" ")[0] for outcome in made})
-        if arguments.growth:
-            made += run_cost_scaling(methods, output, on_progress=progress, **limits)
+            scenes, check_names(arguments.method or ()), output, workers=cores(), settings=dict(arguments.set or ()),
+            on_progress=progress, repeats=arguments.repeats, budget_s=arguments.budget,
+        )  # fmt: skip
+    measured = len({outcome.case.scene.name for outcome in made})
     for line in left_out:
         print(line, file=sys.stderr)
     names = {scene.name for scene in scenes}
@@ -98,24 +90,6 @@ def modes(arguments: argparse.Namespace) -> int:
             print(*modes_summary(one), sep="\n")
         _write_pages(arguments.output, arguments.report)
     return int(is_lost or not all(one.agrees for one in chosen))
-
-
-def claims(arguments: argparse.Namespace) -> int:
-    """The paper's claims in words tested on many runs. Always 0: the verdicts are what is found out."""
-    from rotor_mbs.analysis.claim_records import count_of_rows
-    from rotor_mbs.analysis.claim_shares import RULE
-    from rotor_mbs.studies.claims import study_claims
-
-    with ProgressLine() as progress:
-        study = study_claims(
-            arguments.output, runs=arguments.runs, seed=arguments.seed, workers=arguments.jobs, on_sweep=progress.stage
-        )
-    print(study.shares, f"\n{RULE}\n", sep="\n")
-    for duration in sorted({one.duration for one in study.numbers.conditions}):
-        count, of = count_of_rows(study.numbers, duration)
-        print(f"{duration:g} s: {count} of {of} ways of writing the first row of (56) give all published numbers")
-    print(f"{arguments.output}: written")
-    return 0
 
 
 def compare(arguments: argparse.Namespace) -> int:

@@ -6,7 +6,6 @@ A model's code is imported when one of its methods is first asked for; its engin
 from __future__ import annotations
 
 import functools
-import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module, metadata
@@ -28,7 +27,6 @@ _BUILT_IN: Mapping[str, tuple[str, ...]] = {
 }
 
 _UNKNOWN_LOOK = Look("#666666", ":", "D")
-_log = logging.getLogger("rotor_mbs")
 
 
 def methods() -> tuple[Method, ...]:
@@ -155,6 +153,12 @@ def _as_methods(found: object) -> tuple[Method, ...]:
     return several
 
 
+def _warn(message: str, *values: object) -> None:
+    import logging  # late: 6 ms that `rotor-mbs list` need not wait for
+
+    logging.getLogger("rotor_mbs").warning(message, *values)
+
+
 @functools.cache
 def _plug_ins() -> dict[str, Method]:
     """Methods of other packages by name. One that cannot be loaded is left out, with a warning."""
@@ -164,12 +168,12 @@ def _plug_ins() -> dict[str, Method]:
         try:
             loaded = _as_methods(point.load())
         except Exception as exc:  # whatever another package raises must not stop this one
-            _log.warning("plug-in %s of %s left out: %s: %s", point.name, point.value, type(exc).__name__, exc)
+            _warn("plug-in %s of %s left out: %s: %s", point.name, point.value, type(exc).__name__, exc)
             continue
         package = (point.dist.name,) if point.dist else ()
         for method in loaded:
             if method.name in taken:
-                _log.warning("plug-in %s of %s: method %s left out: name taken", point.name, point.value, method.name)
+                _warn("plug-in %s of %s: method %s left out: name taken", point.name, point.value, method.name)
                 continue
             taken.add(method.name)
             distributions = tuple(dict.fromkeys((*method.distributions, *package)))

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.scenario.scene import Scene
+
+if TYPE_CHECKING:
+    from rotor_mbs.scenario.scene import Scene
 
 
 def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:

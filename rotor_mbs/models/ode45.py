@@ -17,7 +17,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from rotor_mbs.methods.settings import Settings, number
+from rotor_mbs.models.ode45_settings import Ode45Settings as Ode45Settings
 from rotor_mbs.solution.trajectory import Array
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
@@ -104,12 +104,6 @@ class Ode45Result:
         state = self.at(time)
         state[::4] = self.state
         return time, state
-
-
-@dataclass(frozen=True)
-class Ode45Settings(Settings):
-    relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
-    absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
 
 
 def ode45(

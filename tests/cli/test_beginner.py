@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import pytest
+from support.commands import rotor_mbs
 
 import rotor_mbs as rm
-from rotor_mbs.cli import main
 from rotor_mbs.errors import PlausibilityWarning
 from rotor_mbs.scenario.catalogue import list_scenes
 from rotor_mbs.scenario.plausibility import doubts
@@ -35,7 +34,7 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a method of the file": ({"methods = []": 'methods = ["rk67"]'}, "run {file}", "mine:10: methods: unknown method"),
     "an option that is none": ({}, "run {file} --stiff", "rotor-mbs run: unrecognized arguments: --stiff; see"),
     "a new file that would not run": ({}, "new mine.txt", "allowed: a name that ends in .toml"),
-    "a new file over an old one": ({}, "new {file}", "allowed: a file that is not there yet"),
+    "a new file over an old one": ({}, "new {file}", "allowed: a file that does not exist yet"),
 }  # fmt: skip
 SLIPS: dict[str, tuple[str, str, str]] = {
     "degrees": ('"deg(30)"', "30", '30 rad are 4.8 turns; degrees? write "deg(30)"'),
@@ -57,30 +56,22 @@ def scene_file(folder: Path, edits: dict[str, str]) -> Path:
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_one_line_that_says_what_to_do_next(
-    mistake: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mistake_is_one_line_that_says_what_to_do_next(mistake: str, folder: Path) -> None:
     edits, command, says = MISTAKES[mistake]
-    monkeypatch.chdir(tmp_path)
-    try:
-        status = main(command.format(file=scene_file(tmp_path, edits).name).split())
-    except SystemExit as end:
-        status = int(str(end.code))
-    printed = capsys.readouterr()
-    assert status == 2
-    assert says in printed.err
-    assert len(printed.err.splitlines()) == 1
-    assert printed.out == ""
+    ended = rotor_mbs(*command.format(file=scene_file(folder, edits).name).split())
+    assert ended.status == 2
+    assert says in ended.err
+    assert len(ended.err.splitlines()) == 1
+    assert ended.out == ""
 
 
 @pytest.mark.parametrize("slip", SLIPS)
-def test_a_number_that_looks_like_a_slip_is_warned_of_and_not_refused(
-    slip: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_number_that_looks_like_a_slip_is_warned_of_and_not_refused(slip: str, folder: Path) -> None:
     old, new, says = SLIPS[slip]
-    path = scene_file(tmp_path, {old: new})
-    assert main(["show", str(path)]) == 0
-    (line,) = capsys.readouterr().err.splitlines()
+    path = scene_file(folder, {old: new})
+    shown = rotor_mbs("show", path)
+    assert shown.status == 0
+    (line,) = shown.err.splitlines()
     assert line.startswith("warning: mine: ")
     assert says in line
     with pytest.warns(PlausibilityWarning, match="mine.toml"):
@@ -100,19 +91,17 @@ def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_u
         assert not [line for line in doubts(rm.scene(name)) if "gyration" in line or "rest" in line], name
 
 
-def test_plausible_numbers_are_not_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        rm.load(scene_file(tmp_path, {}))
-    assert main(["show", str(tmp_path / "mine.toml")]) == 0
-    assert capsys.readouterr().err == ""
+def test_plausible_numbers_are_not_warned_of(folder: Path) -> None:
+    path = scene_file(folder, {})
+    rm.load(path)  # warnings are errors here
+    assert rotor_mbs("show", path)[::2] == (0, "")
 
 
 def test_an_inaccurate_run_names_the_next_step_to_try_until_it_is_accurate() -> None:
-    scene = rm.scene("paper/fig11").replace(duration=1.0, samples=11)
+    scene = rm.scene("check/general")
     step, steps = 0.1, [0.1]
     for _ in range(12):
-        run = rm.run(scene, "exudyn_tree/rk44", step=step, reference=True)
+        run = rm.run(scene, "exudyn_tree/rk44", step=step)
         if run.status == "ok":
             break
         assert run.status == "inaccurate"
@@ -123,23 +112,18 @@ def test_an_inaccurate_run_names_the_next_step_to_try_until_it_is_accurate() -> 
     assert steps == sorted(set(steps), reverse=True)
 
 
-def test_a_scene_names_its_methods_and_settings(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_scene_names_its_methods_and_settings(folder: Path) -> None:
     edits = {
         "methods = []": 'methods = ["exudyn_tree/rk67", "lagrange/dop853"]', "# step = 1e-3": "step = 0.002",
         "duration = 10.0": "duration = 0.2", "samples = 1001": "samples = 11",
     }  # fmt: skip
-    path = scene_file(tmp_path, edits)
-    assert main(["run", str(path), "-o", "r.h5", "-j", "1"]) == 0
-    assert main(["run", str(path), "-o", "s.h5", "-j", "1", "--set", "step=0.001"]) == 0
-    for name, step in (("r.h5", 0.002), ("s.h5", 0.001)):
-        tree = rm.open(name)
-        assert set(tree.scenes["mine"]) == {"reference", "exudyn_tree/rk67", "lagrange/dop853"}
-        assert tree["mine/exudyn_tree/rk67"].settings["step"] == step
+    path = scene_file(folder, edits)
     assert rm.run(rm.load(path), "exudyn_tree/rk67").settings["step"] == 0.002
-    capsys.readouterr()
-    scene_file(tmp_path, edits | {"# step = 1e-3": "stp = 0.002"})
-    assert main(["run", str(path), "-o", "r.h5"]) == 2
-    assert "mine:38: settings: no setting 'stp', perhaps step" in capsys.readouterr().err
+    assert rotor_mbs("run", path, "-o", "r.h5", "-j", "1", "--set", "step=0.001").status == 0
+    tree = rm.open("r.h5")
+    assert set(tree.scenes["mine"]) == {"reference", "exudyn_tree/rk67", "lagrange/dop853"}
+    assert tree["mine/exudyn_tree/rk67"].settings["step"] == 0.001
+    scene_file(folder, edits | {"# step = 1e-3": "stp = 0.002"})
+    refused = rotor_mbs("run", path, "-o", "r.h5")
+    assert refused.status == 2
+    assert "mine:38: settings: no setting 'stp', perhaps step" in refused.err

@@ -5,11 +5,12 @@ from __future__ import annotations
 import io
 import signal
 import time
+from collections.abc import Callable
 from contextlib import suppress
 
 import pytest
+from support.commands import rotor_mbs
 
-from rotor_mbs.cli import main
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.runs.case import Case
@@ -78,48 +79,48 @@ def test_an_estimate_counts_what_comes_after_the_cases() -> None:
         assert "pages 5/10" in screen.getvalue()
 
 
+def _ends_by(patch: pytest.MonkeyPatch, action: Callable[[], object]) -> tuple[int, str]:
+    """Status and errors of a command in which `action` takes the place of its first step."""
+    patch.setattr("rotor_mbs.cli.runs.find_scenes", lambda _: action())
+    ended = rotor_mbs("run", "paper/fig03")
+    return ended.status, ended.err
+
+
 @pytest.mark.parametrize("error", [SystemError, ImportError, MethodRefusal])
 def test_an_interrupt_inside_compiled_code_is_an_interrupt(
-    error: type[Exception], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    error: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """h5py's locks make a SystemError of it, loading an engine an ImportError, which may be taken for a lack."""
 
-    def interrupted(_: object) -> None:
+    def interrupted() -> None:
         raise error("initialization failed") from KeyboardInterrupt()
 
-    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
-    assert main(["run", "paper/fig03"]) == 130
-    assert capsys.readouterr().err.startswith("interrupted; ")
+    status, errors = _ends_by(monkeypatch, interrupted)
+    assert status == 130
+    assert errors.startswith("interrupted; ")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_an_interrupt_that_becomes_another_error_without_a_trace(
-    number: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_interrupt_that_becomes_another_error_without_a_trace(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """NumPy's own loading: PyCapsule_Import("datetime") forgets why the import failed."""
 
-    def interrupted(_: object) -> None:
+    def interrupted() -> None:
         with suppress(KeyboardInterrupt):
             signal.raise_signal(number)
         raise ImportError("PyCapsule_Import could not import module")
 
-    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
-    assert main(["run", "paper/fig03"]) == 130
-    assert capsys.readouterr().err.startswith("interrupted; ")
+    assert _ends_by(monkeypatch, interrupted)[0] == 130
 
 
 @pytest.mark.parametrize("error", [SystemError, ImportError])
-def test_code_that_cannot_be_loaded_is_told_in_a_line(
-    error: type[Exception], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_code_that_cannot_be_loaded_is_one_line(error: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
     """As where there is no memory for a library: "failed to map segment from shared object"."""
 
-    def short_of_memory(_: object) -> None:
+    def short_of_memory() -> None:
         raise error("failed to map segment")
 
-    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", short_of_memory)
-    assert main(["run", "paper/fig03"]) == 1
-    assert capsys.readouterr().err == f"code cannot be loaded: {error.__name__}: failed to map segment\n"
+    line = f"code cannot be loaded: {error.__name__}: failed to map segment\n"
+    assert _ends_by(monkeypatch, short_of_memory) == (1, line)
 
 
 class _InterruptedAtItsEnd:
@@ -127,14 +128,10 @@ class _InterruptedAtItsEnd:
         raise KeyboardInterrupt
 
 
-def test_an_interrupt_where_python_ignores_exceptions_comes_again(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupted(_: object) -> list[object]:
+def test_an_interrupt_where_python_ignores_exceptions_comes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> list[object]:
         _InterruptedAtItsEnd()
         time.sleep(1.0)
         return []
 
-    monkeypatch.setattr("rotor_mbs.cli.runs.find_scenes", interrupted)
-    assert main(["run", "paper/fig03"]) == 130
-    assert capsys.readouterr().err.startswith("interrupted; ")
+    assert _ends_by(monkeypatch, interrupted)[0] == 130

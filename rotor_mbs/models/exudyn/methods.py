@@ -9,31 +9,30 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from itertools import product
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice, step
-from rotor_mbs.models.exudyn import blueprint, chain, schemes, sensor_samples, tree
-from rotor_mbs.models.exudyn.extrapolation import NONE, RICHARDSON, ExtrapolatedSolver
-from rotor_mbs.models.exudyn.moments import Loads
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment, intervals
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.models.exudyn import schemes
+
+if TYPE_CHECKING:  # the list of methods needs none of them
+    from rotor_mbs.models.exudyn import blueprint
+    from rotor_mbs.models.exudyn.moments import Loads
+    from rotor_mbs.scenario.scene import Scene
+    from rotor_mbs.scenario.time_table import Segment
+    from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+
+    Reading = Callable[[Scene, Sequence[Segment], Callable[[str], Array]], Trajectory]
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8
 _MOST_STEPS = 1e9
 _LINEARIZATION = "rotor_mbs.models.exudyn.linearization"
 
-Reading = Callable[[Scene, Sequence[Segment], Callable[[str], Array]], Trajectory]
-
-
-_NODE = choice("euler_parameters", chain.NODES, doc="coordinates of a body's rotation")
-_EXTRAPOLATION = choice(NONE, (NONE, RICHARDSON), doc="richardson: three runs, with step, step/2 and step/4")
+_NODE = choice("euler_parameters", ("euler_parameters", "rotation_vector"), doc="coordinates of a body's rotation")
+_EXTRAPOLATION = choice("none", ("none", "richardson"), doc="richardson: three runs, with step, step/2 and step/4")
 
 
 @dataclass(frozen=True)
@@ -65,6 +64,7 @@ class MultibodySolver:
         rows_between: bool,
     ) -> None:
         from rotor_mbs.models.exudyn.adapter import System
+        from rotor_mbs.scenario.time_table import intervals
 
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
@@ -76,12 +76,17 @@ class MultibodySolver:
         return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._loads.enter)
 
     def observe(self) -> Trajectory:
+        import numpy as np
+
         # A diverging state may overflow in its energies; the rows are cut where they stop being finite.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._reading(self._scene, self._loads.segments, self.system.rows)
 
 
 def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
+    from rotor_mbs.models.exudyn import sensor_samples, tree
+    from rotor_mbs.models.exudyn.moments import Loads
+
     scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
         scheme = scheme.with_accelerations()
@@ -90,6 +95,10 @@ def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
 
 
 def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
+    from rotor_mbs.models.exudyn import chain, sensor_samples
+    from rotor_mbs.models.exudyn.extrapolation import RICHARDSON, ExtrapolatedSolver
+    from rotor_mbs.models.exudyn.moments import Loads
+
     scheme = _scheme(scene, settings)
     if scene.wants("loads") and settings.node == "rotation_vector":
         raise MethodRefusal(
@@ -128,6 +137,9 @@ def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
     in_tree = model == "exudyn_tree"
 
     def items(scene: Scene) -> list[BuiltItem]:
+        from rotor_mbs.models.exudyn import blueprint, chain, tree
+        from rotor_mbs.models.exudyn.moments import Loads
+
         return blueprint.items((tree if in_tree else chain).parts(scene, Loads(scene)))
 
     return Method(

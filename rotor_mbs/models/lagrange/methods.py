@@ -1,24 +1,23 @@
-"""The methods of the closed form. Importing this loads neither heyoka nor SciPy."""
+"""The methods of the closed form. Importing this loads neither NumPy, SciPy nor heyoka."""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from rotor_mbs.methods.base import Look, Method, late
+from rotor_mbs.methods.base import Look, Method, Solver, late
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.equation_items import equation_items
-from rotor_mbs.models.lagrange import heyoka_adapter, reference, taylor
-from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator
-from rotor_mbs.models.ode45 import Ode45Settings
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.linearization import Linearization
+from rotor_mbs.models.ode45_settings import Ode45Settings
 
-_EPS = float(np.finfo(float).eps)
+if TYPE_CHECKING:  # the list of methods needs none of them
+    from rotor_mbs.scenario.scene import Scene
+    from rotor_mbs.solution.linearization import Linearization
+
+_EPS = sys.float_info.epsilon
 _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 _BLUE, _LIGHT_BLUE = "#0072b2", "#56b4e9"
 
@@ -55,6 +54,18 @@ class RadauSettings(Settings):
     absolute_tolerance: float = _absolute(1e-11)
 
 
+def _build_taylor(scene: Scene, settings: TaylorSettings) -> Solver:
+    from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
+
+    return Propagation(scene, tol=settings.tolerance, compact_mode=is_compact(scene), high_accuracy=True)
+
+
+def _build_ode45(scene: Scene, settings: Ode45Settings) -> Solver:
+    from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator
+
+    return OdeSolver(scene, ode45_integrator(settings.relative_tolerance, settings.absolute_tolerance))
+
+
 def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linearization:
     from rotor_mbs.models.lagrange.linearization import linearize
 
@@ -65,14 +76,18 @@ def _scipy_method(
     solver: str, look: Look, settings: type[Settings], ladder: Ladder, medium: float, relative_cost: float
 ) -> Method:
     """SciPy's solver of that name; medium: relative tolerance of the cost scaling study."""
+
+    def build(scene: Scene, chosen: Any) -> Solver:
+        from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
+
+        return OdeSolver(scene, scipy_integrator(solver, chosen.relative_tolerance, chosen.absolute_tolerance))
+
     return Method(
         name=f"lagrange/{solver.lower()}",
         label=f"closed form, {solver}",
         look=look,
         settings=settings,
-        build=lambda scene, chosen: OdeSolver(
-            scene, scipy_integrator(solver, chosen.relative_tolerance, chosen.absolute_tolerance)
-        ),
+        build=build,
         items=equation_items,
         distributions=("scipy",),
         ladders=(ladder,),
@@ -88,12 +103,10 @@ METHODS = (
         label="closed form, Taylor",
         look=Look(_BLUE, "-", "o"),
         settings=TaylorSettings,
-        build=lambda scene, settings: taylor.Propagation(
-            scene, tol=settings.tolerance, compact_mode=taylor.is_compact(scene), high_accuracy=True
-        ),
-        items=taylor.items,
+        build=_build_taylor,
+        items=late("rotor_mbs.models.lagrange.taylor:items"),
         solve_many=lambda scenes, settings: late(_SOLVE_MANY)(scenes, settings.tolerance),
-        load=heyoka_adapter.compile_anew,
+        load=late("rotor_mbs.models.lagrange.heyoka_adapter:compile_anew"),
         distributions=("heyoka",),
         fallback="lagrange/dop853",
         is_default=True,
@@ -110,9 +123,7 @@ METHODS = (
         label="closed form, Dormand-Prince 5(4)",
         look=Look(_LIGHT_BLUE, "-", "v"),
         settings=Ode45Settings,
-        build=lambda scene, chosen: OdeSolver(
-            scene, ode45_integrator(chosen.relative_tolerance, chosen.absolute_tolerance)
-        ),
+        build=_build_ode45,
         items=equation_items,
         ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
         cost_scaling={"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
@@ -132,7 +143,7 @@ METHODS = (
         label="reference, quad precision",
         look=Look(_BLUE, "-.", "*"),
         settings=ReferenceSettings,
-        build=reference.build,
+        build=late("rotor_mbs.models.lagrange.reference:build"),
         arrays=lambda _: ("angle_uncertainty", "error_growth"),
         items=equation_items,
     ),

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder
 from rotor_mbs.methods.settings import Settings, step
-from rotor_mbs.models.mujoco import mjcf
-from rotor_mbs.scenario.scene import Scene
+
+if TYPE_CHECKING:
+    from rotor_mbs.scenario.scene import Scene
 
 _HINT = "pip install 'rotor_mbs[mujoco]'"
 _MOST_STEPS = 1e10
@@ -33,6 +34,8 @@ def _items(scene: Scene) -> list[BuiltItem]:
     """Raises MethodRefusal, with the way to get it, where MuJoCo is not installed."""
     if not METHODS[0].is_installed:
         raise MethodRefusal(f"MuJoCo is not installed: {_HINT}")
+    from rotor_mbs.models.mujoco import mjcf
+
     return mjcf.items(scene)
 
 

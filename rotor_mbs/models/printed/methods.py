@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method
 from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.equation_items import equation_items
-from rotor_mbs.models.ode45 import Ode45Result, Ode45Settings, RightHandSide, ode45
+from rotor_mbs.models.ode45_settings import Ode45Settings
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import Errata
-from rotor_mbs.models.printed.observables import PointMassRotor, torque_work
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Table, is_constant, value_at
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, sample_times
+
+if TYPE_CHECKING:  # the list of methods needs none of them
+    from rotor_mbs.models.ode45 import Ode45Result, RightHandSide
+    from rotor_mbs.models.printed.observables import PointMassRotor
+    from rotor_mbs.scenario.scene import Scene
+    from rotor_mbs.scenario.time_table import Table
+    from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,9 @@ class PrintedSolver:
         self._result: Ode45Result  # of the last integration
 
     def integrate(self) -> Integration:
+        from rotor_mbs.models.ode45 import ode45
+        from rotor_mbs.solution.trajectory import Integration
+
         result = ode45(self._right_hand_side, self._scene.duration, self._initial, *self._tolerances)
         self._result = result
         return Integration(
@@ -61,6 +66,11 @@ class PrintedSolver:
         )
 
     def observe(self) -> Trajectory:
+        import numpy as np
+
+        from rotor_mbs.models.printed.observables import torque_work
+        from rotor_mbs.solution.trajectory import Trajectory, sample_times
+
         scene, rotor, result = self._scene, self._rotor, self._result
         time = sample_times(scene)
         time = time[time <= result.time[-1]]
@@ -84,6 +94,8 @@ class PrintedSolver:
 
     def _accelerations(self, time: Array, states: Array) -> Array:
         """(n, 1 + blades) rad/s² by the equations that are run; zero of a fixed pitch."""
+        import numpy as np
+
         found = np.zeros((len(time), len(self._scene.initial_angles)))
         for k, (t, state) in enumerate(zip(time.tolist(), states.tolist(), strict=True)):
             found[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
@@ -98,6 +110,8 @@ class PrintedSolver:
         return {"refined_time": time, "refined_angles": angles, "refined_rates": rates}
 
     def _coordinates(self, states: Array) -> tuple[Array, Array]:
+        from rotor_mbs.solution.trajectory import all_coordinates
+
         return all_coordinates(self._scene, states[:, : self._moving], states[:, self._moving :])
 
 
@@ -130,6 +144,8 @@ class PrintedModel:
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
         """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
+        from rotor_mbs.models.printed.observables import PointMassRotor
+
         blade, name, count = scene.blades[0], self._name, len(scene.blades)
         x, y, z = blade.centre_of_mass
         refusals = {
@@ -172,6 +188,8 @@ def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:
 
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
     """y' = f(t, y) of y = (angles, rates) of the `moving` coordinates; NaN where the equations are singular."""
+    from rotor_mbs.scenario.time_table import is_constant, value_at
+
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
     constant = [value_at(table, 0.0) for table in tables] if all(map(is_constant, tables)) else None

@@ -1,0 +1,67 @@
+"""The main job, `reproduce`, on two scenes: every default method, errata, a bench, the report, a second call."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from support.commands import Ended, rotor_mbs
+
+from rotor_mbs.methods.catalogue import is_corrected
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.studies import reproduce
+
+SCENES = ["paper/fig08", reproduce.BENCHED]
+METHODS = {"printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"}
+
+
+@pytest.fixture(scope="module")
+def call(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Ended]:
+    """The folder, the first call and the second one."""
+    pytest.importorskip("heyoka")
+
+    def two_scenes(names: Sequence[str]) -> list[Scene]:
+        return find_scenes(SCENES if names == ["paper"] else names)
+
+    folder = tmp_path_factory.mktemp("main-job")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reproduce, "find_scenes", two_scenes)
+        return folder, rotor_mbs("reproduce", "-o", folder), rotor_mbs("reproduce", "-o", folder)
+
+
+def test_every_method_has_run_and_those_of_the_correct_equations_are_ok(call: tuple[Path, Ended, Ended]) -> None:
+    folder, first, _ = call
+    assert first.status == 0, first.err
+    with open_results(folder / "results.h5") as results:
+        assert sorted(results.scenes) == sorted(SCENES)
+        for scene in results.scenes.values():
+            assert set(scene.methods) >= METHODS
+            assert {run.status for run in scene.runs.values() if is_corrected(run.method)} == {"ok"}
+            drift = {method: scene.runs[method].attributes["energy_drift_max"] for method in METHODS}
+            assert drift["printed/ode45"] > 1e-3 > 1e-9 >= max(drift["lagrange/taylor"], drift["exudyn_tree/rk67"])
+
+
+def test_the_report_is_whole_and_needs_no_network(call: tuple[Path, Ended, Ended]) -> None:
+    pages = {path.name: path.read_text() for path in (call[0] / "report").glob("*.html")}
+    assert {"index.html", "errata.html"} <= set(pages)
+    assert len(pages) == len(SCENES) + 5  # index, errata, the figures one by one, the bench and its scene
+    for page in pages.values():
+        assert not re.search(r'(?:src|href)="(?:https?:)?//', page)
+
+
+def test_the_second_call_has_nothing_to_do_and_shows_the_same(call: tuple[Path, Ended, Ended]) -> None:
+    _, first, second = call
+    assert second.status == 0
+    assert "nothing to do" in second.out
+    summary = [line for line in first.out.splitlines() if line.startswith(("lagrange/", "exudyn_", "printed/"))]
+    assert summary
+    assert set(summary) <= set(second.out.splitlines())
+
+
+def test_its_results_pass_check(call: tuple[Path, Ended, Ended]) -> None:
+    ended = rotor_mbs("check", call[0] / "results.h5")
+    assert ended.status == 0, ended.out
