@@ -32,7 +32,7 @@ def bench(arguments: argparse.Namespace) -> int:
             scenes, check_names(arguments.method or ()), output, workers=cores(), settings=dict(arguments.set or ()),
             on_progress=progress, repeats=arguments.repeats, budget_s=arguments.budget,
         )  # fmt: skip
-    measured = len({outcome.case.scene.name for outcome in made})
+    measured = len({outcome.label.partition(" ")[0] for outcome in made})
     for line in left_out:
         print(line, file=sys.stderr)
     names = {scene.name for scene in scenes}

@@ -1,1 +1,1 @@
-"""What a method is, the catalogue of them, their settings, and the rule that selects one. Imports no engine."""
+"""What a method is, the catalogue of them, their settings, and the rule that selects one."""

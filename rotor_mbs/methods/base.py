@@ -1,8 +1,7 @@
-"""What a method is: one object that says all there is to know of it. Knows no particular model, imports no engine."""
+"""What a method is: one object that says all there is to know of it."""
 
 from __future__ import annotations
 
-import functools
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -46,33 +45,35 @@ class Solver(Protocol):
 class Method:
     """A model with one integrator.
 
-    name            "model/integrator", as on the command line and in files
-    label, look     how it is called and drawn in tables and figures; label is "model, integrator"
-    build           (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal where the
-                    method cannot represent the scene
-    items           (scene) -> what is built for it; raises MethodRefusal likewise
-    settings        class of its settings, with units, defaults and ranges
-    is_corrected    whether it claims to solve the correct equations, so that any status but "ok" is a failure
-    is_default      whether it belongs to the set that runs where no method is named
-    erratum         "E1" ...: the one erratum of the printed equations it has; "" for others
-    distributions   packages it needs, by the names they are installed by
-    fallback        name of the method to take where these are not installed; "" for none
-    order           order of convergence; None where it is not fixed
-    fixed_step      whether the step is the setting `step`
-    stability_function   R(z) of one step for y' = λy, z = hλ; None for adaptive and implicit methods
-    ladders         settings it is benched with
-    cost_scaling    settings of the cost scaling study; None: not part of it
-    relative_cost   run time as a multiple of the fastest method's, roughly: expensive methods are started first
-    bounds          accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml
-    solve_many      (scenes, settings) -> RunBlock: a vectorized path for sweeps that ask for angles, rates, tips
-                    and energies alone, or None
-    linearize       (scene, steady angles, rotor speed, rotor torque) -> the model linearized there, or None; one method
-                    of a model has it. Raises MethodRefusal for a state that the model cannot be linearized about
-    arrays          (settings) -> names of the quantities that not every method has and this one stores, such as
-                    "constraint_error"
-    sources         of a method from outside: the files whose code decides its runs
-    load            imports what it computes with, and prevents the use of compiled code from an earlier process: before
-                    timings, which exclude both
+    Attributes
+    ----------
+    name : "model/integrator", as on the command line and in files.
+    label, look : how it is called and drawn in tables and figures; label is "model, integrator".
+    build : (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal where the method
+        cannot represent the scene.
+    items : (scene) -> what is built for it; raises MethodRefusal likewise.
+    settings : class of its settings, with units, defaults and ranges.
+    is_corrected : whether it claims to solve the correct equations, so that any status but "ok" is a failure.
+    is_default : whether it belongs to the set that runs where no method is named.
+    erratum : "E1" ...: the one erratum of the printed equations it has; "" for others.
+    distributions : packages it needs, by the names they are installed by.
+    fallback : name of the method to take where these are not installed; "" for none.
+    order : order of convergence; None where it is not fixed.
+    fixed_step : whether the step is the setting `step`.
+    stability_function : R(z) of one step for y' = λy, z = hλ; None for adaptive and implicit methods.
+    ladders : settings it is benched with.
+    cost_scaling : settings of the cost scaling study; None: not part of it.
+    relative_cost : run time as a multiple of the fastest method's, roughly: expensive methods are started first.
+    bounds : accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml.
+    solve_many : (scenes, settings) -> RunBlock: a vectorized path for sweeps that ask for angles, rates, tips and
+        energies alone, or None.
+    linearize : (scene, steady angles, rotor speed, rotor torque) -> the model linearized there, or None; one method of
+        a model has it. Raises MethodRefusal for a state that the model cannot be linearized about.
+    arrays : (settings) -> names of the quantities that not every method has and this one stores, such as
+        "constraint_error".
+    sources : of a method from outside, the files whose code decides its runs.
+    load : imports what it computes with, and prevents the use of compiled code from an earlier process: before
+        timings, which exclude both.
     """
 
     name: str
@@ -101,14 +102,14 @@ class Method:
 
     def __post_init__(self) -> None:
         """Gives the ladders the name, the label, the look and the order of their method."""
-        object.__setattr__(self, "ladders", tuple(map(self._own, self.ladders)))
-
-    def _own(self, ladder: Ladder) -> Ladder:
-        if ladder.method:
-            return ladder
-        label = f"{self.label}, {ladder.label}" if ladder.label else self.label
-        order = self.order if ladder.kind == STEP else None
-        return replace(ladder, method=self.name, label=label, look=ladder.look or self.look, order=order)
+        ladders = []
+        for ladder in self.ladders:
+            if not ladder.method:
+                label = f"{self.label}, {ladder.label}" if ladder.label else self.label
+                order = self.order if ladder.kind == STEP else None
+                ladder = replace(ladder, method=self.name, label=label, look=ladder.look or self.look, order=order)
+            ladders.append(ladder)
+        object.__setattr__(self, "ladders", tuple(ladders))
 
     @property
     def model(self) -> str:
@@ -128,24 +129,30 @@ class Method:
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
         """The settings of the next finer rung of its ladder; {} where it is as fine as the ladder goes.
 
-        interval: s, between samples.
+        Parameters
+        ----------
+        settings : of the run that is to be refined
+        interval : s, between samples
         """
         for ladder in self.ladders:
-            for setting in () if ladder.variant else ladder.rungs(interval):
-                varied = {name: float(str(value)) for name, value in ladder.fill(setting).items()}
-                # By more than the rounding of a rung that was told to three digits.
-                lower = {name: value for name, value in varied.items() if value < 0.99 * float(str(settings[name]))}
-                if next(iter(varied)) in lower:
+            if ladder.variant:
+                continue
+            for rung in ladder.rungs(interval):
+                finer = ladder.fill(rung)
+                # By more than the rounding of a rung that was given with three digits.
+                lower = {name: value for name, value in finer.items() if value < 0.99 * float(str(settings[name]))}
+                first_setting = next(iter(finer))
+                if first_setting in lower:
                     return dict(lower)
         return {}
 
     @property
     def is_installed(self) -> bool:
         """Whether all packages it needs are there; none is imported."""
-        return all(map(_is_installed, self.distributions))
+        return all(_is_distribution_installed(distribution) for distribution in self.distributions)
 
 
-def _is_installed(distribution: str) -> bool:
+def _is_distribution_installed(distribution: str) -> bool:
     module = distribution.replace("-", "_")
     if module in sys.modules:
         return bool(sys.modules[module])
@@ -162,4 +169,11 @@ def late(place: str) -> Callable[..., Any]:
 
 def stability_polynomial(*coefficients: float) -> Callable[[complex], complex]:
     """R(z) of an explicit Runge-Kutta method, from its coefficients of z⁰ up."""
-    return lambda z: functools.reduce(lambda value, coefficient: value * z + coefficient, reversed(coefficients), 0j)
+
+    def stability_function(z: complex) -> complex:
+        value = 0j
+        for coefficient in reversed(coefficients):
+            value = value * z + coefficient
+        return value
+
+    return stability_function

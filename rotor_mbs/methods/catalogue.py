@@ -86,10 +86,11 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
     if unknown and names:
         allowed = f"{', '.join(known) or 'none'} ({', '.join(names)})"
         raise InputError(f"no setting {setting!r}{nearest(setting, known)}; allowed: {allowed}" for setting in unknown)
-    found = {name: {one: value for one, value in given.items() if one in allowed} for name, allowed in own.items()}
-    for name, chosen in found.items():
-        find_method(name).settings.of(name, chosen)
-    return found
+    settings = {}
+    for name, allowed_settings in own.items():
+        settings[name] = {setting: value for setting, value in given.items() if setting in allowed_settings}
+        find_method(name).settings.of(name, settings[name])  # checks the values
+    return settings
 
 
 def is_corrected(name: str) -> bool:
@@ -100,8 +101,11 @@ def is_corrected(name: str) -> bool:
 
 def default_methods() -> tuple[str, ...]:
     """Names of the methods that run where none is named; a fallback in place of one that is not installed."""
-    defaults = (method for method in methods() if method.is_default)
-    return tuple(one.name if one.is_installed or not one.fallback else one.fallback for one in defaults)
+    names = []
+    for method in methods():
+        if method.is_default:
+            names.append(method.fallback if method.fallback and not method.is_installed else method.name)
+    return tuple(names)
 
 
 def errata_methods() -> dict[str, str]:
@@ -121,14 +125,14 @@ def ladders(names: Sequence[str] = ()) -> tuple[Ladder, ...]:
 
 def label_of(curve: str) -> str:
     """How a method, or a variant of one by the name of its curve, is called; its name where it is not known here."""
-    found = look_up(curve) or _variant(curve)
-    return found.label if found else curve
+    method = look_up(curve) or _variant(curve)
+    return method.label if method else curve
 
 
 def look_of(curve: str) -> Look:
     """How a method, or a variant of one by the name of its curve, is drawn; in grey where it is not known here."""
-    found = look_up(curve) or _variant(curve)
-    return found.look if found and found.look else _UNKNOWN_LOOK
+    method = look_up(curve) or _variant(curve)
+    return method.look if method and method.look else _UNKNOWN_LOOK
 
 
 def model_label(model: str) -> str:
@@ -145,11 +149,11 @@ def _load(place: str) -> tuple[Method, ...]:
     return _as_methods(getattr(import_module(module), name))
 
 
-def _as_methods(found: object) -> tuple[Method, ...]:
+def _as_methods(loaded: object) -> tuple[Method, ...]:
     """A Method or several of them as a tuple. Raises TypeError for anything else."""
-    several = tuple(found) if isinstance(found, Iterable) else (found,)
-    if not several or not all(isinstance(one, Method) for one in several):
-        raise TypeError(f"{found!r:.60} is no Method and no sequence of them")
+    several = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
+    if not several or not all(isinstance(method, Method) for method in several):
+        raise TypeError(f"{loaded!r:.60} is no Method and no sequence of them")
     return several
 
 
@@ -163,7 +167,7 @@ def _warn(message: str, *values: object) -> None:
 def _plug_ins() -> dict[str, Method]:
     """Methods of other packages by name. One that cannot be loaded is left out, with a warning."""
     taken = {REFERENCE} | {method.name for place in _BUILT_IN for method in _load(place)}
-    found: dict[str, Method] = {}
+    plug_ins: dict[str, Method] = {}
     for point in metadata.entry_points(group=GROUP):
         try:
             loaded = _as_methods(point.load())
@@ -177,8 +181,8 @@ def _plug_ins() -> dict[str, Method]:
                 continue
             taken.add(method.name)
             distributions = tuple(dict.fromkeys((*method.distributions, *package)))
-            found[method.name] = replace(method, distributions=distributions, sources=_sources(point.module))
-    return found
+            plug_ins[method.name] = replace(method, distributions=distributions, sources=_sources(point.module))
+    return plug_ins
 
 
 def _sources(module: str) -> tuple[Path, ...]:

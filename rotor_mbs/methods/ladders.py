@@ -1,7 +1,4 @@
-"""A method's curve in the bench: its ladder of settings, from useless to the round-off floor, and how it is drawn.
-
-Knows numbers, no method.
-"""
+"""A method's curve in the bench: its ladder of settings, from useless to the round-off floor, and how it is drawn."""
 
 from __future__ import annotations
 
@@ -25,18 +22,20 @@ class Look:
 class Ladder:
     """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance.
 
-    kind      STEP or TOLERANCE
-    values    steps as shares of the sample interval, or tolerances; coarse to fine
-    fill      the settings that go with one value
-    choices   settings that stay the same along the ladder
-    variant   what follows the method's name in the curve's name; "" where the choices are the default ones
-    label, look     of the variant; the method's where they are left out
-    method, order   name and expected order (None: adaptive step) of the method; filled in by the `Method`
+    Attributes
+    ----------
+    kind : STEP or TOLERANCE.
+    values : steps as shares of the sample interval, or tolerances; coarse to fine.
+    fill : the settings that go with one value.
+    choices : settings that stay the same along the ladder.
+    variant : what follows the method's name in the curve's name; "" where the choices are the default ones.
+    label, look : of the variant; the method's where they are left out.
+    method, order : name and expected order (None: adaptive step) of the method; filled in by the `Method`.
     """
 
     kind: str
     values: tuple[float, ...]
-    fill: Callable[[float], Mapping[str, object]]
+    fill: Callable[[float], Mapping[str, float]]
     choices: Mapping[str, object] = field(default_factory=dict)
     variant: str = ""
     label: str = ""
@@ -55,24 +54,35 @@ class Ladder:
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def rungs(self, interval: float) -> dict[float, dict[str, object]]:
-        """The ladder on a scene whose samples are `interval` s apart.
+        """All that the method is given at each rung, by the number it is plotted by (step in s, or the tolerance).
 
-        All that the method is given, by the number it is plotted by (s, or the tolerance).
+        Parameters
+        ----------
+        interval : s, between samples of the scene
         """
-        settings = [value * interval if self.kind == STEP else value for value in self.values]
-        return {setting: {**self.choices, **self.fill(setting)} for setting in settings}
+        numbers = [value * interval if self.kind == STEP else value for value in self.values]
+        return {number: {**self.choices, **self.fill(number)} for number in numbers}
 
 
 def step_ladder(count: int, first: int = 0, **facts: Any) -> Ladder:
-    """`count` values of the setting `step`, by halves from 0.5**first of the sample interval; facts: of a `Ladder`."""
-    return Ladder(STEP, tuple(0.5**k for k in range(first, first + count)), lambda step: {"step": step}, **facts)
+    """A ladder of the setting `step`.
+
+    Parameters
+    ----------
+    count, first : the steps are 0.5**first, ..., 0.5**(first + count - 1) of the sample interval
+    facts : further attributes of the `Ladder`
+    """
+    shares = tuple(0.5**k for k in range(first, first + count))
+    return Ladder(STEP, shares, lambda step: {"step": step}, **facts)
 
 
-def tolerance_ladder(fill: Callable[[float], Mapping[str, object]], *tolerances: float) -> Ladder:
+def tolerance_ladder(fill: Callable[[float], Mapping[str, float]], *tolerances: float) -> Ladder:
     """The settings that `fill` gives for each tolerance, coarse to fine."""
     return Ladder(TOLERANCE, tolerances, fill)
 
 
-def tolerance_pair(tolerance: float) -> Mapping[str, object]:
-    """Angles and rates of order one: a hundredth of the relative tolerance is nowhere the larger of the two."""
+def tolerance_pair(tolerance: float) -> Mapping[str, float]:
+    """Relative and absolute tolerance of the same work.
+
+    Angles and rates of order one: a hundredth of the relative tolerance is nowhere the larger of the two."""
     return {"relative_tolerance": tolerance, "absolute_tolerance": 0.01 * tolerance}

@@ -1,4 +1,4 @@
-"""Which method to take for a scene where none is named, and why, in one line. Knows scenes and names; no engine.
+"""Which method to take for a scene where none is named, and why, in one line.
 
 The rule is drawn from the stability suite (`rotor-mbs stability`): what holds on which family of scenes.
 """
@@ -11,11 +11,11 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.scenario.scene import Scene
 
 # Explicit fixed steps at their default (1e-3 s and below) follow a swing up to this rate, rad/s, within their bounds.
-_FASTEST_SWING = 90.0
+_MAX_EXPLICIT_SWING = 90.0
 # A decay rate, 1/s, times the run, beyond which stability alone, not accuracy, sets an explicit step.
-_DECAYS = 1e4
+_MAX_EXPLICIT_DECAY = 1e4
 # Radians of the fastest swing in a run beyond which fixed steps take minutes, and the error of each has added up.
-_LONG = 3e4
+_MAX_FIXED_STEP_TURN = 3e4
 # Share of the rotor's inertia that a quarter turn of the pitch leaves, below which rates jump there.
 _NEARLY_SINGULAR = 1e-3
 
@@ -23,29 +23,36 @@ _NEARLY_SINGULAR = 1e-3
 def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
     """The methods for `scene`, the recommended one first, and why, in one line.
 
-    Raises MethodRefusal, with the reason, where no motion exists to be followed.
+    Parameters
+    ----------
+    defaults : names of the default methods, see `catalogue.default_methods`
+
+    Raises
+    ------
+    MethodRefusal
+        With the reason, where no motion exists to be followed.
     """
     reason = singular_reason(scene)
     if reason:
         raise MethodRefusal(f"{scene.name}: refused: {reason}; name a method with -m to see what it makes of it")
     closed_form = next((name for name in defaults if name.partition("/")[0] == "lagrange"), "lagrange/dop853")
     swing, decay = fastest_rates(scene)
-    if decay * scene.duration > _DECAYS and decay > 10.0 * swing:
+    if decay * scene.duration > _MAX_EXPLICIT_DECAY and decay > 10.0 * swing:
         reason = f"overdamped, fastest decay {decay:.2g} /s: an implicit method beside it"
         return (closed_form, "lagrange/radau"), reason
     if _is_nearly_singular(scene):
         return (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
-    if swing > _FASTEST_SWING:
+    if swing > _MAX_EXPLICIT_SWING:
         reason = f"stiff or fast, fastest swing {swing:.2g} rad/s: methods that choose their own step"
         return (closed_form, "exudyn_tree/dopri5"), reason
-    if swing * scene.duration > _LONG:
+    if swing * scene.duration > _MAX_FIXED_STEP_TURN:
         return (closed_form,), f"long, {swing * scene.duration:.2g} rad of the fastest swing: no fixed step"
     others = (name for name in defaults if name != closed_form)
     return (closed_form, *others), "neither stiff, singular nor long: the default set, best of each model"
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:
-    """(rad/s, 1/s): fastest swing of a pitch (spring, torque, gravity, turning and driven rotor), fastest decay."""
+    """Fastest swing of a pitch in rad/s (spring, torque, gravity, turning and driven rotor), fastest decay in 1/s."""
     swing = abs(scene.initial_rates[0])
     driven = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0) / _rotor_inertia(scene)
     decay = scene.shaft_damping / _rotor_inertia(scene) if scene.shaft_damping else 0.0

@@ -15,12 +15,14 @@ from rotor_mbs.errors import InputError, nearest
 class Allowed:
     """What a setting may be: one of `options`, or a finite number within the limits.
 
-    unit       SI unit of a number, "" where it has none
-    above      exclusive lower limit
-    at_least, at_most   inclusive limits
-    whole      whole numbers only
-    options    the allowed values of a choice; () for a number
-    doc        one line on what the setting does
+    Attributes
+    ----------
+    unit : SI unit of a number, "" where it has none.
+    above : exclusive lower limit.
+    at_least, at_most : inclusive limits.
+    whole : whole numbers only.
+    options : the allowed values of a choice; () for a number.
+    doc : one line on what the setting does.
     """
 
     unit: str = ""
@@ -50,13 +52,11 @@ class Allowed:
         """ "a number above 0, in s"."""
         if self.options:
             return " or ".join(map(str, self.options))
-        limits = [
-            f"above {self.above:g}" if math.isfinite(self.above) else "",
-            f"at least {self.at_least:g}" if math.isfinite(self.at_least) else "",
-            f"at most {self.at_most:g}" if math.isfinite(self.at_most) else "",
-        ]
-        kind = "a whole number" if self.whole else "a number"
-        text = " ".join([kind, " and ".join(filter(None, limits))]).strip()
+        limits = {"above": self.above, "at least": self.at_least, "at most": self.at_most}
+        text = "a whole number" if self.whole else "a number"
+        ranges = [f"{word} {limit:g}" for word, limit in limits.items() if math.isfinite(limit)]
+        if ranges:
+            text += " " + " and ".join(ranges)
         return f"{text}, in {self.unit}" if self.unit else text
 
 
@@ -101,8 +101,11 @@ class Settings:
     def of(cls, method: str, given: Mapping[str, object]) -> Self:
         """The settings of `method` with the `given` values in place of defaults.
 
-        Raises InputError, in one line that lists all settings, for an unknown name, a wrong type, a number that is
-        not finite, or one out of range.
+        Raises
+        ------
+        InputError
+            In one line that lists all settings, for an unknown name, a wrong type, a number that is not finite, or one
+            out of range.
         """
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
@@ -112,7 +115,8 @@ class Settings:
             try:
                 values[name] = known[name].convert(value)
             except ValueError:
-                problems.append(f"{name} = {_shown(value)} is not allowed")
+                text = ascii(value)
+                problems.append(f"{name} = {text if len(text) <= 60 else f'{text[:57]}...'} is not allowed")
         if problems:
             raise InputError(f"{method}: {'; '.join(problems)}; allowed: {cls.describe()}")
         return cls(**values)
@@ -120,19 +124,15 @@ class Settings:
     @classmethod
     def allowed(cls) -> dict[str, Allowed]:
         """What each setting may be, by its name."""
-        return {one.name: one.metadata.get("allowed", Allowed()) for one in fields(cls)}
+        return {setting.name: setting.metadata.get("allowed", Allowed()) for setting in fields(cls)}
 
     @classmethod
     def describe(cls) -> str:
         """All settings with ranges and defaults, in one line."""
         defaults = cls().as_dict()
-        return ", ".join(f"{name} ({text}; default {defaults[name]})" for name, text in cls.allowed().items()) or "none"
+        texts = [f"{name} ({allowed}; default {defaults[name]})" for name, allowed in cls.allowed().items()]
+        return ", ".join(texts) or "none"
 
     def as_dict(self) -> dict[str, object]:
         """Name and value of every setting, as stored with a run."""
         return asdict(self)
-
-
-def _shown(value: object) -> str:
-    text = ascii(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

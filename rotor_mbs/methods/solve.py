@@ -23,11 +23,28 @@ def solve(
     budget_s: float = float("inf"),
     time_limit_s: float = float("inf"),
 ) -> Solution:
-    """Build once, integrate up to `repeats` times while within `budget_s` (garbage collector off), observe once.
+    """Run a method on a scene: build once, integrate once or more often, observe once.
 
-    The integrations together end themselves after `time_limit_s`; building (which may compile code) does not count.
-    Raises InputError for an unknown method or setting, MethodRefusal as `Method.build` does, OutOfTimeError where a
-    method cannot keep the samples it reached. A failure of the engine is in the result, not an exception.
+    Parameters
+    ----------
+    settings : those that differ from the method's defaults
+    repeats, budget_s : integrate up to so often, as long as the sum of the times in s stays within the budget; the
+        garbage collector is off
+    time_limit_s : s, for the integrations together; building (which may compile code) does not count
+
+    Returns
+    -------
+    Solution
+        Not yet judged. A failure of the engine is in it, not an exception.
+
+    Raises
+    ------
+    InputError
+        For an unknown method or setting.
+    MethodRefusal
+        As `Method.build` does.
+    OutOfTimeError
+        Where a method cannot keep the samples it reached.
     """
     method = find_method(method) if isinstance(method, str) else method
     chosen = method.settings.of(method.name, settings)
@@ -52,6 +69,15 @@ def solve(
     with np.errstate(over="ignore", invalid="ignore"):  # of a runaway: the judgement sees what is not finite
         trajectory = solver.observe()
     output = time.perf_counter() - start
-    found = Solution(scene, method.name, trajectory, integration, chosen.as_dict(), setup, run_times, output)
-    found.is_corrected, found.bounds = method.is_corrected, method.bounds
-    return found
+    return Solution(
+        scene,
+        method.name,
+        trajectory,
+        integration,
+        chosen.as_dict(),
+        setup,
+        run_times,
+        output,
+        is_corrected=method.is_corrected,
+        bounds=method.bounds,
+    )

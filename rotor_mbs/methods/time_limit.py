@@ -1,4 +1,4 @@
-"""A time limit that a run ends by itself, with what it reached. Knows no engine.
+"""A time limit that a run ends by itself, with what it reached.
 
 An engine that looks for signals (Exudyn at every step, anything in Python) is interrupted by an exception; one that
 would lose its samples that way asks `is_over` between steps instead, inside `polled`. What does neither is ended from
@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 MESSAGE = "ended by its time limit"  # of a run that was
-_LONGEST_S = 1e9  # the system's timers take no more than the seconds of its clock
+_MAX_LIMIT_S = 1e9  # the system's timers take no more than the seconds of its clock
 
 
 class OutOfTimeError(Exception):
@@ -25,14 +25,14 @@ class OutOfTimeError(Exception):
 class _State:
     end = math.inf
     polled = False
-    is_over = False  # as the signal, or who asked, has found
+    is_over = False  # as the signal, or a question to `is_over`, has set it
     has_signal = False
 
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
     """Raises OutOfTimeError in the block after `seconds` (inf: never), except inside `polled`."""
-    if seconds > _LONGEST_S:
+    if seconds > _MAX_LIMIT_S:
         yield
         return
     has_signal = hasattr(signal, "SIGALRM") and threading.current_thread() is threading.main_thread()

@@ -1,4 +1,4 @@
-"""MATLAB's ode45: Dormand and Prince's pair with that function's own step control. Knows nothing of rotors.
+"""MATLAB's ode45: Dormand and Prince's pair with that function's own step control.
 
 On a chaotic problem the step control decides the digits, so it is followed to the letter; sources:
 
@@ -64,7 +64,12 @@ _INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INT
 class Ode45Result:
     """Every accepted step with its stages, so that the solution can be read off at any time it reached.
 
-    time (k+1,), state (k+1, n), stages (k, 7, n)
+    Attributes
+    ----------
+    time, state : (k + 1,), (k + 1, n)
+    stages : (k, 7, n) derivatives
+    success, message : whether the end was reached, and why not
+    evaluations : of the right-hand side
     """
 
     time: Array
@@ -111,8 +116,15 @@ def ode45(
 ) -> Ode45Result:
     """Solve y' = f(t, y) over [0, t_end], t_end > 0, in plain floats.
 
-    Where `f` is not defined it returns NaN: such a step is a failed one. A step that would have to be shorter than
-    16 units in the last place of t ends the run with success False and the part that was reached.
+    Parameters
+    ----------
+    f : returns NaN where it is not defined; such a step is a failed one
+    rel_tol, abs_tol : of the local error of each component
+
+    Returns
+    -------
+    Ode45Result
+        Where a step would have to be shorter than 16 units in the last place of t: success False, and what was reached.
     """
     threshold = abs_tol / rel_tol
     t, y = 0.0, [float(value) for value in initial_state]

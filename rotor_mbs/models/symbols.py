@@ -6,7 +6,7 @@
     >>> str(0.1 * CodeSymbol("w0") * CodeSymbol("w1"))
     '0.1*w0*w1'
 
-Knows sums, products, quotients and whole powers; drops zeros and ones, simplifies nothing else.
+Sums, products, quotients and whole powers; zeros and ones are dropped, nothing else is simplified.
 """
 
 from __future__ import annotations

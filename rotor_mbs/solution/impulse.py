@@ -1,7 +1,7 @@
 """Balances of momentum, from a run's own samples: independent of its equations of motion and of its energies.
 
 About the shaft: L(t) - L(0) = ∫ (torque + moment of the weights - damping) dt, from angles and rates alone. In space:
-p(t) - p(0) = ∫ (force of the shaft's bearing + weights) dt, where the run has that force. Knows scenes and samples.
+p(t) - p(0) = ∫ (force of the shaft's bearing + weights) dt, where the run has that force.
 """
 
 from __future__ import annotations
@@ -16,16 +16,22 @@ from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 # Samples that one polynomial goes through; a narrower one shows how much is left open between samples.
-_WITH_SLOPES = (6, 4)
-_WITHOUT_SLOPES = (10, 8)
+_POINTS_WITH_SLOPES = (6, 4)
+_POINTS_WITHOUT_SLOPES = (10, 8)
 # How many times that difference counts: at a spike both polynomials are off.
 _SLACK = 10.0
 # rad: a motion that turns further from one sample to the next is not resolved by them.
-_RESOLVED = 1.0
+_MAX_TURN_PER_SAMPLE = 1.0
 
 
 class Balance(NamedTuple):
-    """error: (n,) kg m²/s or kg m/s, beyond what the samples leave open; scale: what it is relative to."""
+    """Residual of a balance of momentum.
+
+    Attributes
+    ----------
+    error : (n,) kg m²/s or kg m/s, beyond what the samples leave open
+    scale : what it is relative to
+    """
 
     error: Array
     scale: float
@@ -41,19 +47,19 @@ def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
 
     Returns None where the samples do not resolve the motion, or are too few to show what they leave open.
     """
-    if len(run.time) < max(_WITH_SLOPES) or not _is_resolved(scene, run):
+    if len(run.time) < max(_POINTS_WITH_SLOPES) or not _is_resolved(scene, run):
         return None
     angles, rates, step = run.angles, run.rates, run.time[1]
     moment, change = np.zeros((2, len(run.time)))
     for i, blade in enumerate(scene.blades):
-        place, velocity = _centre(scene, angles, rates, i)
-        moment += blade.mass * scene.gravity * place[:, 0]
+        position, velocity = _centre(scene, angles, rates, i)
+        moment += blade.mass * scene.gravity * position[:, 0]
         change += blade.mass * scene.gravity * velocity[:, 0]
     momentum, torque = angular_momentum(scene, angles, rates), _torque_impulse(scene, run.time)
-    wide, narrow = (_impulse(step, moment, change, points) for points in _WITH_SLOPES)
-    left = momentum - momentum[0] - torque + scene.shaft_damping * (angles[:, 0] - angles[0, 0]) - wide
+    wide, narrow = (_impulse(step, moment, change, points) for points in _POINTS_WITH_SLOPES)
+    residual = momentum - momentum[0] - torque + scene.shaft_damping * (angles[:, 0] - angles[0, 0]) - wide
     fall = sum(blade.mass * _arm(blade) * np.sqrt(scene.gravity * _arm(blade)) for blade in scene.blades)
-    return Balance(_beyond(left, wide - narrow), float(np.abs(momentum).max() + np.abs(torque).max() + fall))
+    return Balance(_beyond(residual, wide - narrow), float(np.abs(momentum).max() + np.abs(torque).max() + fall))
 
 
 def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
@@ -66,7 +72,7 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
     force = run.get("shaft_force")
     if (
         force is None
-        or len(run.time) < max(_WITHOUT_SLOPES)
+        or len(run.time) < max(_POINTS_WITHOUT_SLOPES)
         or knots(scene.load_tables, scene.duration)
         or not _is_resolved(scene, run, _fastest_bearing(scene))
     ):
@@ -75,17 +81,17 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
     for i, blade in enumerate(scene.blades):
         momentum += blade.mass * _centre(scene, run.angles, run.rates, i)[1]
     weights = np.array([0.0, 0.0, mass * scene.gravity])
-    wide, narrow = (_impulse(run.time[1], force - weights, None, points) for points in _WITHOUT_SLOPES)
-    left = np.linalg.norm(momentum - momentum[0] - wide, axis=1)
+    wide, narrow = (_impulse(run.time[1], force - weights, None, points) for points in _POINTS_WITHOUT_SLOPES)
+    residual = np.linalg.norm(momentum - momentum[0] - wide, axis=1)
     fall = sum(blade.mass * np.sqrt(scene.gravity * _arm(blade)) for blade in scene.blades)
     scale = float(np.linalg.norm(momentum, axis=1).max() + fall)
-    return Balance(_beyond(left, np.linalg.norm(wide - narrow, axis=1)), scale)
+    return Balance(_beyond(residual, np.linalg.norm(wide - narrow, axis=1)), scale)
 
 
 def _is_resolved(scene: Scene, run: Trajectory, frequency: float = 0.0) -> bool:
     """Whether little happens from sample to sample: at the run's rates, and at a frequency in rad/s."""
     step = scene.duration / (scene.samples - 1)
-    return len(run.time) > 1 and bool(max(np.abs(run.rates).max(), frequency) * step < _RESOLVED)
+    return len(run.time) > 1 and bool(max(np.abs(run.rates).max(), frequency) * step < _MAX_TURN_PER_SAMPLE)
 
 
 def _fastest_bearing(scene: Scene) -> float:
@@ -94,9 +100,9 @@ def _fastest_bearing(scene: Scene) -> float:
     return max((np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2]) for stiffness, blade in blades), default=0.0)
 
 
-def _beyond(left: Array, open_: Array) -> Array:
-    """(n,) what is left of a balance beyond what the samples leave open."""
-    return np.maximum(np.abs(left) - _SLACK * np.maximum.accumulate(np.abs(open_)), 0.0)
+def _beyond(residual: Array, uncertainty: Array) -> Array:
+    """(n,) the part of a residual that the samples' uncertainty does not explain."""
+    return np.maximum(np.abs(residual) - _SLACK * np.maximum.accumulate(np.abs(uncertainty)), 0.0)
 
 
 def _arm(blade: Blade) -> float:
@@ -136,17 +142,17 @@ def _inertia_about_hub(blade: Blade) -> Array:
 
 
 def _centre(scene: Scene, angles: Array, rates: Array, blade: int) -> tuple[Array, Array]:
-    """(n, 3) m and m/s: place and velocity of a blade's centre of mass in the base frame."""
+    """(n, 3) m and m/s: position and velocity of a blade's centre of mass in the base frame."""
     x, y, z = scene.blades[blade].centre_of_mass
     s, c = np.sin(angles[:, 1 + blade]), np.cos(angles[:, 1 + blade])
     azimuth = angles[:, 0] + scene.phases[blade]
     sin_phi, cos_phi = np.sin(azimuth), np.cos(azimuth)
     across, along = x * c - y * s, x * s + y * c
-    place = np.stack([cos_phi * across + sin_phi * z, along, cos_phi * z - sin_phi * across], axis=1)
+    position = np.stack([cos_phi * across + sin_phi * z, along, cos_phi * z - sin_phi * across], axis=1)
     spin, rate = rates[:, 0], rates[:, 1 + blade]
     by_pitch = np.stack([-cos_phi * along, across, sin_phi * along], axis=1)
-    by_rotor = np.stack([place[:, 2], np.zeros_like(spin), -place[:, 0]], axis=1)
-    return place, spin[:, None] * by_rotor + rate[:, None] * by_pitch
+    by_rotor = np.stack([position[:, 2], np.zeros_like(spin), -position[:, 0]], axis=1)
+    return position, spin[:, None] * by_rotor + rate[:, None] * by_pitch
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""The one judgement of a run, from its samples: runs, bench, check and report use it. Knows no engine and no file.
+"""The one judgement of a run, from its samples: runs, bench, check and report use it.
 
 The bounds are those of reference/accuracy.toml, which `check` reads, too, and those that a quantity brings: a status
 and a verdict cannot follow from different numbers.
@@ -45,14 +45,21 @@ _RESEMBLES = 1e-2
 # after such a sample follows from round-off alone, whatever an engine reports.
 _NO_INERTIA = 1e-30
 
-
 # Of the rotor's inertia at the start: above it, no start is singular.
 _CLEAR_SHARE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """status: one of `status.STATUSES`; message: one line, "" for ok; false_success: the engine claimed too much."""
+    """What a run is judged to be.
+
+    Attributes
+    ----------
+    status : one of `status.STATUSES`.
+    message : one line; "" for ok.
+    false_success : the engine reported success of a run that is wrong.
+    metrics : see `metrics.metrics_of`.
+    """
 
     status: str
     message: str
@@ -64,10 +71,12 @@ class Judgement:
 def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> tuple[float, float] | None:
     """The bounds on "model/integrator", `own` first; None for methods that have none (the printed equations).
 
-    angle    relative error (of the rotor's way from its start, of the largest pitch, each at least 1 rad) per unit of
-             error growth: the scene's own growth, which is not the method's fault, carries every local error on
-             (samples before the horizon)
-    energy   of the scene's energy scale, over the whole run; see `energy_conditioning`
+    Returns
+    -------
+    angle : relative error (of the rotor's way from its start, of the largest pitch, each at least 1 rad) per unit of
+        error growth: the scene's own growth, which is not the method's fault, carries every local error on (samples
+        before the horizon)
+    energy : of the scene's energy scale, over the whole run; see `energy_conditioning`
     """
     bounds = shipped_bounds().with_entries(own)
     angle, energy = (bounds.find(check, method) for check in ("agreement", "energy"))
@@ -106,13 +115,20 @@ def clearly_ok(
     angles: Array,
     own: tuple[Bound, ...] = (),
 ) -> NDArray[np.bool_]:
-    """(k,) whether `judge`, without a reference, is certain to call each run ok; of a method without bounds it is not.
+    """Whether `judge`, without a reference, is certain to call each run ok; of a method without bounds it is not.
 
-    drifts, angles   (k,) energy error of its scale, and the largest angle in rad, of each run
-    own              bounds that the method brings
+    Parameters
+    ----------
+    scenes, integrations, samples : of each of k runs of one `method`
+    drifts, angles : (k,) energy error of its scale, and the largest angle in rad, of each run
+    own : bounds that the method brings
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
     """
     allowed = allowed_of(method, own)
-    complete = np.array([one.success and n == scenes[0].samples for one, n in zip(integrations, samples, strict=True)])
+    complete = np.array([run.success and n == scenes[0].samples for run, n in zip(integrations, samples, strict=True)])
     complete &= angles <= ANGLE_LIMIT
     if allowed is None:
         return np.zeros_like(complete)
@@ -134,7 +150,7 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
 
 
 def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
-    """What each judged quantity's number comes to, of what it is relative to; only those that the run has."""
+    """Each judged quantity, its rule, and its error relative to what the rule says; only those that the run has."""
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement
         if rule is not None and rule.metric in metrics:
@@ -229,7 +245,7 @@ def energy_conditioning(scene: Scene, run: Trajectory) -> float:
 
 def _shares_at_quarter_turns(scene: Scene, angles: Array) -> Array:
     """Where a pitch passes ±π/2 between two samples (straight way): the shares there."""
-    found = [np.empty(0)]
+    shares = [np.empty(0)]
     for column in range(1, angles.shape[1]):
         quarter = np.floor(angles[:, column] / np.pi - 0.5)
         for k in np.flatnonzero(np.diff(quarter)):
@@ -238,8 +254,8 @@ def _shares_at_quarter_turns(scene: Scene, angles: Array) -> Array:
             part = (target - before[column]) / (after[column] - before[column])
             there = before + part * (after - before)
             there[column] = target
-            found.append(rotor_inertia_shares(scene, there[None, :]))
-    return np.concatenate(found)
+            shares.append(rotor_inertia_shares(scene, there[None, :]))
+    return np.concatenate(shares)
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:

@@ -1,4 +1,4 @@
-"""Equations of motion linearized about a steady state, as every model hands them out. Knows no model."""
+"""Equations of motion linearized about a steady state, as every model gives them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from rotor_mbs.solution.trajectory import Array
 class Linearization:
     """δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided out.
 
-    stiffness   (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
-    damping     (n, n) 1/s: the same by the rates; it holds gyroscopic terms, too
-    residual    (n,) rad/s²: accelerations that are left at the state, zero where it is steady; () where not known
+    Attributes
+    ----------
+    stiffness : (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
+    damping : (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
+    residual : (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not known
     """
 
     stiffness: Array
@@ -38,8 +40,11 @@ def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque
 def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
     """Difference quotients with the steps h, 2h, 4h, ... extrapolated to a step of 0 (Richardson).
 
-    ratio   by which a doubled step enlarges the first term of the error, and each further term once more: 2 for
-            one-sided quotients, 4 for central ones
+    Parameters
+    ----------
+    quotients : arrays of the same shape, from the shortest step to the longest
+    ratio : by which a doubled step enlarges the first term of the error, and each further term once more: 2 for
+        one-sided quotients, 4 for central ones
     """
     values = list(quotients)
     for power in range(1, len(values)):

@@ -1,7 +1,7 @@
 """How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks.
 
-Angles and energies have rules of their own here; every other quantity is measured as its declaration says. Knows
-samples only; no engine, no file, no bound (those are in `judgement`).
+Angles and energies have rules of their own here; every other quantity is measured as its declaration says. Bounds are
+in `judgement`.
 """
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ Metrics = dict[str, float]
 # rad: beyond it a double's last digit is above 1e-10 rad, and neither its sine nor an error of 1e-9 rad means anything.
 ANGLE_LIMIT = 1e6
 
-# A pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
+# rad: a pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
 # far below what a plot shows.
 _LEFT_ZERO = 1e-9
+# rad: between these the departure grows exponentially; below is round-off, above the motion is no longer linear.
+_LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
 
 def running_growth(reference: Trajectory) -> Array:
@@ -58,10 +60,10 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
 
     Σ m g |r| + kinetic energy and spring energy at the start + largest |work|. Zero only where nothing moves.
     """
-    weights = sum(b.mass * scene.gravity * float(np.linalg.norm(b.centre_of_mass)) for b in scene.blades)
+    weights = sum(blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass)) for blade in scene.blades)
     springs = sum(
-        0.5 * k * float(np.square(angle - value_at(scene.pitch_load(i)[1], 0.0)))
-        for i, (k, angle) in enumerate(zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False))
+        0.5 * stiffness * float(np.square(angle - value_at(scene.pitch_load(i)[1], 0.0)))
+        for i, (stiffness, angle) in enumerate(zip(scene.bearing_stiffness, scene.initial_angles[1:], strict=False))
     )
     kinetic = float(run.kinetic_energy[0]) if run.kinetic_energy is not None and len(run.time) else 0.0
     work = float(np.abs(run.work).max(initial=0.0)) if run.work is not None else 0.0
@@ -81,33 +83,47 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
         metrics["energy_gain_J"] = float(energy.max())
     if reference is not None and scene.wants("angles"):
         metrics |= _angle_errors(run, reference)
-    return metrics | _impulse_errors(scene, run) | _of_quantities(scene, run, reference) | _peaks(scene, run)
+    if scene.wants("angles") and scene.wants("rates"):
+        with np.errstate(over="ignore", invalid="ignore"):
+            balances = {"angular": angular_balance(scene, run), "linear": linear_balance(scene, run)}
+        for name, balance in balances.items():
+            if balance is not None:
+                metrics[f"{name}_impulse_error_max"] = balance.largest
+    return metrics | _rotor_extremes(run) | _quantity_errors(scene, run, reference) | _peaks(scene, run)
 
 
-def _impulse_errors(scene: Scene, run: Trajectory) -> Metrics:
-    """What is left of the balances of momentum, of their scale; only of a run whose angles and rates are stored."""
-    if not (scene.wants("angles") and scene.wants("rates")):
-        return {}
-    with np.errstate(over="ignore", invalid="ignore"):
-        balances = {"angular": angular_balance(scene, run), "linear": linear_balance(scene, run)}
-    return {f"{name}_impulse_error_max": one.largest for name, one in balances.items() if one is not None}
+def _rotor_extremes(run: Trajectory) -> Metrics:
+    """Smallest and largest rotor angle (rad) and largest rotor speed (rad/s).
+
+    Over the integrator's own output points where the run has them, else over its samples.
+    """
+    refined_angles, refined_rates = run.get("refined_angles"), run.get("refined_rates")
+    angles = run.angles if refined_angles is None else refined_angles
+    rates = run.rates if refined_rates is None else refined_rates
+    return {
+        "rotor_angle_min": float(angles[:, 0].min()),
+        "rotor_angle_max": float(angles[:, 0].max()),
+        "rotor_rate_max": float(np.abs(rates[:, 0]).max()),
+    }
 
 
-def _of_quantities(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
+def _quantity_errors(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
     """The metric of every quantity that is judged by a rule of its declaration."""
     metrics: Metrics = {}
     for quantity in known_quantities(scene.outputs):
-        errors = deviation(quantity, scene, run, reference)
-        if errors is None or quantity.judgement is None:
+        rule, errors = quantity.judgement, deviation(quantity, scene, run, reference)
+        if rule is None or errors is None:
             continue
-        if quantity.judgement.with_reference and reference is not None:
+        if rule.with_reference and reference is not None:
             until = min(horizon_samples(reference), len(errors))
             errors = errors[: until if until > 1 else 0]  # the first sample is given, and equal in every run
-            if quantity.judgement.per_growth_of is not None:
-                scale = quantity.judgement.per_growth_of(scene, reference, until)
-                errors = errors / (scale * _carried_error(reference)[: len(errors)])
+            if rule.per_growth_of is not None:
+                scale = rule.per_growth_of(scene, reference, until)
+                # What a relative error of 1 at the start would have become in a quantity that follows from all angles.
+                carried = running_growth(reference) * np.maximum(*_motion_sizes(reference))
+                errors = errors / (scale * carried[: len(errors)])
         if len(errors):
-            metrics[quantity.judgement.metric] = float(errors.max())
+            metrics[rule.metric] = float(errors.max())
     return metrics
 
 
@@ -118,12 +134,12 @@ def _peaks(scene: Scene, run: Trajectory) -> Metrics:
         values = array_of(quantity, scene, run) if quantity.has_peak else None
         if values is None:
             continue
-        found = sizes(quantity, values)
-        place = np.unravel_index(int(found.argmax()), found.shape)
-        metrics[f"{quantity.name}_max"] = float(found[place])
-        metrics[f"{quantity.name}_max_time_s"] = float(run.time[place[0]])
+        lengths = sizes(quantity, values)
+        peak = np.unravel_index(int(lengths.argmax()), lengths.shape)
+        metrics[f"{quantity.name}_max"] = float(lengths[peak])
+        metrics[f"{quantity.name}_max_time_s"] = float(run.time[peak[0]])
         if quantity.dimensions[1:2] == ("blade",):
-            metrics[f"{quantity.name}_max_blade"] = float(place[1] + 1)
+            metrics[f"{quantity.name}_max_blade"] = float(peak[1] + 1)
     return metrics
 
 
@@ -149,8 +165,8 @@ def _relative_error(run: Trajectory, reference: Trajectory) -> Array:
     n = min(len(run.time), len(reference.time))
     error = np.abs(run.angles[:n] - reference.angles[:n])
     rotor, pitch = (size[:n] for size in _motion_sizes(reference))
-    found: Array = np.maximum(error[:, 0] / rotor, error[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
-    return found
+    relative: Array = np.maximum(error[:, 0] / rotor, error[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
+    return relative
 
 
 def _motion_sizes(reference: Trajectory) -> tuple[Array, Array]:
@@ -158,11 +174,6 @@ def _motion_sizes(reference: Trajectory) -> tuple[Array, Array]:
     turned = np.abs(reference.angles[:, 0] - reference.angles[0, 0])
     pitch = np.abs(reference.angles[:, 1:]).max(axis=1)
     return np.maximum(np.maximum.accumulate(turned), 1.0), np.maximum(np.maximum.accumulate(pitch), 1.0)
-
-
-def _carried_error(reference: Trajectory) -> Array:
-    """(n,) What a relative error of 1 at the start would have become in a quantity that follows from all angles."""
-    return running_growth(reference) * np.maximum(*_motion_sizes(reference))
 
 
 def _invariant_set(run: Trajectory, reference: Trajectory) -> Metrics:
@@ -174,7 +185,9 @@ def _invariant_set(run: Trajectory, reference: Trajectory) -> Metrics:
     metrics = {"zero_pitch_max": float(away.max())}
     if (away > _LEFT_ZERO).any():
         metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > _LEFT_ZERO))])
-        linear = (away > 1e-12) & (away < 1e-2) & (np.arange(len(away)) <= int(np.argmax(away >= 1e-2) or len(away)))
+        large = away >= _LINEAR_TO
+        until = int(np.argmax(large)) if large.any() else len(away)
+        linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < until)
         if linear.sum() >= 10:
             slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
             metrics["zero_pitch_growth_per_s"] = float(slope)
@@ -183,15 +196,25 @@ def _invariant_set(run: Trajectory, reference: Trajectory) -> Metrics:
 
 def largest(values: Array) -> Array:
     """(k,) of (k, n): the largest size of each row; samples that are not finite do not count."""
-    found: Array = np.abs(np.maximum(values.max(axis=1), -values.min(axis=1)))  # of zeros: not -0
-    if not np.isfinite(found).all():
-        sizes = np.abs(values)
-        found = sizes.max(axis=1, initial=0.0, where=np.isfinite(sizes))
-    return found
+    result: Array = np.abs(np.maximum(values.max(axis=1), -values.min(axis=1)))  # of zeros: not -0
+    if not np.isfinite(result).all():
+        magnitudes = np.abs(values)
+        result = magnitudes.max(axis=1, initial=0.0, where=np.isfinite(magnitudes))
+    return result
 
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
-    """(k,) largest energy error of each run, of its scale (J where that is zero); NaN samples do not count."""
+    """Return the largest energy error of each of k runs, of its scale (J where that is zero).
+
+    Parameters
+    ----------
+    scenes : of each run
+    kinetic, work, errors : (k, n) J, over the samples; NaN samples do not count
+
+    Returns
+    -------
+    ndarray, shape (k,)
+    """
     nothing = np.zeros((1, 1))
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])

@@ -1,7 +1,7 @@
 """The output quantities of a run, each declared once: dimensions, units, who computes it, how it is judged and drawn.
 
 What stores, reads, compares or draws samples loops over these declarations. Further quantities come from packages that
-have an entry point in the group `rotor_mbs.quantities`. Knows scenes and samples; no engine and no file format.
+have an entry point in the group `rotor_mbs.quantities`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,18 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import ENTRY_POINT_GROUP, Scene
 
-if TYPE_CHECKING:
-    from rotor_mbs.solution.trajectory import Trajectory
-
 Array = NDArray[np.float64]
+
+
+class Samples(Protocol):
+    """What quantities are computed from: the samples of a run, see `trajectory.Trajectory`."""
+
+    time: Array
+    angles: Array
+    rates: Array
+
+    def get(self, name: str) -> Array | None:
+        """An array by its quantity's name; None where the run does not have it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +41,7 @@ class QuantityMetric:
 
     Attributes
     ----------
-    metric : name of the number among the run's attributes.
+    metric : name of the number among the run's metrics.
     with_reference : the size is that of the difference from the reference's array, up to the horizon.
     relative_to : from the scene to what the number is divided by before it is judged; None for 1.
     per_growth_of : from (scene, reference, number of samples up to the horizon) to a scale; the number is then the
@@ -48,7 +56,7 @@ class QuantityMetric:
     metric: str
     with_reference: bool = True
     relative_to: Callable[[Scene], float] | None = None
-    per_growth_of: Callable[[Scene, Trajectory, int], float] | None = None
+    per_growth_of: Callable[[Scene, Samples, int], float] | None = None
     check: str = ""
     bound: float | None = None
     channel: str = ""
@@ -98,7 +106,7 @@ class Quantity:
     units: str
     long_name: str
     output: str = ""
-    producer: Callable[[Scene, Trajectory], Array | None] | None = None
+    producer: Callable[[Scene, Samples], Array | None] | None = None
     required: bool = True
     judgement: QuantityMetric | None = None
     plot: Plot | None = None
@@ -110,7 +118,9 @@ class Quantity:
         return self.dimensions[:1] == ("time",)
 
 
-# Dimensions, and the arrays that number them.
+# ---- Dimensions
+
+# The arrays that number them.
 SCALES = {
     scale.name: scale
     for scale in (
@@ -123,6 +133,31 @@ SCALES = {
 }
 
 
+def sample_times(scene: Scene) -> Array:
+    """(samples,) s, both ends included."""
+    return np.linspace(0.0, scene.duration, scene.samples)
+
+
+def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
+    """The scales of a complete run: time in s, and the numbers of coordinates, blades and axes."""
+    blades = len(scene.blades)
+    return {
+        "time": sample_times(scene),
+        "coordinate": np.arange(1 + blades),
+        "blade": np.arange(1, 1 + blades),
+        "axis": np.arange(3),
+    }
+
+
+def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
+    """The shape of one sample of a quantity: () for a number, (1 + blades,) for angles."""
+    scales = scale_values(scene)
+    return tuple(len(scales[dimension]) for dimension in quantity.dimensions[1:])
+
+
+# ---- Built-in quantities, and what their declarations compute
+
+
 @np.errstate(over="ignore", invalid="ignore")  # of a runaway: the judgement sees what is not finite
 def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
     """(..., n) J: total energy less work, less its value at the start, of one run or of many."""
@@ -131,7 +166,7 @@ def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
     return error
 
 
-def energy_error(samples: Trajectory) -> Array | None:
+def energy_error(samples: Samples) -> Array | None:
     """(n,) J: the energy balance of a run; None where energies were not asked for."""
     kinetic, potential, work = (samples.get(name) for name in ("kinetic_energy", "potential_energy", "work"))
     if kinetic is None or potential is None or work is None:
@@ -144,26 +179,13 @@ def longest_arm(scene: Scene) -> float:
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 
 
-_JOINT_GAP = QuantityMetric(
-    "constraint_error_max",
-    with_reference=False,
-    relative_to=longest_arm,
-    check="gap",
-    bound=0.0,  # of a model without joints that can open
-    channel="joints",
-    unit="of arm",
-    fault="a joint opens by {value} of the longest arm",
-    look_at="a joint of the chain that is not constrained, or its marker",
-)
-
-
-def _largest_root_force(_scene: Scene, run: Trajectory, until: int) -> float:
+def _largest_root_force(_scene: Scene, run: Samples, until: int) -> float:
     """N, over the blades and the first samples; 1 where there is none."""
     forces = run.get("blade_root_force")
     return 1.0 if forces is None else float(np.linalg.norm(forces[:until], axis=-1).max(initial=0.0)) or 1.0
 
 
-def _largest_root_force_at_arm(scene: Scene, run: Trajectory, until: int) -> float:
+def _largest_root_force_at_arm(scene: Scene, run: Samples, until: int) -> float:
     """N m, that force at the longest arm: a scale for moments, which may all be next to nothing."""
     return _largest_root_force(scene, run, until) * longest_arm(scene)
 
@@ -212,11 +234,30 @@ LOADS = (
 def named_loads(
     roots: Iterable[tuple[Array, Array]], shaft_force: Array, shaft_moment: Array, actuators: Array
 ) -> dict[str, Array]:
-    """The arrays of `LOADS` by name, from force and moment at the root of each blade; all (n, 3) but actuators."""
+    """The arrays of `LOADS` by name.
+
+    Parameters
+    ----------
+    roots : of each blade, (n, 3) force in N and (n, 3) moment in N m at its root, in its frame
+    shaft_force, shaft_moment : (n, 3) N and N m, in the base frame
+    actuators : (n, blades) N m
+    """
     forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
     arrays = forces, moments, shaft_force, shaft_moment, actuators
     return {load.name: np.asarray(values, dtype=float) for load, values in zip(LOADS, arrays, strict=True)}
 
+
+_JOINT_GAP = QuantityMetric(
+    "constraint_error_max",
+    with_reference=False,
+    relative_to=longest_arm,
+    check="gap",
+    bound=0.0,  # of a model without joints that can open
+    channel="joints",
+    unit="of arm",
+    fault="a joint opens by {value} of the longest arm",
+    look_at="a joint of the chain that is not constrained, or its marker",
+)
 
 BUILT_IN = (
     Quantity("angles", ("time", "coordinate"), "rad", "rotor angle and pitch angles, unwrapped", "angles"),
@@ -260,12 +301,18 @@ _OUTPUTS = frozenset(quantity.output for quantity in BUILT_IN)
 NAMES = frozenset({*(quantity.name for quantity in BUILT_IN), "refined_time"})
 
 
+# ---- Quantities of a scene: built-in ones, and those of installed packages
+
+
 def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
     """The built-in quantities, and those that installed packages bring for `outputs`.
 
-    Raises InputError where an output is neither built in nor brought by an installed package.
+    Raises
+    ------
+    InputError
+        Where an output is neither built in nor brought by an installed package.
     """
-    return BUILT_IN + tuple(one for output in outputs if output not in _OUTPUTS for one in installed(output))
+    return BUILT_IN + tuple(quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output))
 
 
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
@@ -279,44 +326,43 @@ def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
 
 @functools.cache
 def installed(output: str) -> tuple[Quantity, ...]:
-    """What the entry point called `output` brings."""
-    found = entry_points(group=ENTRY_POINT_GROUP, name=output)
-    if not found:
+    """The quantities of the entry point called `output`. Raises InputError where there is none, or it is not valid."""
+    points = tuple(entry_points(group=ENTRY_POINT_GROUP, name=output))
+    if not points:
         raise InputError(
             f"unknown output {output!r}; allowed: {', '.join(sorted(_OUTPUTS - {''}))}, or the name of an entry point "
             f"in the group {ENTRY_POINT_GROUP}"
         )
-    point = next(iter(found))
-    where = f"output {output!r}, from {point.value}"
+    where = f"output {output!r}, from {points[0].value}"
     try:
-        loaded = point.load()
+        loaded = points[0].load()
     except Exception as exc:  # whatever the other package raises
         raise InputError(f"{where}: cannot be loaded: {type(exc).__name__}: {exc}") from exc
     brought = (loaded,) if isinstance(loaded, Quantity) else loaded
-    if not isinstance(brought, Sequence) or not all(isinstance(one, Quantity) for one in brought):
+    if not isinstance(brought, Sequence) or not all(isinstance(quantity, Quantity) for quantity in brought):
         raise InputError(f"{where}: is a {type(loaded).__name__}; allowed: a Quantity or a sequence of them")
-    return tuple(_checked(one, output, where) for one in brought)
-
-
-def _checked(quantity: Quantity, output: str, where: str) -> Quantity:
-    allowed = set(SCALES) - {"time", "refined_time"}
-    faults = {
-        f"name {quantity.name!r}; allowed: an identifier that is not taken": not quantity.name.isidentifier()
-        or quantity.name in NAMES | set(SCALES),
-        f"dimensions {quantity.dimensions}; allowed: 'time', then any of {', '.join(sorted(allowed))}, once each": not (
-            quantity.is_over_time
-            and set(quantity.dimensions[1:]) <= allowed
-            and len(set(quantity.dimensions)) == len(quantity.dimensions)
-        ),
-        f"output {quantity.output!r}; allowed: {output!r}, the entry point's name": quantity.output != output,
-    }
-    problems = [f"{where}: {quantity.name}: {text}" for text, is_wrong in faults.items() if is_wrong]
+    problems = []
+    allowed = sorted(set(SCALES) - {"time", "refined_time"})
+    for quantity in brought:
+        name, dimensions = quantity.name, quantity.dimensions
+        faults = []
+        if not name.isidentifier() or name in NAMES | set(SCALES):
+            faults.append(f"name {name!r}; allowed: an identifier that is not taken")
+        is_repeated = len(set(dimensions)) < len(dimensions)
+        if not quantity.is_over_time or is_repeated or not set(dimensions[1:]) <= set(allowed):
+            faults.append(f"dimensions {dimensions}; allowed: 'time', then any of {', '.join(allowed)}, once each")
+        if quantity.output != output:
+            faults.append(f"output {quantity.output!r}; allowed: {output!r}, the entry point's name")
+        problems += [f"{where}: {name}: {fault}" for fault in faults]
     if problems:
         raise InputError(problems)
-    return quantity
+    return tuple(brought)
 
 
-def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | None:
+# ---- Arrays of a run
+
+
+def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None:
     """The run's array of a quantity: the model's own, or what the quantity's producer makes of the samples.
 
     Returns None where the run does not have it. Raises InputError where a producer gives an array of another shape.
@@ -327,49 +373,35 @@ def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | N
     values = quantity.producer(scene, samples)
     if values is None:
         return None
+    values = np.asarray(values, dtype=np.float64)
     expected = (len(samples.time), *row_shape(quantity, scene))
-    found = np.asarray(values, dtype=np.float64)
-    if found.shape != expected:
-        raise InputError(f"quantity {quantity.name!r}: its producer gives shape {found.shape}; allowed: {expected}")
-    return found
+    if values.shape != expected:
+        raise InputError(f"quantity {quantity.name!r}: its producer gives shape {values.shape}; allowed: {expected}")
+    return values
 
 
-def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
+def arrays(scene: Scene, samples: Samples) -> dict[str, Array]:
     """All arrays of a run that its scene asks for, by name."""
-    found = {one.name: array_of(one, scene, samples) for one in quantities(scene.outputs)}
-    return {name: values for name, values in found.items() if values is not None}
+    by_name = {quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)}
+    return {name: values for name, values in by_name.items() if values is not None}
 
 
-def sample_times(scene: Scene) -> Array:
-    """(samples,) s, both ends included."""
-    return np.linspace(0.0, scene.duration, scene.samples)
+def sizes(quantity: Quantity, values: Array) -> Array:
+    """Magnitudes of an array of this quantity: with the last dimension `axis`, lengths of the vectors."""
+    lengths: Array = np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
+    return lengths
 
 
-def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
-    """The scales of a complete run: time in s, and the numbers of coordinates, blades and axes."""
-    blades = len(scene.blades)
-    return {
-        "time": sample_times(scene),
-        "coordinate": np.arange(1 + blades),
-        "blade": np.arange(1, 1 + blades),
-        "axis": np.arange(3),
-    }
-
-
-def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
-    """The shape of one sample of a quantity: () for a number, (1 + blades,) for angles."""
-    scales = scale_values(scene)
-    return tuple(len(scales[dimension]) for dimension in quantity.dimensions[1:])
-
-
-def deviation(quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None) -> Array | None:
+def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples | None) -> Array | None:
     """(common samples,) Size of a quantity, or of its difference from the reference, largest over the other axes.
 
     Returns None where the quantity is not judged, or where the run or the needed reference does not have it.
     """
     rule = quantity.judgement
-    values = array_of(quantity, scene, run) if rule else None
-    if rule is None or values is None:
+    if rule is None:
+        return None
+    values = array_of(quantity, scene, run)
+    if values is None:
         return None
     if rule.with_reference:
         exact = None if reference is None else array_of(quantity, scene, reference)
@@ -377,11 +409,5 @@ def deviation(quantity: Quantity, scene: Scene, run: Trajectory, reference: Traj
             return None
         n = min(len(values), len(exact))
         values = values[:n] - exact[:n]
-    found = sizes(quantity, values)
-    return np.asarray(found.max(axis=tuple(range(1, found.ndim))))
-
-
-def sizes(quantity: Quantity, values: Array) -> Array:
-    """Magnitudes of an array of this quantity: with the last dimension `axis`, lengths of the vectors."""
-    found: Array = np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
-    return found
+    lengths = sizes(quantity, values)
+    return np.asarray(lengths.max(axis=tuple(range(1, lengths.ndim))))

@@ -1,4 +1,4 @@
-"""A run as a Python user has it: scene, method, samples, status, numbers, times. Knows no engine and no file format."""
+"""A run as a Python user has it: scene, method, samples, status, numbers, times."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.quantities import SCALES, Array, Quantity, arrays, quantities, scale_values
+from rotor_mbs.solution.quantities import SCALES, Array, Quantity, quantities, scale_values
+from rotor_mbs.solution.quantities import arrays as all_arrays
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 
@@ -68,12 +69,12 @@ class Solution:
     @property
     def quantities(self) -> dict[str, Array]:
         """The arrays that the scene's `outputs` ask for, by name."""
-        return arrays(self.scene, self.trajectory)
+        return all_arrays(self.scene, self.trajectory)
 
     def __getitem__(self, name: str) -> Array:
-        found = self.trajectory.get(name)
-        if found is not None:
-            return found
+        values = self.trajectory.get(name)
+        if values is not None:
+            return values
         known = self.quantities
         if name not in known:
             raise KeyError(f"{name!r}; this solution has: time, {', '.join(known)}")
@@ -104,18 +105,21 @@ class Solution:
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
         if (refined := self.trajectory.get("refined_time")) is not None:
             scales["refined_time"] = refined
-        known, found = quantities(self.scene.outputs), self.quantities
-        variables = {one.name: (one.dimensions, found[one.name], _described(one)) for one in known if one.name in found}
-        used = {"time"}.union(*(dimensions for dimensions, _, _ in variables.values()))
+        arrays = self.quantities
+        variables, used = {}, {"time"}
+        for quantity in quantities(self.scene.outputs):
+            if quantity.name in arrays:
+                variables[quantity.name] = (quantity.dimensions, arrays[quantity.name], _attributes(quantity))
+                used |= set(quantity.dimensions)
         coordinates = {
-            name: (name, labels.get(name, scales[name]), _described(scale))
+            name: (name, labels.get(name, scales[name]), _attributes(scale))
             for name, scale in SCALES.items()
             if name in used
         }
         facts = {"scene": self.scene.name, "method": self.method, "status": self.status, "message": self.message}
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
-    def _shown(self) -> dict[str, str]:
+    def _summary(self) -> dict[str, str]:
         reached = f"{self.time[-1]:g} s of {self.scene.duration:g} s" if len(self.time) else "no sample"
         rows = {
             "method": self.method,
@@ -129,12 +133,15 @@ class Solution:
 
     def __repr__(self) -> str:
         metrics = ", ".join(f"{name} {value:.3g}" for name, value in self.metrics.items())
-        lines = [f"{self.scene.name}: {self.scene.title}", *(f"{name}: {text}" for name, text in self._shown().items())]
+        lines = [
+            f"{self.scene.name}: {self.scene.title}",
+            *(f"{name}: {text}" for name, text in self._summary().items()),
+        ]
         return "\n  ".join([*lines, *textwrap.wrap(metrics, 110)[:3]])
 
     def _repr_html_(self) -> str:
         """For a notebook: a table of status and numbers."""
-        rows = self._shown() | {name: f"{value:.3g}" for name, value in self.metrics.items()}
+        rows = self._summary() | {name: f"{value:.3g}" for name, value in self.metrics.items()}
         cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table><caption>{escape(self.scene.title)}</caption>{cells}</table>"
 
@@ -148,5 +155,5 @@ def need_xarray() -> Any:
     return xarray
 
 
-def _described(quantity: Quantity) -> dict[str, str]:
+def _attributes(quantity: Quantity) -> dict[str, str]:
     return {"units": quantity.units, "long_name": quantity.long_name}

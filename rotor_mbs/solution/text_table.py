@@ -1,4 +1,4 @@
-"""A small table for terminals and notebooks, and texts in a sentence."""
+"""A small table for terminals and notebooks, and a list of texts in a sentence."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from html import escape
 
 def listed(texts: Sequence[str]) -> str:
     """ "a, b and c"."""
-    return " and ".join([", ".join(texts[:-1]), texts[-1]]) if len(texts) > 1 else texts[0]
+    if len(texts) == 1:
+        return texts[0]
+    return f"{', '.join(texts[:-1])} and {texts[-1]}"
 
 
 @dataclass(frozen=True)
@@ -20,11 +22,10 @@ class TextTable:
     rows: list[tuple[str, ...]]
 
     def __str__(self) -> str:
-        lines = [self.head, *self.rows]
-        widths = [max(len(line[i]) for line in lines) for i in range(len(self.head))]
-        return "\n".join(
-            "  ".join(f"{cell:{w}}" for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines
-        )
+        rows = [self.head, *self.rows]
+        widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
+        return "\n".join(line.rstrip() for line in lines)
 
     __repr__ = __str__
 

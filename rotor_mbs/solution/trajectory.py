@@ -1,7 +1,4 @@
-"""What a model returns of a run: samples by quantity, and the engine's report; how its rows become samples.
-
-Knows no engine and no file format.
-"""
+"""What a model returns of a run: samples by quantity, and the engine's report; how its rows become samples."""
 
 from __future__ import annotations
 
@@ -48,8 +45,10 @@ class Trajectory:
 
     def get(self, name: str) -> Array | None:
         """An array by its quantity's name, time among them; None where the run does not have it."""
-        found: Array | None = self.__dict__.get(name) if name in _FIELDS else self.quantities.get(name)
-        return found
+        if name in _FIELDS:
+            values: Array = self.__dict__[name]
+            return values
+        return self.quantities.get(name)
 
     def replace(self, **changes: Array | None) -> Trajectory:
         """A copy with other arrays; None removes one. The arrays themselves are shared."""
@@ -81,7 +80,13 @@ _FIELDS = ("time", "angles", "rates")
 class Integration:
     """One integration as the engine reports it: a claim, which `judgement` checks against the samples.
 
-    out_of_time: it was ended by its time limit; what it reached is kept.
+    Attributes
+    ----------
+    success : whether the engine says that it reached the end.
+    message : why it did not; "" where it did.
+    time_reached : s
+    steps, rhs_evaluations : how many; None where they are not counted.
+    out_of_time : it was ended by its time limit; what it reached is kept.
     """
 
     success: bool
@@ -96,10 +101,12 @@ class Integration:
 class RunBlock:
     """Many runs at once, of scenes with the same number of blades and samples and the same outputs.
 
-    time            (runs, samples) s
-    quantities      by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
-    integrations    the engine's report of each run
-    samples         how many rows of each are finite
+    Attributes
+    ----------
+    time : (runs, samples) s
+    quantities : by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
+    integrations : the engine's report of each run
+    samples : how many rows of each are finite
     """
 
     time: Array
@@ -123,10 +130,11 @@ class RunBlock:
 
 def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, Array]:
     """(n, 1 + blades) rad and rad/s from those of `scene.moving_coordinates`; a pitch that is fixed keeps its angle."""
-    found = np.tile(np.array(scene.initial_angles, dtype=angles.dtype), (len(angles), 1))
-    turning = np.zeros_like(found)
-    found[:, scene.moving_coordinates], turning[:, scene.moving_coordinates] = angles, rates
-    return found, turning
+    moving = scene.moving_coordinates
+    all_angles = np.tile(np.array(scene.initial_angles, dtype=angles.dtype), (len(angles), 1))
+    all_rates = np.zeros_like(all_angles)
+    all_angles[:, moving], all_rates[:, moving] = angles, rates
+    return all_angles, all_rates
 
 
 def finite_rows(*tables: Array) -> int:

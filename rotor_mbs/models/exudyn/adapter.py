@@ -1,6 +1,6 @@
 """The one place that imports Exudyn: builds a system from its parts, runs it, returns recorded rows.
 
-Knows no rotor. The engine runs without window, console output or files, in its fast build (no range checks).
+The engine runs without window, console output or files, in its fast build (no range checks).
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration
 
-os.environ.setdefault("EXUDYN_SUPPRESS_UI_WINDOW_OPEN", "1")
 os.environ.setdefault("EXUDYN_MODULE", "fast")
 with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
     import exudyn
@@ -31,6 +30,8 @@ with contextlib.redirect_stdout(io.StringIO()):  # it greets on import
 _engine: Any = exudyn
 _engine.config.printToConsole = False
 _engine.config.suppressWarnings = True
+# Not by the engine's environment variable, with which it would set matplotlib's backend to Agg, the caller's plots too.
+_engine.special.userInterface.SuppressAll(True)
 
 
 class Linearized(NamedTuple):
@@ -52,22 +53,22 @@ class System:
         self._container = _engine.SystemContainer()
         self._mbs = self._container.AddSystem()
         self._numbers: dict[Ref, object] = {}
-        outputs = {part.name: str(part.parameters["outputVariableType"]) for part in parts if part.kind == "sensor"}
-        self._of_accelerations = [name for name, output in outputs.items() if "Acceleration" in output]
+        self._of_accelerations = [
+            part.name
+            for part in parts
+            if part.kind == "sensor" and "Acceleration" in str(part.parameters["outputVariableType"])
+        ]
         self._initial_values: dict[str, Array] = {}  # by sensor, where the solver does not know them
         try:
             for part in parts:
-                self._add(part)
+                arguments = {key: self._argument(key, value) for key, value in part.parameters.items()}
+                item = getattr(itemInterface, part.type)(name=part.name, **arguments)
+                add = getattr(self._mbs, f"Add{part.kind.capitalize()}")
+                self._numbers[Ref(part.kind, part.name)] = add(item)
             self._mbs.Assemble()
         except _engine.ExudynError as exc:
             raise MethodRefusal(f"Exudyn does not take this model: {_one_line(str(exc))}") from exc
         self._initial_state = self._mbs.systemData.GetSystemState(_engine.ConfigurationType.Initial)
-
-    def _add(self, part: Part) -> None:
-        arguments = {key: self._argument(key, value) for key, value in part.parameters.items()}
-        item = getattr(itemInterface, part.type)(name=part.name, **arguments)
-        add = getattr(self._mbs, f"Add{part.kind.capitalize()}")
-        self._numbers[Ref(part.kind, part.name)] = add(item)
 
     def _argument(self, key: str, value: Any) -> object:
         if isinstance(value, Ref):
@@ -77,7 +78,7 @@ class System:
         return _TRANSLATIONS[key](value) if key in _TRANSLATIONS else value
 
     def rows(self, sensor: str) -> Array:
-        """(n, 1 + k) rows a sensor kept in the last integration: time in s, then its k values."""
+        """(n, 1 + k) rows that a sensor kept in the last integration: time in s, then its k values."""
         stored = np.array(self._mbs.GetSensorStoredData(self._numbers[Ref("sensor", sensor)]), dtype=float, ndmin=2)
         if sensor in self._initial_values:
             stored[0, 1:] = self._initial_values[sensor]
@@ -102,9 +103,9 @@ class System:
         settings.solution.file.write = False
         solver.InitializeSolver(self._mbs, settings)
         solver.ComputeODE2RHS(self._mbs)
-        found = np.array(solver.GetSystemResidual())[: solver.GetODE2size()]
+        residual = np.array(solver.GetSystemResidual())[: solver.GetODE2size()]
         solver.FinalizeSolver(self._mbs, settings)
-        return found
+        return residual
 
     @property
     def coordinates(self) -> Array:
@@ -124,8 +125,16 @@ class System:
     ) -> Integration:
         """From the initial state to the end of the last interval, or to the first failure, which is in the result.
 
-        rows_between: keep rows between samples too. before_interval is called with each interval first.
-        Raises KeyboardInterrupt if interrupted.
+        Parameters
+        ----------
+        intervals : of constant or linear loads, one after the other
+        rows_between : keep rows between samples too
+        before_interval : called with each interval first
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If interrupted.
         """
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)

@@ -1,7 +1,4 @@
-"""What a model consists of, as plain data: it is listed, counted, and handed to the engine, and so cannot differ.
-
-Knows the names of the engine's items only.
-"""
+"""What a model consists of, as plain data, from which it is listed, counted and built in the engine."""
 
 from __future__ import annotations
 

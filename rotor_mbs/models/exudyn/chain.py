@@ -1,8 +1,8 @@
 """The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates.
 
-Knows the engine through the blueprint alone. Every node stands at its body's centre of mass, so masses and inertias
-go in as the scene tells them. A hub without mass or inertia is a body with none: its joints fix it, the constrained
-system is regular, and no inertia has to be invented for it.
+Every node stands at its body's centre of mass, so masses and inertias go in as the scene has them. A hub without mass
+or inertia is a body with none: its joints fix it, the constrained system is regular, and no inertia has to be invented
+for it.
 """
 
 from __future__ import annotations
@@ -38,8 +38,14 @@ NODES = ("euler_parameters", "rotation_vector")
 
 @dataclass(frozen=True)
 class Placed:
-    """A body at the start: turn about the shaft and pitch in rad; base frame: (3,) axis that it turns about in its
-    bearing, (3,) angular velocity in rad/s."""
+    """A body at the start.
+
+    Attributes
+    ----------
+    about_shaft, pitch : rad, of its orientation
+    axis : (3,) in the base frame, that it turns about in its bearing
+    omega : (3,) rad/s in the base frame, angular velocity
+    """
 
     name: str
     body: Body
@@ -59,18 +65,18 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     rotor, rate = scene.initial_angles[0], scene.initial_rates[0]
     shaft = np.array([0.0, 1.0, 0.0])
     spin = rate * shaft
-    out = [Placed("hub", hub_body(scene), rotor, 0.0, shaft, spin)]
+    bodies = [Placed("hub", hub_body(scene), rotor, 0.0, shaft, spin)]
     for i in pitching(scene):
         pitch, pitch_rate = scene.initial_angles[1 + i], scene.initial_rates[1 + i]
         about_shaft = rotor + scene.phases[i]
         axis = np.array([np.sin(about_shaft), 0.0, np.cos(about_shaft)])
         body = blade_body(scene.blades[i])
-        out.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, axis, spin + pitch_rate * axis))
-    return out
+        bodies.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, axis, spin + pitch_rate * axis))
+    return bodies
 
 
 def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
-    """Everything the engine holds for this scene, in the order it is built; `node` is one of NODES."""
+    """Everything the engine has of this scene, in the order it is built; `node` is one of NODES."""
     hub, *blades = placed_bodies(scene)
     built = [Part("object", "ground", "ObjectGround")]
     for placed in (hub, *blades):
@@ -195,23 +201,23 @@ def _rotor_torque(scene: Scene, moment: Moment) -> Part:
     return Part("load", "rotor torque", "LoadTorqueVector", load, detail)
 
 
-def _sensors(scene: Scene, placed: list[Placed]) -> list[Part]:
-    out = []
-    for each in placed:
-        name, node = each.name, Ref("node", each.name)
-        out.append(sensor(f"{name} position", "SensorNode", "Position", nodeNumber=node))
-        out.append(sensor(f"{name} rotation", "SensorNode", "RotationMatrix", nodeNumber=node))
-        out.append(sensor(f"{name} spin", "SensorNode", "AngularVelocityLocal", nodeNumber=node))
-        if scene.wants("energy") and each.body.mass:
-            out.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=node))
+def _sensors(scene: Scene, bodies: list[Placed]) -> list[Part]:
+    sensors = []
+    for placed in bodies:
+        name, node = placed.name, Ref("node", placed.name)
+        sensors.append(sensor(f"{name} position", "SensorNode", "Position", nodeNumber=node))
+        sensors.append(sensor(f"{name} rotation", "SensorNode", "RotationMatrix", nodeNumber=node))
+        sensors.append(sensor(f"{name} spin", "SensorNode", "AngularVelocityLocal", nodeNumber=node))
+        if scene.wants("energy") and placed.body.mass:
+            sensors.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=node))
     if scene.wants("tip"):
-        out += [_tip_sensor(scene, blade, placed) for blade in range(len(scene.blades))]
+        sensors += [_tip_sensor(scene, blade, bodies) for blade in range(len(scene.blades))]
     if scene.wants("loads"):
-        out += chain_sensors(scene, placed[0].body)
-    return out
+        sensors += chain_sensors(scene, bodies[0].body)
+    return sensors
 
 
-def _tip_sensor(scene: Scene, blade: int, placed: list[Placed]) -> Part:
+def _tip_sensor(scene: Scene, blade: int, bodies: list[Placed]) -> Part:
     number, point = on_body(scene, blade, scene.blades[blade].tip)
-    body, place = Ref("object", placed[number].name), list(point - placed[number].body.com)
-    return sensor(f"tip {blade + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=place)
+    body, position = Ref("object", bodies[number].name), list(point - bodies[number].body.com)
+    return sensor(f"tip {blade + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=position)

@@ -1,7 +1,4 @@
-"""Energy of the bearing springs, and the work of the loads.
-
-Knows no engine and no equations of motion.
-"""
+"""Energy of the bearing springs, and the work of the loads."""
 
 from __future__ import annotations
 
@@ -20,8 +17,18 @@ _POINTS = 8
 
 
 def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
-    """J at the first n samples, from (n, 1 + blades) rad: (n,) energy of the springs; (n,) what `work` leaves out.
+    """Return the energy of the springs, and the work of their rest angles that `work` leaves out.
 
+    Parameters
+    ----------
+    angles : (n, 1 + blades) rad, at the first n samples
+
+    Returns
+    -------
+    energy, of_rests : (n,) J
+
+    Notes
+    -----
     With the spring's energy ½ k (θ - r)², a rest angle r that moves does the work -∫ k (θ - r) dr, jumps included.
     That is ∫ k r dθ, which `work` has, and the change of ½ k r (r - 2θ).
     """
@@ -38,8 +45,15 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
 
 def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
-    """(n,) J of the torques less what the dampers took, from rows of time s, angles rad, rates rad/s.
+    """Return the work of the torques less what the dampers took, (n,) J.
 
+    Parameters
+    ----------
+    segments : of the loads
+    time, angles, rates : (n,) s, (n, 1 + blades) rad and rad/s: all rows, samples among them
+
+    Notes
+    -----
     A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`.
     """
     if not scene.work_needs_path:

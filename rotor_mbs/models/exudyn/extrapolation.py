@@ -3,8 +3,6 @@
 With steps h, h/2 and h/4 the terms of h² and h⁴ are eliminated. For the trapezoidal rule (Newmark) the error has even
 powers only, and the result is of sixth order. Generalized-α has a term of h³, too, which remains; it is small: to
 eliminate it in place of h⁴ left errors of 8e-6 rad on paper/fig11 before its horizon, for 3e-7.
-
-Knows solvers and samples; no engine.
 """
 
 from __future__ import annotations
@@ -31,14 +29,16 @@ SAFETY = 4.0
 _ROUNDING = 10.0 * float(np.finfo(float).eps)
 
 # What a run is judged by without a reference: sizes without a sign, whose errors no step's power describes.
-_DISTANCES = {one.name for one in BUILT_IN if one.judgement and not one.judgement.with_reference}
+_DISTANCES = {quantity.name for quantity in BUILT_IN if quantity.judgement and not quantity.judgement.with_reference}
 
 
 class ExtrapolatedSolver:
     """See `rotor_mbs.methods.base.Solver`.
 
-    build      from the number of steps that take the place of each step to the solver of that run
-    tolerance  relative tolerance of Newton's residual
+    Parameters
+    ----------
+    build : from the number of steps that take the place of each step to the solver of that run
+    tolerance : relative tolerance of Newton's residual
     """
 
     def __init__(self, build: Callable[[int], Solver], tolerance: float) -> None:
@@ -51,34 +51,36 @@ class ExtrapolatedSolver:
         self._integrated = 0
         total = Integration(True, steps=0, rhs_evaluations=0, time_reached=float("inf"))
         for run in self._runs:
-            found = run.integrate()
+            part = run.integrate()
             self._integrated += 1
-            total.steps = (total.steps or 0) + (found.steps or 0)
-            total.rhs_evaluations = (total.rhs_evaluations or 0) + (found.rhs_evaluations or 0)
-            total.time_reached = min(total.time_reached, found.time_reached)
-            if not found.success:
-                total = replace(total, success=False, message=found.message, out_of_time=found.out_of_time)
+            total.steps = (total.steps or 0) + (part.steps or 0)
+            total.rhs_evaluations = (total.rhs_evaluations or 0) + (part.rhs_evaluations or 0)
+            total.time_reached = min(total.time_reached, part.time_reached)
+            if not part.success:
+                total = replace(total, success=False, message=part.message, out_of_time=part.out_of_time)
                 break
         return total
 
     def observe(self) -> Trajectory:
         """As far as the shortest run got; the initial state alone where a run was not begun."""
         runs = [run.observe() for run in self._runs[: self._integrated]]
-        rows = min(len(run.time) for run in runs) if len(runs) == len(self._runs) else 1
-        first = [run.replace(**_first_rows(run, rows)) for run in (*runs, runs[-1], runs[-1])[:3]]
-        return extrapolated(first, self._tolerance)
-
-
-def _first_rows(run: Trajectory, rows: int) -> dict[str, Array]:
-    arrays = {"time": run.time, "angles": run.angles, "rates": run.rates, **run.quantities}
-    return {name: values[:rows] for name, values in arrays.items()}
+        rows = min(len(run.time) for run in runs)
+        if len(runs) < len(self._runs):
+            rows, runs = 1, [*runs, runs[-1], runs[-1]][: len(self._runs)]
+        cut = []
+        for run in runs:
+            arrays = {"time": run.time, "angles": run.angles, "rates": run.rates, **run.quantities}
+            cut.append(Trajectory(**{name: values[:rows] for name, values in arrays.items()}))
+        return extrapolated(cut, self._tolerance)
 
 
 def extrapolated(runs: list[Trajectory], tolerance: float) -> Trajectory:
     """Every quantity extrapolated to step zero, but for distances such as the joints' gaps: those are the finest run's.
 
-    runs       with steps h, h/2 and h/4; same samples, same quantities
-    tolerance  relative tolerance of Newton's residual
+    Parameters
+    ----------
+    runs : with steps h, h/2 and h/4; same samples, same quantities
+    tolerance : relative tolerance of Newton's residual
     """
     coarse, middle, fine = runs
     distance = np.abs(
@@ -86,13 +88,12 @@ def extrapolated(runs: list[Trajectory], tolerance: float) -> Trajectory:
     ).max(axis=1)
     largest = np.maximum(np.abs(fine.angles).max(axis=1), 1.0)
     names = {"angles", "rates", *fine.quantities} - _DISTANCES
-    arrays = {name: _to_zero(*(getattr(run, name) for run in runs)) for name in names}
+    arrays = {}
+    for name in names:
+        first, second, third = (getattr(run, name) for run in runs)
+        arrays[name] = _eliminated(_eliminated(first, second, 4.0), _eliminated(second, third, 4.0), 16.0)
     arrays["angle_uncertainty"] = SAFETY * np.maximum.accumulate(distance + (tolerance + _ROUNDING) * largest)
     return fine.replace(**arrays)
-
-
-def _to_zero(coarse: Array, middle: Array, fine: Array) -> Array:
-    return _eliminated(_eliminated(coarse, middle, 4.0), _eliminated(middle, fine, 4.0), 16.0)
 
 
 def _eliminated(coarse: Array, fine: Array, ratio: float) -> Array:

@@ -1,4 +1,4 @@
-"""Rotations and rigid bodies of the rotor, from raw scene data. Knows neither the engine nor any other model.
+"""Rotations and rigid bodies of the rotor, from raw scene data.
 
 Base frame: z up, the shaft along y. Blade i stands in the hub frame turned by its phase about y, and turns by its
 pitch about its own z: R_i = Ry(rotor + phase_i) Rz(pitch_i).
@@ -23,7 +23,11 @@ ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 class Body:
     """A rigid body in its own frame, whose origin is the hub centre.
 
-    mass kg; com (3,) m; inertia (3, 3) kg m² about the centre of mass.
+    Attributes
+    ----------
+    mass : kg
+    com : (3,) m, centre of mass
+    inertia : (3, 3) kg m² about the centre of mass
     """
 
     mass: float
@@ -50,16 +54,13 @@ def mounting(index: int, count: int) -> Array:
 def _turn(part: int, whole: int) -> tuple[float, float]:
     """Cosine and sine of 2π part/whole, folded into the first half quadrant: blades that balance do so exactly."""
     quarter, rest = divmod(4 * part, whole)
-    cosine, sine = _cos_sin(min(rest, whole - rest) / whole)
+    quarters = min(rest, whole - rest) / whole
+    angle = 0.5 * math.pi * quarters
+    cosine = math.cos(angle)
+    sine = 0.5 if math.isclose(quarters, 1.0 / 3.0, rel_tol=1e-15) else math.sin(angle)
     if 2 * rest > whole:
         cosine, sine = sine, cosine
     return [(cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine)][quarter % 4]
-
-
-def _cos_sin(quarters: float) -> tuple[float, float]:
-    angle = 0.5 * math.pi * quarters
-    sine = 0.5 if math.isclose(quarters, 1.0 / 3.0, rel_tol=1e-15) else math.sin(angle)
-    return math.cos(angle), sine
 
 
 def quaternion(about_shaft: float, pitch: float) -> Array:
@@ -101,7 +102,7 @@ def on_body(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Arra
 
 
 def blade_body(blade: Blade) -> Body:
-    """The blade as the scene tells it."""
+    """The blade with the scene's own numbers."""
     return Body(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor)
 
 
@@ -115,12 +116,9 @@ def hub_body(scene: Scene) -> Body:
     parts = [Body(0.0, np.zeros(3), np.diag([half, scene.hub_inertia, half]))]
     for index, blade in enumerate(scene.blades):
         if not blade.has_pitch_inertia:
-            parts.append(_turned(blade_body(blade), fixed_blade_rotation(scene, index)))
+            body, rotation = blade_body(blade), fixed_blade_rotation(scene, index)
+            parts.append(Body(body.mass, rotation @ body.com, rotation @ body.inertia @ rotation.T))
     return _joined(parts)
-
-
-def _turned(body: Body, rotation: Array) -> Body:
-    return Body(body.mass, rotation @ body.com, rotation @ body.inertia @ rotation.T)
 
 
 def _joined(parts: list[Body]) -> Body:

@@ -32,9 +32,9 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
     """
     state = scene_at(scene, angles, speed, torque)
     system = System(tree.parts(state, Loads(state)))
-    found = _extrapolated(system.linearized)
-    inverse = np.asarray(np.linalg.inv(found.M), dtype=np.float64)
-    return Linearization(inverse @ found.K, inverse @ found.D, inverse @ system.forces())
+    linear = _extrapolated(system.linearized)
+    inverse = np.asarray(np.linalg.inv(linear.M), dtype=np.float64)
+    return Linearization(inverse @ linear.K, inverse @ linear.D, inverse @ system.forces())
 
 
 def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
@@ -48,34 +48,30 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
         raise MethodRefusal("exudyn_chain: linearized at rest alone")
     state = scene_at(scene, angles, 0.0, 0.0)
     system = System(chain.parts(state, Loads(state), "euler_parameters"))
-    found = _extrapolated(system.linearized)
+    linear = _extrapolated(system.linearized)
     force = system.forces()
-    multipliers = np.asarray(np.linalg.lstsq(found.C, force, rcond=None)[0], dtype=np.float64)
-    left = np.abs(force - found.C @ multipliers).max()
-    if left > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(found.K).max():
-        raise MethodRefusal(f"exudyn_chain: not at rest: {left:g} N of the forces are not taken by the joints")
-    N = _free_directions(found.C)
+    multipliers = np.asarray(np.linalg.lstsq(linear.C, force, rcond=None)[0], dtype=np.float64)
+    residual = np.abs(force - linear.C @ multipliers).max()
+    if residual > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(linear.K).max():
+        raise MethodRefusal(f"exudyn_chain: not at rest: {residual:g} N of the forces are not taken by the joints")
+    # Orthonormal basis of the velocities with Cᵀ q̇ = 0.
+    vectors, singular_values, _ = np.linalg.svd(linear.C)
+    rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
+    N: Array = np.asarray(vectors[:, rank:])
     geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
     joint = _joint_angles(state) @ N
-    mass = N.T @ found.M @ N
+    mass = N.T @ linear.M @ N
 
     def in_joint_angles(matrix: Array) -> Array:
         return np.asarray(joint @ np.linalg.solve(mass, matrix) @ np.linalg.inv(joint))
 
-    stiffness = in_joint_angles(N.T @ (found.K @ N + geometric))
-    damping = in_joint_angles(N.T @ found.D @ N)
+    stiffness = in_joint_angles(N.T @ (linear.K @ N + geometric))
+    damping = in_joint_angles(N.T @ linear.D @ N)
     return Linearization(stiffness, damping, joint @ np.linalg.solve(mass, N.T @ force))
 
 
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
     return Linearized(*(limit_at_zero(matrices, 2.0) for matrices in zip(*map(linearized, _STEPS), strict=True)))
-
-
-def _free_directions(C: Array) -> Array:
-    """(n, free) orthonormal basis of the velocities with Cᵀ q̇ = 0."""
-    vectors, sizes, _ = np.linalg.svd(C)
-    rank = int(np.count_nonzero(sizes > 1e-10 * sizes[0]))
-    return np.asarray(vectors[:, rank:])
 
 
 def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
@@ -96,9 +92,9 @@ def _joint_angles(scene: Scene) -> Array:
     A body's coordinates are its position and its Euler parameters p; its angular velocity is 2 (e0 ė - ė0 e + e × ė).
     """
     bodies = chain.placed_bodies(scene)
-    out = np.zeros((len(bodies), 7 * len(bodies)))
+    by_coordinates = np.zeros((len(bodies), 7 * len(bodies)))
     for k, placed in enumerate(bodies):
         p = quaternion(placed.about_shaft, placed.pitch)
         spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
-        out[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
-    return out
+        by_coordinates[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
+    return by_coordinates

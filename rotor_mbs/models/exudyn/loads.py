@@ -1,5 +1,5 @@
 """Loads from what the engine records. The chain: multipliers of its joints, moments of its connectors. The tree, and a
-blade that is part of the hub: Newton's and Euler's laws on the engine's accelerations. Knows no equations of motion.
+blade that is part of the hub: Newton's and Euler's laws on the engine's accelerations.
 
 Forces in N and moments in N m act on the blade at its root (hub on blade) and on the hub (bearing on rotor).
 """
@@ -22,11 +22,6 @@ from rotor_mbs.solution.trajectory import Array
 Sampled = Callable[[str], Array]
 
 
-def _rotation(scene: Scene, i: int) -> Array:
-    """(3, 3) from the frame of blade i to the engine's body that it is, or, where it cannot pitch, is part of."""
-    return np.eye(3) if i in pitching(scene) else fixed_blade_rotation(scene, i)
-
-
 def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
     """What Newton's and Euler's laws need of blade i: the engine's names of outputs by those of sensors."""
     outputs = {"root acceleration": "Acceleration", "root rotation": "RotationMatrix"}
@@ -40,7 +35,9 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
 
     F = m (a + g e_z),  M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it.
     """
-    blade, turned, name = scene.blades[i], _rotation(scene, i), f"blade {i + 1} root"
+    blade, name = scene.blades[i], f"blade {i + 1} root"
+    # From the blade's frame to the engine's body that it is, or, where it cannot pitch, is part of.
+    turned = np.eye(3) if i in pitching(scene) else fixed_blade_rotation(scene, i)
     frames = matrices(sampled(f"{name} rotation")) @ turned
     lifted = sampled(f"{name} acceleration") + np.array([0.0, 0.0, scene.gravity])
     force = blade.mass * _in_frames(frames, lifted)
@@ -73,26 +70,26 @@ def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
     """What `tree_loads` reads; on_link: (name, output, link, point) -> sensor."""
-    found = []
+    sensors = []
     for i, blade in enumerate(scene.blades):
         place = on_body(scene, i, blade.centre_of_mass)
-        found += [on_link(name, output, *place) for name, output in _motion_outputs(scene, i).items()]
+        sensors += [on_link(name, output, *place) for name, output in _motion_outputs(scene, i).items()]
     if scene.hub_inertia:
-        found.append(on_link("hub spin rate", "AngularAccelerationLocal", 0, np.zeros(3)))
-    return found
+        sensors.append(on_link("hub spin rate", "AngularAccelerationLocal", 0, np.zeros(3)))
+    return sensors
 
 
 def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
     """What `chain_loads` reads beside the rotations: joints, connectors, and blades that are part of the hub."""
-    found = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
+    sensors = _joint_sensors("shaft bearing", "shaft damper" if scene.shaft_damping else "")
     for i in range(len(scene.blades)):
         if i in pitching(scene):
-            found += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else "")
+            sensors += _joint_sensors(f"pitch bearing {i + 1}", f"pitch spring {i + 1}" if is_driven(scene, i) else "")
             continue
         point = list(on_body(scene, i, scene.blades[i].centre_of_mass)[1] - hub.com)
         for name, output in _motion_outputs(scene, i).items():
-            found.append(sensor(name, "SensorBody", output, bodyNumber=Ref("object", "hub"), localPosition=point))
-    return found
+            sensors.append(sensor(name, "SensorBody", output, bodyNumber=Ref("object", "hub"), localPosition=point))
+    return sensors
 
 
 def _joint_sensors(joint: str, connector: str) -> list[Part]:

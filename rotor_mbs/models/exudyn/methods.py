@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # the list of methods needs none of them
 
 # The engine takes a run as ended within 1e-10 s of its end, whatever the step.
 _SHORTEST_INTERVAL = 1e-8
-_MOST_STEPS = 1e9
+_MAX_STEPS = 1e9
 _LINEARIZATION = "rotor_mbs.models.exudyn.linearization"
 
 _NODE = choice("euler_parameters", ("euler_parameters", "rotation_vector"), doc="coordinates of a body's rotation")
@@ -49,9 +49,17 @@ class ChainNewmarkSettings(schemes.NewtonSettings):
 
 
 class MultibodySolver:
-    """See `rotor_mbs.methods.base.Solver`. rows_between: the reading needs rows between samples too.
+    """See `rotor_mbs.methods.base.Solver`.
 
-    Raises MethodRefusal, with the engine's reason, where the engine does not take the parts.
+    Parameters
+    ----------
+    reading : from the recorded rows to the trajectory
+    rows_between : whether the reading needs rows between samples too
+
+    Raises
+    ------
+    MethodRefusal
+        With the engine's reason, where the engine does not take the parts.
     """
 
     def __init__(
@@ -122,8 +130,8 @@ def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
         raise MethodRefusal(f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart")
     scheme = settings.scheme()
-    if scheme.step is not None and scene.duration / scheme.step > _MOST_STEPS:
-        raise InputError(f"setting step: {scheme.step:g} s makes more than {_MOST_STEPS:g} steps")
+    if scheme.step is not None and scene.duration / scheme.step > _MAX_STEPS:
+        raise InputError(f"setting step: {scheme.step:g} s makes more than {_MAX_STEPS:g} steps")
     return scheme
 
 

@@ -1,4 +1,4 @@
-"""Moments over time as load functions of the engine: which loads drive which coordinate. Knows no engine."""
+"""Moments over time as load functions of the engine: which loads drive which coordinate."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class Drive(NamedTuple):
 def drives(scene: Scene) -> list[Drive]:
     """Torques, and the moments k r of springs whose rest angle r changes over time; one that is constant is the
     spring's own."""
-    found = [Drive(0, ROTOR, 1.0)] if scene.has_torque else []
+    all_drives = [Drive(0, ROTOR, 1.0)] if scene.has_torque else []
     for column in scene.moving_coordinates[1:]:
         torque, rest = scene.pitch_load(column - 1)
         if torque:
-            found.append(Drive(column, 2 * column - 1, 1.0))
+            all_drives.append(Drive(column, 2 * column - 1, 1.0))
         if not is_constant(rest):
-            found.append(Drive(column, 2 * column, scene.bearing(column - 1)[0]))
-    return found
+            all_drives.append(Drive(column, 2 * column, scene.bearing(column - 1)[0]))
+    return all_drives
 
 
 class Loads:
@@ -48,7 +48,10 @@ class Loads:
 class Moment:
     """A moment as a load function of the engine: the sum of factors times loads.
 
-    terms    (place in `Scene.load_tables`, factor); the factor of a rest angle is the spring's stiffness, N m/rad
+    Attributes
+    ----------
+    loads : over time
+    terms : (place in `Scene.load_tables`, factor); the factor of a rest angle is the spring's stiffness, N m/rad
     """
 
     loads: Loads
@@ -67,9 +70,9 @@ class Moment:
 
 def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
     """Of all that drives a coordinate (0: rotor)."""
-    return Moment(loads, tuple((one.load, one.factor) for one in drives(scene) if one.coordinate == coordinate))
+    return Moment(loads, tuple((drive.load, drive.factor) for drive in drives(scene) if drive.coordinate == coordinate))
 
 
 def is_driven(scene: Scene, blade: int) -> bool:
     """Whether a spring, a damper or a torque acts on the pitch of a blade."""
-    return any(scene.bearing(blade)) or any(one.coordinate == 1 + blade for one in drives(scene))
+    return any(scene.bearing(blade)) or any(drive.coordinate == 1 + blade for drive in drives(scene))

@@ -1,7 +1,4 @@
-"""The engine's time integrations as data: which solver, which options, and the settings a user may choose.
-
-Knows no engine and no model.
-"""
+"""The engine's time integrations as data: which solver, which options, and the settings a user may choose."""
 
 from __future__ import annotations
 
@@ -15,11 +12,17 @@ _END_ACCELERATIONS = "explicit.computeEndOfStepAccelerations"
 
 @dataclass(frozen=True)
 class Scheme:
-    """A time integration: the engine's name of the solver, its stages (0: implicit), its options by dotted path.
+    """A time integration.
 
-    step is the largest step in s, or None where the scheme chooses its own; it is then given up after `trial_steps`
-    trials within one integration interval (the engine itself repeats a rejected smallest step for ever).
-    refinement: how many equal steps take the place of each step that fits the sample interval.
+    Attributes
+    ----------
+    solver : the engine's name of it.
+    stages : evaluations in a step; 0 for an implicit one.
+    options : by dotted path below the engine's settings of a time integration.
+    step : s, the largest; None where the scheme chooses its own.
+    trial_steps : of a scheme that chooses its step: trials within one integration interval after which the run is given
+        up (the engine itself repeats a rejected smallest step for ever).
+    refinement : how many equal steps take the place of each step that fits the sample interval.
     """
 
     solver: str
@@ -35,7 +38,7 @@ class Scheme:
 
     @property
     def lacks_initial_accelerations(self) -> bool:
-        """Whether accelerations are wanted of a solver that knows none before its first step."""
+        """Whether accelerations are wanted of a solver that has none before its first step."""
         return bool(self.options.get(_END_ACCELERATIONS))
 
 

@@ -1,6 +1,6 @@
 """A scene as a Python script for Exudyn that needs nothing of this package: the kinematic tree, the same step.
 
-Its text is `script.py.txt`. Knows the tree's parts and the engine's names as words only.
+Its text is `script.py.txt`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.models.exudyn import tree
-from rotor_mbs.models.exudyn.blueprint import LISTS, Part, Ref
+from rotor_mbs.models.exudyn.blueprint import LISTS, Ref
 from rotor_mbs.models.exudyn.geometry import pitching
 from rotor_mbs.models.exudyn.moments import Loads, Moment
 from rotor_mbs.scenario.scene import Scene
@@ -32,6 +32,11 @@ def exudyn_script(scene: Scene) -> str:
     """The text of the script."""
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
     moving = [0, *(1 + i for i in pitching(scene))]
+    calls = []
+    for part in parts:
+        arguments = "".join(f"    {key}={_argument(key, value)},\n" for key, value in part.parameters.items())
+        call = f"number[{part.kind!r}, {part.name!r}] = mbs.Add{part.kind.capitalize()}({part.type}("
+        calls.append(f"# {_COMMENTS[part.kind]}\n{call}\n{arguments}))")
     template = Path(__file__).with_name("script.py.txt").read_text(encoding="utf-8")
     return Template(template).substitute(
         title=(scene.title or scene.name).replace("\\", "/").replace('"', "'"),
@@ -44,14 +49,8 @@ def exudyn_script(scene: Scene) -> str:
         angles=_value(list(map(float, scene.initial_angles))),
         rates=_value([float(rate) if i in moving else 0.0 for i, rate in enumerate(scene.initial_rates)]),
         moving=_value(moving),
-        parts="\n".join(_lines(part) for part in parts),
+        parts="\n".join(calls),
     )
-
-
-def _lines(part: Part) -> str:
-    arguments = "".join(f"    {key}={_argument(key, value)},\n" for key, value in part.parameters.items())
-    call = f"number[{part.kind!r}, {part.name!r}] = mbs.Add{part.kind.capitalize()}({part.type}("
-    return f"# {_COMMENTS[part.kind]}\n{call}\n{arguments}))"
 
 
 def _argument(key: str, value: Any) -> str:
@@ -59,8 +58,11 @@ def _argument(key: str, value: Any) -> str:
         return f"number[{value.kind!r}, {value.name!r}]"
     if callable(value):
         moment: Moment = value.__self__
-        sums = (f"{'' if factor == 1.0 else f'{factor!r} * '}now({load}, time)" for load, factor in moment.terms)
-        return f"lambda system, time, load: {' + '.join(sums)}"
+        terms = []
+        for load, factor in moment.terms:
+            term = f"now({load}, time)"
+            terms.append(term if factor == 1.0 else f"{factor!r} * {term}")
+        return f"lambda system, time, load: {' + '.join(terms)}"
     if key == "jointTypes":
         return f"[{', '.join(f'exu.JointType.{name}' for name in value)}]"
     return f"exu.{LISTS[key]}({_value(value)})" if key in LISTS else _value(value)

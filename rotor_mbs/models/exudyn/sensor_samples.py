@@ -1,4 +1,4 @@
-"""From the recorded rows of the sensors of both models to a trajectory. Knows no equations of motion."""
+"""From the recorded rows of the sensors of both models to a trajectory."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times
 
-Indices = NDArray[np.intp]
-
 
 class _Reader:
     """The rows of all sensors: once for each time, up to the last at which the state is finite."""
@@ -23,11 +21,18 @@ class _Reader:
     def __init__(self, scene: Scene, recorded: Callable[[str], Array], state: Iterable[str]) -> None:
         tables = {name: recorded(name) for name in state}
         time = next(iter(tables.values()))[:, 0]
-        kept = _distinct_rows(scene, time)
-        self._rows = kept[: finite_rows(*(table[kept] for table in tables.values()))]
+        # Two intervals share the row they meet at.
+        is_distinct = np.diff(time) > 1e-9 * scene.duration / (scene.samples - 1)
+        distinct = np.flatnonzero(np.concatenate([[True], is_distinct]))
+        self._rows = distinct[: finite_rows(*(table[distinct] for table in tables.values()))]
         self._tables, self._recorded = tables, recorded
         self.time = time[self._rows]
-        self.samples = _sample_rows(scene, self.time)
+        # The row of each sample, as far as they were reached without a gap.
+        wanted, slack = sample_times(scene), 1e-6 * scene.duration / (scene.samples - 1)
+        rows = np.searchsorted(self.time, wanted - slack)
+        met = rows < len(self.time)
+        met[met] = np.abs(self.time[rows[met]] - wanted[met]) <= slack
+        self.samples: NDArray[np.intp] = rows if met.all() else rows[: int(np.argmin(met))]
 
     def all(self, name: str) -> Array:
         """(n, k): every kept row."""
@@ -54,12 +59,18 @@ def tree_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callabl
 def chain_trajectory(scene: Scene, segments: Sequence[Segment], recorded: Callable[[str], Array]) -> Trajectory:
     """Joint angles from the bodies' rotation matrices, rates from their angular velocities, and the joints' gaps."""
     placed = chain.placed_bodies(scene)
-    bodies = [(each.name, each.body) for each in placed]
+    bodies = [(part.name, part.body) for part in placed]
     state = [f"{name} {what}" for name, _ in bodies for what in ("position", "rotation", "spin")]
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
     fields = _fields(scene, segments, read, angles, rates, bodies)
-    fields["constraint_error"] = _largest_gap(read, bodies)
+    # Every body's hub centre, which the joints keep together with the ground's and the hub's.
+    hub, *blades = (
+        read.sampled(f"{name} position") - matrices(read.sampled(f"{name} rotation")) @ body.com
+        for name, body in bodies
+    )
+    gaps = [hub, *(blade - hub for blade in blades)]
+    fields["constraint_error"] = np.asarray(np.max([np.linalg.norm(gap, axis=1) for gap in gaps], axis=0))
     if scene.wants("loads"):
         fields |= chain_loads(scene, read.sampled)
     return finite_samples(scene, fields)
@@ -87,17 +98,6 @@ def _dot(a: Array, b: Array) -> Array:
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
-def _largest_gap(read: _Reader, bodies: Sequence[tuple[str, Body]]) -> Array:
-    """(samples,) m: every body's hub centre, which the joints hold together with the ground's and the hub's."""
-    centres = []
-    for name, body in bodies:
-        rotation = matrices(read.sampled(f"{name} rotation"))
-        centres.append(read.sampled(f"{name} position") - rotation @ body.com)
-    hub, *blades = centres
-    gaps = [hub, *(blade - hub for blade in blades)]
-    return np.asarray(np.max([np.linalg.norm(gap, axis=1) for gap in gaps], axis=0))
-
-
 def _fields(
     scene: Scene,
     segments: Sequence[Segment],
@@ -117,39 +117,16 @@ def _fields(
         if any(scene.bearing_rest):
             fields["work"] += of_rests
         fields["kinetic_energy"] = np.zeros(len(read.samples))
+        # ½ m v² and m g z of each centre of mass, ½ ω·J ω in the body's own frame.
         for name, body in bodies:
-            _add_energies(scene, fields, read, name, body)
+            if body.mass:
+                velocity, position = read.sampled(f"{name} velocity"), read.sampled(f"{name} position")
+                fields["kinetic_energy"] += 0.5 * body.mass * np.sum(velocity * velocity, axis=1)
+                fields["potential_energy"] += body.mass * scene.gravity * position[:, 2]
+            if np.any(body.inertia):
+                spin = read.sampled(f"{name} spin")
+                fields["kinetic_energy"] += 0.5 * np.sum(spin @ body.inertia * spin, axis=1)
     return fields
-
-
-def _add_energies(scene: Scene, fields: dict[str, Array], read: _Reader, name: str, body: Body) -> None:
-    """Adds a body's energies: ½ m v² and m g z of its centre of mass, ½ ω·J ω in its own frame."""
-    if body.mass:
-        velocity, position = read.sampled(f"{name} velocity"), read.sampled(f"{name} position")
-        fields["kinetic_energy"] += 0.5 * body.mass * np.sum(velocity * velocity, axis=1)
-        fields["potential_energy"] += body.mass * scene.gravity * position[:, 2]
-    if np.any(body.inertia):
-        spin = read.sampled(f"{name} spin")
-        fields["kinetic_energy"] += 0.5 * np.sum(spin @ body.inertia * spin, axis=1)
-
-
-# From recorded rows to samples: which rows are samples, angles over many turns, where a run stopped being finite.
-
-
-def _distinct_rows(scene: Scene, time: Array) -> Indices:
-    """Indices of the rows to keep: two intervals share the row they meet at."""
-    slack = 1e-9 * scene.duration / (scene.samples - 1)
-    return np.flatnonzero(np.concatenate([[True], np.diff(time) > slack]))
-
-
-def _sample_rows(scene: Scene, time: Array) -> Indices:
-    """Row of each sample, as far as they were reached without a gap."""
-    wanted = sample_times(scene)
-    slack = 1e-6 * scene.duration / (scene.samples - 1)
-    rows = np.searchsorted(time, wanted - slack)
-    met = rows < len(time)
-    met[met] = np.abs(time[rows[met]] - wanted[met]) <= slack
-    return rows if met.all() else rows[: int(np.argmin(met))]
 
 
 def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:

@@ -1,6 +1,6 @@
 """The rotor as a kinematic tree: hub and blades as links, rotor angle and pitch angles as the only coordinates.
 
-Knows the engine through the blueprint alone. Exact zeros stay exact: no coordinate is ever computed from another.
+Exact zeros stay exact: no coordinate is ever computed from another.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _NODE = Ref("node", "joint angles")
 
 
 def parts(scene: Scene, loads: Loads) -> list[Part]:
-    """Everything the engine holds for this scene, in the order it is built."""
+    """Everything the engine has of this scene, in the order it is built."""
     built = [_node(scene), _tree(scene)]
     for number, column in enumerate(scene.moving_coordinates):
         moment = moment_on(scene, loads, column)
@@ -37,7 +37,12 @@ def parts(scene: Scene, loads: Loads) -> list[Part]:
             built.append(_link_sensor(f"tip {i + 1}", "Position", *on_body(scene, i, blade.tip)))
     if scene.wants("energy"):
         for link, body in enumerate(bodies(scene)):
-            built += _energy_sensors(link, body)
+            name = link_name(link)
+            if body.mass:  # a hub without mass needs no path of its centre of mass
+                built.append(_link_sensor(f"{name} position", "Position", link, body.com))
+                built.append(_link_sensor(f"{name} velocity", "Velocity", link, body.com))
+            if np.any(body.inertia):
+                built.append(_link_sensor(f"{name} spin", "AngularVelocityLocal", link, np.zeros(3)))
     if scene.wants("loads"):
         built += tree_sensors(scene, _link_sensor)
     return built
@@ -57,8 +62,8 @@ def _node(scene: Scene) -> Part:
     moving = scene.moving_coordinates
     parameters = {
         "referenceCoordinates": [0.0] * len(moving),
-        "initialCoordinates": [scene.initial_angles[j] for j in moving],
-        "initialCoordinates_t": [scene.initial_rates[j] for j in moving],
+        "initialCoordinates": [scene.initial_angles[column] for column in moving],
+        "initialCoordinates_t": [scene.initial_rates[column] for column in moving],
         "numberOfODE2Coordinates": len(moving),
     }
     return Part("node", _NODE.name, "NodeGenericODE2", parameters, f"{len(moving)} coordinates")
@@ -99,17 +104,6 @@ def _torque(name: str, where: str, coordinate: int, moment: Moment, is_fixed: bo
     if not is_fixed:
         load["loadUserFunction"] = moment.scalar
     return [marker, Part("load", name, "LoadCoordinate", load, "constant" if is_fixed else "over time")]
-
-
-def _energy_sensors(link: int, body: Body) -> list[Part]:
-    """What this link's energies need: a hub without mass needs no path of its centre of mass."""
-    name, sensors = link_name(link), []
-    if body.mass:
-        sensors.append(_link_sensor(f"{name} position", "Position", link, body.com))
-        sensors.append(_link_sensor(f"{name} velocity", "Velocity", link, body.com))
-    if np.any(body.inertia):
-        sensors.append(_link_sensor(f"{name} spin", "AngularVelocityLocal", link, np.zeros(3)))
-    return sensors
 
 
 def _link_sensor(name: str, quantity: str, link: int, point: Array) -> Part:

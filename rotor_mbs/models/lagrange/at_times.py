@@ -22,9 +22,12 @@ _DOP853 = (1e-12, 1e-14)
 
 
 def motion_at(scene: Scene, times: Array, equations: Accelerations | None = None) -> Trajectory:
-    """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early.
+    """The motion at chosen times; fewer rows where it ends early.
 
-    equations: in place of the closed form, with its signature; one of `LEFT_OUT`, or of `at_azimuths`
+    Parameters
+    ----------
+    times : (n,) s, increasing from 0 up to the duration at most
+    equations : in place of the closed form, with its signature; one of `LEFT_OUT`, or of `at_azimuths`
     """
     if equations is None and is_available():
         # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
@@ -38,7 +41,7 @@ def motion_at(scene: Scene, times: Array, equations: Accelerations | None = None
 
 def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
     """The closed form with each blade at another angle about the shaft than `Scene.phases`: (blades,) rad."""
-    form = rotor_form(scene, phases=[(Fraction(math.cos(one)), Fraction(math.sin(one))) for one in azimuths])
+    form = rotor_form(scene, phases=[(Fraction(math.cos(angle)), Fraction(math.sin(angle))) for angle in azimuths])
     return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, form, *rest)
 
 

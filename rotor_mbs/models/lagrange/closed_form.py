@@ -1,7 +1,7 @@
 """The closed form: accelerations by an arrowhead solve, energies, tip. One text for NumPy, SciPy and heyoka.
 
 Every function takes numbers of any kind that knows + - * / (floats, arrays, quad precision, symbolic expressions)
-together with a sine and a cosine for that kind, and contains no branch on a value. Knows no integrator.
+together with a sine and a cosine for that kind, and contains no branch on a value.
 
 Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ.
 T = ½ J_hub Ω² + ½ Σ ω·J ω with ω = (Ω s, Ω c, θ̇) and J the blade's inertia about the hub centre, so
@@ -25,9 +25,11 @@ Function = Callable[[Any], Any]
 class LoadValues:
     """Loads at one time, or over time as arrays.
 
-    rotor     N m on the rotor
-    pitches   (form.blades,) N m between hub and blade; () for none
-    rests     (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
+    Attributes
+    ----------
+    rotor : N m on the rotor
+    pitches : (form.blades,) N m between hub and blade; () for none
+    rests : (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
     """
 
     rotor: Number
@@ -44,11 +46,14 @@ def load_values(values: Sequence[Any]) -> LoadValues:
 def accelerations(
     angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> list[Number]:
-    """Rotor, then pitch accelerations in rad/s².
+    """Rotor, then pitch accelerations in rad/s², by Lagrange's equations of T - V above.
 
-    angles, rates   1 + len(form.blades) numbers, rad and rad/s: rotor, then the pitches that move
+    Singular where S = 0: point-mass blades all at ±π/2 on a massless hub.
 
-    Source: Lagrange's equations of T - V above. Singular where S = 0: point-mass blades all at ±π/2 on a massless hub.
+    Parameters
+    ----------
+    angles, rates : 1 + len(form.blades) numbers, rad and rad/s: rotor, then the pitches that move
+    sin, cos : of the same kind of numbers
     """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
@@ -79,11 +84,11 @@ def accelerations(
         moment = moment + (c * rotor_c + s * rotor_s) + ratio * resistance
         schur = schur + (blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c))
     rotor = moment / schur
-    found = [rotor]
+    result = [rotor]
     for blade, (s, c, on_s, on_c, resistance) in zip(form.blades, pitched, strict=True):
         driven = s * (on_s - blade.coupling_s * rotor) + c * (on_c - blade.coupling_c * rotor)
-        found.append((driven - resistance) / blade.pitch_inertia)
-    return found
+        result.append((driven - resistance) / blade.pitch_inertia)
+    return result
 
 
 def pitches(

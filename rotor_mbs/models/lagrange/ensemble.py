@@ -37,9 +37,9 @@ _HUGE = 1e13
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
 # Samples of all runs side by side: what is worked on stays near the processor.
-_AT_ONCE = 4096
+_SAMPLES_PER_CHUNK = 4096
 # Samples of a run whose tips and energies are evaluated at once, with the rotor's numbers anew for each of them.
-_OBSERVED_AT_ONCE = 1024
+_OBSERVED_PER_CALL = 1024
 
 
 def empty_block(scenes: Sequence[Scene]) -> RunBlock:
@@ -145,30 +145,31 @@ def _observables(example: Scene) -> Any:
     rates = hamilton.rates(angles, momenta, form, engine.sin, engine.cos)
     moving = dict(zip(example.moving_coordinates, angles, strict=True))
     pitches = [moving[i] if i in moving else parameters.own(Fraction(0)) for i in range(1, 1 + len(example.blades))]
-    found: list[Any] = [*rates]
+    observables: list[Any] = [*rates]
     for i, point in enumerate(points):
         azimuth = angles[0] + example.phases[i]
-        found += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos)
+        observables += closed_form.point_path(azimuth, pitches[i], point, engine.sin, engine.cos)
     if example.wants("energy"):
-        found += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
+        observables += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
     # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
-    rows = [engine.expression(0.0) + row for row in found]
+    rows = [engine.expression(0.0) + row for row in observables]
     return engine.cfunc(rows, [*angles, *momenta], compact_mode=is_compact(example))
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
     """(rows, runs, samples): what a compiled function gives, such as x y z in m of each tip, or the energies in J.
 
-    states    (variables, runs, samples): of what moves, angles in rad, then rates or momenta
-    numbers   (parameters, runs): of equations and tips, then the pitches that are fixed
-    The runs must fill the processor's lanes, once or more: what is left over is rounded by other instructions.
+    `states` are (variables, runs, samples), of what moves: angles in rad, then rates or momenta; `numbers` are
+    (parameters, runs), of equations and tips, then the pitches that are fixed. The runs must fill the processor's
+    lanes, once or more: what is left over is rounded by other instructions.
     """
     _, runs, samples = states.shape
     parts = []
-    for i in range(0, samples, _OBSERVED_AT_ONCE):
-        part = states[: function.nvars, :, i : i + _OBSERVED_AT_ONCE]
+    for i in range(0, samples, _OBSERVED_PER_CALL):
+        part = states[: function.nvars, :, i : i + _OBSERVED_PER_CALL]
         spread = np.broadcast_to(numbers[: function.nparams, :, None], (function.nparams, runs, part.shape[2]))
-        inputs, pars = (np.ascontiguousarray(each).reshape(len(each), -1) for each in (part, spread))
+        inputs = np.ascontiguousarray(part).reshape(len(part), -1)
+        pars = np.ascontiguousarray(spread).reshape(len(spread), -1)
         parts.append(function(inputs, pars=pars, batch_parallel=False).reshape(-1, runs, part.shape[2]))
     return np.concatenate(parts, axis=2)
 
@@ -176,10 +177,12 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 class _Group:
     """Runs of one structure, and the compiled code for them.
 
-    places, scenes   of each run, in the block
-    initial          (variables, k) state
-    times            (samples, k) s
-    numbers          (parameters, k) of the rotor, then the pitches that are fixed
+    Attributes
+    ----------
+    places, scenes : of each run, in the block
+    initial : (variables, k) state
+    times : (samples, k) s
+    numbers : (parameters, k) of the rotor, then the pitches that are fixed
     """
 
     def __init__(
@@ -219,17 +222,22 @@ class _Group:
                 message = failure(result[0])
                 integrations.append(Integration(not message, message, 0.0, int(result[3])))
         states[:, :, 0] = start  # which a run that fails in its first step has, too
-        found = _observed(self.observables, states, numbers)
-        states[half : 2 * half] = found[:half]
+        observed = _observed(self.observables, states, numbers)
+        states[half : 2 * half] = observed[:half]
         states[:, :, 0] = initial
-        return states, found[half:], integrations
+        return states, observed[half:], integrations
 
     def put(
-        self, block: RunBlock, columns: Sequence[int], states: Array, found: Array, integrations: Sequence[Integration]
+        self,
+        block: RunBlock,
+        columns: Sequence[int],
+        states: Array,
+        observed: Array,
+        integrations: Sequence[Integration],
     ) -> None:
-        """The runs of the first len(integrations) columns into the block; states, found: as of `solve`."""
+        """The runs of the first len(integrations) columns into the block; states, observed: as of `solve`."""
         runs, count = len(integrations), len(self.moving)
-        states, found = states[:, :runs], found[:, :runs]
+        states, observed = states[:, :runs], observed[:, :runs]
         places, scenes = [self.places[i] for i in columns[:runs]], [self.scenes[i] for i in columns[:runs]]
         angles, rates = block.quantities["angles"], block.quantities["rates"]
         angles[places] = np.array([scene.initial_angles for scene in scenes])[:, None]
@@ -240,10 +248,10 @@ class _Group:
         if "tip" in block.quantities:
             tip = block.quantities["tip"].reshape(*block.time.shape, -1)
             rows = tip.shape[2]
-            tip[places] = found[:rows].transpose(1, 2, 0)
+            tip[places] = observed[:rows].transpose(1, 2, 0)
         if "work" in block.quantities:
             kinetic, potential, work = (block.quantities[name] for name in _ENERGIES)
-            kinetic[places], potential[places] = found[rows], found[rows + 1]
+            kinetic[places], potential[places] = observed[rows], observed[rows + 1]
             has_work = len(states) > 2 * count
             for i, place in enumerate(places):
                 work[place] = states[2 * count, i] if has_work else constant_work(scenes[i], angles[place])
@@ -256,19 +264,19 @@ def _propagate(block: RunBlock, group: _Group) -> None:
     """All its runs into the block."""
     width = group.integrator.state.shape[1]
     runs = len(group.scenes)
-    at_once = max(_AT_ONCE // len(group.times) // width, 1) * width
-    for start in range(0, runs, at_once):
-        columns = list(range(start, min(start + at_once, runs)))
+    chunk = max(_SAMPLES_PER_CHUNK // len(group.times) // width, 1) * width
+    for start in range(0, runs, chunk):
+        columns = list(range(start, min(start + chunk, runs)))
         padded = columns + [columns[-1]] * (-len(columns) % width)
-        states, found, integrations = group.solve(padded)
-        group.put(block, padded, states, found, integrations[: len(columns)])
+        states, observed, integrations = group.solve(padded)
+        group.put(block, padded, states, observed, integrations[: len(columns)])
         affected = {i // width for i in np.flatnonzero(~_are_independent(states, integrations)).tolist()}
         for i in [i for i in range(len(columns)) if i // width in affected]:
             # One lane's failure ends all lanes: each runs again with itself alone in every lane.
             alone = [columns[i]] * width
-            states, found, integrations = group.solve(alone)
+            states, observed, integrations = group.solve(alone)
             states[:, np.maximum.accumulate(~np.isfinite(states).all(axis=0), axis=1)] = np.nan
-            group.put(block, alone, states, found, integrations[:1])
+            group.put(block, alone, states, observed, integrations[:1])
 
 
 def _are_independent(states: Array, integrations: Sequence[Integration]) -> NDArray[np.bool_]:
@@ -276,5 +284,5 @@ def _are_independent(states: Array, integrations: Sequence[Integration]) -> NDAr
     sizes = np.maximum(states.max(axis=2), -states.min(axis=2))  # NaN where a sample is
     angles = sizes[: len(sizes) // 2]
     independent = (angles < _HUGE).all(axis=0) & np.isfinite(sizes).all(axis=0)
-    found: NDArray[np.bool_] = independent & np.array([integration.success for integration in integrations])
-    return found
+    succeeded = np.array([integration.success for integration in integrations])
+    return np.asarray(independent & succeeded)

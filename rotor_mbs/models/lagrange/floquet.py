@@ -36,7 +36,7 @@ from rotor_mbs.solution.trajectory import Array
 # state counts as periodic below the second. (A multiplier of 1e9 amplifies the rounding of 1e-16 to 1e-7.)
 _CLOSED = 1e-13
 _ACCEPTED = 1e-9
-_CORRECTIONS = 12
+_MAX_CORRECTIONS = 12
 # Of the integrator: a turn of a stiff bearing takes about two steps for each of its oscillations; a rotor that has
 # left for good takes more and more.
 _STEPS, _STEPS_PER_OSCILLATION = 500, 10
@@ -48,17 +48,19 @@ _LOST = 20.0
 class Turn:
     """A motion that repeats itself after a turn, and how small departures from it grow over that turn.
 
-    speed       rad/s, of the rotor, averaged over the turn
-    start       (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
-    torque      N m on the rotor, constant: what the dampers take in a turn is put in by it
-    transition  (2n, 2n) state transition matrix over the turn
-    gradient    (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where
-                dampers take energy
-    flow        (2n,) time derivative of the state at the start
-    trace_integral  ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the
-                determinant of `transition`, computed without it
-    mismatch    largest difference between end and start: rad, and rates as shares of the speed
-    message     why no periodic motion was found; "" where it was
+    Attributes
+    ----------
+    speed : rad/s, of the rotor, averaged over the turn
+    start : (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
+    torque : N m on the rotor, constant: what the dampers take in a turn is put in by it
+    transition : (2n, 2n) state transition matrix over the turn
+    gradient : (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where dampers
+        take energy
+    flow : (2n,) time derivative of the state at the start
+    trace_integral : ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the
+        determinant of `transition`, computed without it
+    mismatch : largest difference between end and start: rad, and rates as shares of the speed
+    message : why no periodic motion was found; "" where it was
     """
 
     speed: float
@@ -73,11 +75,19 @@ class Turn:
 
 
 def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:
-    """The periodic motion of `scene` at a mean `speed` > 0 rad/s, its rotor starting at the scene's initial angle.
+    """The periodic motion of `scene` at a mean speed, its rotor starting at the scene's initial angle.
 
-    Found by Newton's method from `guess`, or from steady rotation without gravity. The constant torque is an unknown.
+    By Newton's method; the constant torque is an unknown. Where there is no such motion, `message` says why.
 
-    Where there is none, `message` says why. Raises MethodRefusal where heyoka is not installed.
+    Parameters
+    ----------
+    speed : rad/s, above 0
+    guess : motion at a speed nearby to start from; None for steady rotation without gravity
+
+    Raises
+    ------
+    MethodRefusal
+        Where heyoka is not installed.
     """
     try:
         return _closed_turn(scene, speed, guess)
@@ -101,7 +111,7 @@ def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
     shift = np.zeros(2 * n)
     shift[0] = 2.0 * math.pi
     best: Turn | None = None
-    for _ in range(_CORRECTIONS):
+    for _ in range(_MAX_CORRECTIONS):
         end, derivatives, trace = system.propagate(state, torque, period)
         by_state, by_torque = derivatives[:, :-1], derivatives[:, -1]
         residual = (end - state - shift) / units
@@ -129,8 +139,8 @@ def _invariants(scene: Scene, state: Array, torque: float) -> tuple[Array, Array
     gradient = (kinetic + potential).slope
     gradient[:n] -= [torque, *loads.pitches]
     angles, rates = state[:n].tolist(), state[n:].tolist()
-    found = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
-    return (np.zeros(2 * n) if scene.has_damping else gradient), np.array([*rates, *found])
+    accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
+    return (np.zeros(2 * n) if scene.has_damping else gradient), np.array([*rates, *accelerations])
 
 
 class _Variational:
@@ -146,11 +156,12 @@ class _Variational:
         symbols = engine.make_vars(*(f"q{i}" for i in range(n)), *(f"w{i}" for i in range(n)))
         angles, rates = symbols[:n], symbols[n:]
         loads = load_values([torque, *pitch_loads])
-        found = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
-        equations = [*zip(symbols, [*rates, *found], strict=True)]
+        accelerations = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
+        equations = [*zip(symbols, [*rates, *accelerations], strict=True)]
 
         def make() -> object:
-            trace = engine.sum([engine.diff(each, rate) for each, rate in zip(found, rates, strict=True)])
+            diagonal = zip(accelerations, rates, strict=True)
+            trace = engine.sum([engine.diff(acceleration, rate) for acceleration, rate in diagonal])
             system = engine.var_ode_sys(equations, args=[*symbols, torque], order=1).sys
             system.append((engine.make_vars("trace"), trace))
             return engine.taylor_adaptive(system, state=np.zeros(len(system)), compact_mode=True)
@@ -169,11 +180,11 @@ class _Variational:
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0
         integrator.state[:] = np.concatenate([state, np.eye(count, count + 1).ravel(), [0.0]])
-        most = int(_STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi))
-        message = failure(integrator.propagate_until(period, max_steps=most)[0])
+        max_steps = int(_STEPS + _STEPS_PER_OSCILLATION * self._frequency * period / (2.0 * math.pi))
+        message = failure(integrator.propagate_until(period, max_steps=max_steps)[0])
         if "step_limit" in message:
-            message = f"no periodic motion found: a turn takes more than {most} steps"
+            message = f"no periodic motion found: a turn takes more than {max_steps} steps"
         if message:
             raise InputError(message)
-        whole = np.array(integrator.state)
-        return whole[:count], whole[count:-1].reshape(count, count + 1), float(whole[-1])
+        result = np.array(integrator.state)
+        return result[:count], result[count:-1].reshape(count, count + 1), float(result[-1])

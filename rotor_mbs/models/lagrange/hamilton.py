@@ -18,14 +18,14 @@ Numbers = Sequence[Any]
 
 def momenta(angles: Numbers, rates: Numbers, form: RotorForm, sin: Function, cos: Function) -> list[Any]:
     """(1 + blades) kg m²/s."""
-    spin, total, found = rates[0], form.inertia * rates[0], []
+    spin, total, of_pitches = rates[0], form.inertia * rates[0], []
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
         s, c = sin(theta), cos(theta)
         b = blade.coupling_s * s + blade.coupling_c * c
         total = total + (blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)) * spin
         total = total + b * rate
-        found.append(b * spin + blade.pitch_inertia * rate)
-    return [total, *found]
+        of_pitches.append(b * spin + blade.pitch_inertia * rate)
+    return [total, *of_pitches]
 
 
 def rates(angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos: Function) -> list[Any]:
@@ -47,7 +47,7 @@ def forces(
 ) -> list[Any]:
     """(1 + blades) N m: time derivatives of the momenta."""
     sine, cosine = sin(angles[0]), cos(angles[0])
-    spin, found = rates[0], []
+    spin, of_pitches = rates[0], []
     moment = loads.rotor - form.shaft_damping * spin
     for weight, cos_phase, sin_phase in form.fixed:
         moment = moment + weight * (sine * cos_phase + cosine * sin_phase)
@@ -59,5 +59,5 @@ def forces(
         half_slope = blade.half_slope_sc * (s * c) + blade.half_slope_cs * (c * c - s * s)
         force = spin * (half_slope * spin + (blade.coupling_s * c - blade.coupling_c * s) * rate)
         force = force - sin_phi * (blade.weight_x * s + blade.weight_y * c)
-        found.append(force - blade.stiffness * (theta - rest) - blade.damping * rate + torque)
-    return [moment, *found]
+        of_pitches.append(force - blade.stiffness * (theta - rest) - blade.damping * rate + torque)
+    return [moment, *of_pitches]

@@ -46,9 +46,11 @@ def compile_anew() -> None:
 class Parameters:
     """Turns numbers into runtime parameters: equal ones share a parameter, exact zeros vanish from the equations.
 
-    values      the numbers, by parameter index
-    structure   the index (-1: zero) of every number in the order asked for; equal structures give equal equations,
-                so that one compiled integrator serves every scene of that structure
+    Attributes
+    ----------
+    values : the numbers, by parameter index
+    structure : the index (-1: zero) of every number in the order asked for; equal structures give equal equations, so
+        that one compiled integrator serves every scene of that structure
     """
 
     def __init__(self) -> None:

@@ -23,13 +23,13 @@ from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.trajectory import Array
 
 # rad: a step of Newton's method below this is followed by three more, and the state is found.
-_CLOSE = 1e-6
-_STEPS = 200
+_SMALL_STEP = 1e-6
+_MAX_STEPS = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Jet:
-    """A number with its partial derivatives: value, slope (k,) of first order, curvature (k, k) of second order."""
+    """A number with its partial derivatives: slope (k,) of first order, curvature (k, k) of second order."""
 
     value: float
     slope: Array
@@ -77,11 +77,13 @@ class Jet:
 
 
 def sine(x: Jet) -> Jet:
+    """sin x with its derivatives."""
     s, c = math.sin(x.value), math.cos(x.value)
     return x.function(s, c, -s)
 
 
 def cosine(x: Jet) -> Jet:
+    """cos x with its derivatives."""
     s, c = math.sin(x.value), math.cos(x.value)
     return x.function(c, -s, -c)
 
@@ -89,11 +91,17 @@ def cosine(x: Jet) -> Jet:
 def linearize(
     scene: Scene, angles: Sequence[float] | Array, rates: Sequence[float] | Array, torque: float
 ) -> Linearization:
-    """The closed form linearized about `angles` (1 + blades,) rad and `rates` rad/s, under `torque` N m on the rotor.
+    """The closed form linearized in `scene.moving_coordinates`; pitch torques and rest angles are those at t = 0.
 
-    Its coordinates are `scene.moving_coordinates`. Pitch torques and rest angles are those at t = 0.
+    Parameters
+    ----------
+    angles, rates : (1 + blades,) rad and rad/s
+    torque : N m on the rotor
 
-    Raises ZeroDivisionError at the singular configuration.
+    Raises
+    ------
+    ZeroDivisionError
+        At the singular configuration.
 
     Examples
     --------
@@ -106,9 +114,9 @@ def linearize(
     n = len(columns)
     state = Jet.variables([*(angles[i] for i in columns), *(rates[i] for i in columns)])
     loads = loads_at_start(scene, torque)
-    found = closed_form.accelerations(state[:n], state[n:], form, loads, sine, cosine)
-    slopes = np.array([each.slope for each in found])
-    return Linearization(-slopes[:, :n], -slopes[:, n:], np.array([each.value for each in found]))
+    accelerations = closed_form.accelerations(state[:n], state[n:], form, loads, sine, cosine)
+    slopes = np.array([jet.slope for jet in accelerations])
+    return Linearization(-slopes[:, :n], -slopes[:, n:], np.array([jet.value for jet in accelerations]))
 
 
 def holding_torque(scene: Scene, speed: float) -> float:
@@ -143,21 +151,27 @@ def _stationary(scene: Scene, speed: float, *, fixed_rotor: bool) -> Array:
     angles = np.array(scene.initial_angles, dtype=float)
     free = slice(1, None) if fixed_rotor else slice(None)
     changed = columns[free]
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         potential = amended_potential(form, angles[columns], speed, loads)
         step = _newton_step(form, potential, free, downhill=True)
-        if np.abs(step).max(initial=0.0) < _CLOSE:
+        if np.abs(step).max(initial=0.0) < _SMALL_STEP:
             for _ in range(3):
                 potential = amended_potential(form, angles[columns], speed, loads)
                 angles[changed] += _newton_step(form, potential, free, downhill=False)
-            return _steady(scene, angles, speed)
+            # The accelerations must say so, too: they keep differences that the energies' rounding hides.
+            linear = linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], holding_torque(scene, speed))
+            if np.abs(linear.residual).max() > 1e-9 * np.abs(linear.stiffness).max():
+                raise InputError(
+                    f"{scene.name}: the steady state at {speed:g} rad/s is lost in the rounding of the energies"
+                )
+            return angles
         trial = angles.copy()
         for halving in range(30):
             trial[changed] = angles[changed] + 0.5**halving * step
             if _is_lower(amended_potential(form, trial[columns], speed, loads), potential, step, free):
                 break
         angles = trial
-    raise InputError(f"{scene.name}: no steady state at {speed:g} rad/s found in {_STEPS} steps from its start")
+    raise InputError(f"{scene.name}: no steady state at {speed:g} rad/s found in {_MAX_STEPS} steps from its start")
 
 
 def _is_lower(trial: Jet, start: Jet, step: Array, free: slice) -> bool:
@@ -182,18 +196,12 @@ def amended_potential(form: RotorForm, angles: Sequence[float] | Array, speed: f
     return potential - kinetic  # type: ignore[no-any-return]
 
 
-def _steady(scene: Scene, angles: Array, speed: float) -> Array:
-    """The angles, once the accelerations say so, too: they keep differences that the energies' rounding hides."""
-    linear = linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], holding_torque(scene, speed))
-    if np.abs(linear.residual).max() > 1e-9 * np.abs(linear.stiffness).max():
-        raise InputError(f"{scene.name}: the steady state at {speed:g} rad/s is lost in the rounding of the energies")
-    return angles
-
-
 def _newton_step(form: RotorForm, potential: Jet, free: slice, *, downhill: bool) -> Array:
     """(free,) rad: -H⁻¹ g, with |H| where `downhill`; at most 0.5 rad, none where nothing holds the rotor."""
     gradient, hessian = potential.slope[free], potential.curvature[free, free]
-    weights = [*(abs(value) for each in form.blades for value in (each.weight_x, each.weight_y, each.weight_z))]
+    weights = []
+    for blade in form.blades:
+        weights += [abs(blade.weight_x), abs(blade.weight_y), abs(blade.weight_z)]
     weights += [abs(float(weight)) for weight, _, _ in form.fixed]
     least = max(1e-9 * sum(weights), 1e-300)
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), least))

@@ -44,10 +44,10 @@ def _loads(
     """From a motion in numbers of a kind that `convert` makes, and `sin` and `cos` take."""
     moving, applied = scene.moving_coordinates, values_before(load_segments(scene), times)
     accelerations = np.zeros_like(angles)
-    found = closed_form.accelerations(
+    of_moving = closed_form.accelerations(
         angles[:, moving].T, rates[:, moving].T, rotor_form(scene, convert), load_values(list(applied)), sin, cos
     )
-    for column, values in zip(moving, found, strict=True):
+    for column, values in zip(moving, of_moving, strict=True):
         accelerations[:, column] = values
     actuators = np.zeros_like(angles[:, 1:])
     for i, column in enumerate(moving[1:], start=1):
@@ -76,8 +76,10 @@ def root_load(
 ) -> tuple[Numbers, Numbers]:
     """(n, 3) force and moment in the blade's frame.
 
-    azimuth, pitch   (n,) sine and cosine
-    turning          (n,) Ω, θ̇, dΩ/dt, dθ̇/dt
+    Parameters
+    ----------
+    azimuth, pitch : (n,) sine and cosine
+    turning : (n,) Ω, θ̇, dΩ/dt, dθ̇/dt
     """
     (sin_phi, cos_phi), (s, c) = azimuth, pitch
     spin, rate, spin_rate, rate_rate = turning

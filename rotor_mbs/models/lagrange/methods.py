@@ -24,11 +24,15 @@ _BLUE, _LIGHT_BLUE = "#0072b2", "#56b4e9"
 
 @dataclass(frozen=True)
 class TaylorSettings(Settings):
+    """Of heyoka's adaptive Taylor method."""
+
     tolerance: float = number(_EPS, above=0.0, doc="of the local error, absolute and relative")
 
 
 @dataclass(frozen=True)
 class ReferenceSettings(Settings):
+    """Of the two runs in quad precision."""
+
     tolerance: float = number(1e-33, above=0.0, doc="of the run that is kept")
     check_tolerance: float = number(1e-30, above=0.0, doc="of the run whose distance the uncertainty follows from")
 
@@ -44,12 +48,16 @@ def _absolute(default: float) -> Any:
 
 @dataclass(frozen=True)
 class Dop853Settings(Settings):
+    """Of SciPy's DOP853."""
+
     relative_tolerance: float = _relative(3e-14)
     absolute_tolerance: float = _absolute(1e-16)
 
 
 @dataclass(frozen=True)
 class RadauSettings(Settings):
+    """Of SciPy's Radau."""
+
     relative_tolerance: float = _relative(1e-8)
     absolute_tolerance: float = _absolute(1e-11)
 

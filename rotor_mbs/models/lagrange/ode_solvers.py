@@ -1,6 +1,4 @@
-"""The closed form on plain floats under integrators for any right-hand side: SciPy's by name, MATLAB's ode45.
-
-Knows no heyoka; loads SciPy when one of its integrators is made."""
+"""The closed form on plain floats under integrators for any right-hand side: SciPy's by name, MATLAB's ode45."""
 
 from __future__ import annotations
 
@@ -28,10 +26,12 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per segment of the loads.
+    """Any integrator over the scene, one call per segment of the loads; see `rotor_mbs.methods.base.Solver`.
 
-    times, states   as of `taylor.Propagation`
-    accelerations   the equations, where they are not the closed form as it is
+    Parameters
+    ----------
+    times : as of `taylor.Propagation`, as is the attribute `states`
+    accelerations : the equations, where they are not the closed form as it is
     """
 
     def __init__(
@@ -72,13 +72,14 @@ class OdeSolver:
             angles, rates = values[:count], values[count : 2 * count]
             loads = constant or load_values(segment.loads_at(time))
             try:
-                found = equations(angles, rates, form, loads, math.sin, math.cos)
+                accelerations = equations(angles, rates, form, loads, math.sin, math.cos)
             except (ZeroDivisionError, ValueError, OverflowError):
                 # A singular mass matrix, or a state that has diverged: not a number, as in array arithmetic.
                 return [math.nan] * len(values)
             if not work_unit:
-                return [*rates, *found]
-            return [*rates, *found, closed_form.power(rates, form, at_constant_rests(changing, loads)) / work_unit]
+                return [*rates, *accelerations]
+            power = closed_form.power(rates, form, at_constant_rests(changing, loads))
+            return [*rates, *accelerations, power / work_unit]
 
         return derivative
 

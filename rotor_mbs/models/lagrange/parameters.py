@@ -2,7 +2,7 @@
 
 Coefficients are in exact rational arithmetic until the last step. Why: for a point mass the coefficients
 Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating point they leave a rounding remainder, and near
-a pitch of ±π/2 that remainder, not the physics, would be the inertia. Knows the scene only; no integrator.
+a pitch of ±π/2 that remainder, not the physics, would be the inertia.
 """
 
 from __future__ import annotations
@@ -31,16 +31,18 @@ PI = Fraction("3.141592653589793238462643383279502884197169399375105820974944592
 class BladeForm:
     """Coefficients of one blade; s, c are sine and cosine of its pitch θ.
 
-    cos_phase, sin_phase         of its mounting angle about the shaft
-    schur_ss, _cc, _sc           kg m²: its share of the Schur complement, a quadratic form in (s, c)
-    half_slope_sc, _cs           kg m²: ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
-    coupling_s, _c               kg m²: b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
-    ratio_s, ratio_c             b / Jzz
-    pitch_inertia                kg m²: Jzz
-    weight_x, _y, _z             N m: m g (x, y, z) of the centre of mass
-    lever_ss, _cc, _sc           N m: gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
-    stiffness, damping           N m/rad, N m s/rad
-    inertia_ss, _cc, _sc         kg m²: a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
+    Attributes
+    ----------
+    cos_phase, sin_phase : of its mounting angle about the shaft
+    schur_ss, schur_cc, schur_sc : kg m², its share of the Schur complement, a quadratic form in (s, c)
+    half_slope_sc, half_slope_cs : kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
+    coupling_s, coupling_c : kg m², b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
+    ratio_s, ratio_c : b / Jzz
+    pitch_inertia : kg m², Jzz
+    weight_x, weight_y, weight_z : N m, m g (x, y, z) of the centre of mass
+    lever_ss, lever_cc, lever_sc : N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
+    stiffness, damping : N m/rad, N m s/rad
+    inertia_ss, inertia_cc, inertia_sc : kg m², a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
     """
 
     cos_phase: Number
@@ -72,9 +74,12 @@ class BladeForm:
 class RotorForm:
     """Coefficients of the whole rotor.
 
-    blades      the blades whose pitch moves, in order
-    fixed       (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
-    inertia     kg m²: hub, and the blades that are fixed
+    Attributes
+    ----------
+    blades : the blades whose pitch moves, in order
+    fixed : (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
+    inertia : kg m², hub and the blades that are fixed
+    shaft_damping : N m s/rad
     """
 
     blades: tuple[BladeForm, ...]
@@ -86,11 +91,12 @@ class RotorForm:
 def rotor_form(
     scene: Scene, convert: Convert = float, phases: Sequence[tuple[Fraction, Fraction]] | None = None
 ) -> RotorForm:
-    """The coefficients of `scene`, each correctly rounded from its exact value by `convert`.
+    """The coefficients of `scene`; its doubles are taken as exact, so that every precision solves the same rotor.
 
-    phases   (blades,) cosines and sines of the mounting angles, where they are not those of `Scene.phases`
-
-    The scene's doubles are taken as exact, so that every precision solves the same rotor.
+    Parameters
+    ----------
+    convert : rounds each coefficient once from its exact value
+    phases : (blades,) cosines and sines of the mounting angles, where they are not those of `Scene.phases`
     """
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
@@ -149,21 +155,21 @@ def _coefficients(blade: Blade, gravity: Fraction) -> list[Fraction]:
     return [*schur, *slope, *coupling, xz / zz, yz / zz, zz, *weights, *lever]
 
 
-_ONE = 10**60  # of whole numbers that stand for fractions
+_FIXED_POINT = 10**60  # whole numbers stand for this many times a fraction
 
 
 @functools.lru_cache(maxsize=4096)
 def _cosine_of_turn(turn: Fraction) -> Fraction:
     """cos(2π·turn) to 50 digits: so that a third of a turn is -1/2 in double and in quad precision."""
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
-    square = int(angle * angle * _ONE)
-    term = total = _ONE
+    square = int(angle * angle * _FIXED_POINT)
+    term = total = _FIXED_POINT
     k, sign = 0, 1
     while term:
         k, sign = k + 2, -sign
-        term = term * square // (k * (k - 1) * _ONE)
+        term = term * square // (k * (k - 1) * _FIXED_POINT)
         total += sign * term
-    return Fraction(total, _ONE).limit_denominator(10**50)
+    return Fraction(total, _FIXED_POINT).limit_denominator(10**50)
 
 
 def load_tables(scene: Scene) -> tuple[Table, ...]:

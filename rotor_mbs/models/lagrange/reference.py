@@ -41,7 +41,9 @@ class ReferenceSolver:
     The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka a hundredth): their
     distance is the truncation error of the other, or, where both are at round-off, of the size of that.
 
-    epsilon  of the runs' arithmetic
+    Parameters
+    ----------
+    epsilon : of the runs' arithmetic
     """
 
     def __init__(self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float) -> None:
@@ -77,9 +79,11 @@ def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
     may round alike; of it the largest so far, because two runs may meet at a sample by chance. It does not contain the
     rounding of the angles to double precision when they are stored, at most half a unit in the last place.
 
-    difference  (n,) rad, largest over the angles
-    angles      (n, 1 + blades) rad
-    epsilon     of the runs' arithmetic
+    Parameters
+    ----------
+    difference : (n,) rad, largest over the angles
+    angles : (n, 1 + blades) rad
+    epsilon : of the runs' arithmetic
     """
     largest = np.maximum(np.abs(angles).max(axis=1), 1.0)
     return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
@@ -88,9 +92,11 @@ def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
 def build(scene: Scene, settings: Any) -> ReferenceSolver:
     """In quad precision with heyoka; without it by DOP853, with an uncertainty that is larger by many orders."""
     if not is_available():
-        return ReferenceSolver(scene, [_in_doubles(scene, one) for one in (_TIGHTEST, _LOOSER)], _DOUBLE_EPSILON)
-    tolerances = settings.tolerance, settings.check_tolerance
-    return ReferenceSolver(scene, [_in_quad(scene, tolerance) for tolerance in tolerances], _QUAD_EPSILON)
+        runs = _in_doubles(scene, _TIGHTEST), _in_doubles(scene, _LOOSER)
+        return ReferenceSolver(scene, runs, _DOUBLE_EPSILON)
+    return ReferenceSolver(
+        scene, [_in_quad(scene, settings.tolerance), _in_quad(scene, settings.check_tolerance)], _QUAD_EPSILON
+    )
 
 
 def _in_quad(scene: Scene, tolerance: float, times: Array | None = None) -> Propagation:
@@ -157,17 +163,19 @@ def _in_units(scene: Scene, matrices: Array) -> Array:
     return np.asarray(matrices * units / units[:, None])
 
 
-_QUAD = 1e-30  # tolerance: its error, grown 1e10-fold, is still below what a double can hold
+_QUAD_TOLERANCE = 1e-30  # its error, grown 1e10-fold, is still below what a double can hold
 
 
 @dataclass(frozen=True)
 class TimedReference:
     """The reference of a scene at chosen times.
 
-    trajectory   as far as it got: time, angles, rates, error_growth
-    growth       (n, 2 (1 + blades)): of angles, then rates, how many times larger than an error of the initial state
-                 theirs may be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
-    units        (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
+    Attributes
+    ----------
+    trajectory : as far as it got: time, angles, rates, error_growth
+    growth : (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs
+        may be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
+    units : (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
     """
 
     trajectory: Trajectory
@@ -180,7 +188,7 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
 
     In quad precision with heyoka, else by DOP853 at its tightest.
     """
-    run = _in_quad(scene, _QUAD, times) if is_available() else _in_doubles(scene, _TIGHTEST, times)
+    run = _in_quad(scene, _QUAD_TOLERANCE, times) if is_available() else _in_doubles(scene, _TIGHTEST, times)
     run.integrate()
     trajectory, matrices = run.observe(), _transition_matrices(scene, times)
     trajectory.error_growth = _largest_growth(scene, matrices)[: len(trajectory.time)]

@@ -11,7 +11,7 @@ from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.loads import sampled_loads
-from rotor_mbs.models.lagrange.parameters import RotorForm, changing_loads, load_tables, rotor_form
+from rotor_mbs.models.lagrange.parameters import changing_loads, load_tables, rotor_form
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, is_constant, value_at, values_at
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_rows
@@ -20,10 +20,12 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_co
 class Advance(NamedTuple):
     """What an integrator made of one segment.
 
-    states       (samples reached, variables)
-    end          (variables,) state at the end of the segment
-    evaluations  of the right-hand side; None where they are not counted
-    message      why the end was not reached; "" where it was
+    Attributes
+    ----------
+    states : (samples reached, variables)
+    end : (variables,) state at the end of the segment
+    evaluations : of the right-hand side; None where they are not counted
+    message : why the end was not reached; "" where it was
     """
 
     states: Any
@@ -41,8 +43,10 @@ def over_segments(
 ) -> tuple[Any, Integration]:
     """States at the samples, (n, variables), cut before the first row that is not finite; and the engine's report.
 
-    times    (samples,) s, of which the first is that of the `initial` state
-    advance  (segment, state at its start, sample times inside) -> Advance
+    Parameters
+    ----------
+    times : (samples,) s, of which the first is that of the `initial` state
+    advance : (segment, state at its start, sample times inside) -> Advance
     """
     state, rows = initial, [initial[None, :]]
     steps, evaluations, message = 0, None, ""
@@ -64,8 +68,10 @@ def over_segments(
 def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     """What the scene asks for.
 
-    times   (n or more,) s
-    states  (n, 2k) angles, then rates, of the k coordinates that move; with the work in J as one more column, or not
+    Parameters
+    ----------
+    times : (n or more,) s
+    states : (n, 2k) angles, then rates, of the k coordinates that move; with the work in J as one more column, or not
     """
     count, time = len(scene.moving_coordinates), times[: len(states)]
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
@@ -94,13 +100,18 @@ def _put_energies(scene: Scene, result: Trajectory, states: Array) -> None:
         if states.shape[1] <= 2 * len(columns):
             result.work = constant_work(scene, result.angles)
         else:
-            result.work = states[:, 2 * len(columns)] + _work_of_rests(scene, form, angles, loads)
+            result.work = states[:, 2 * len(columns)]
+            # What `closed_form.power` leaves out of the work of rest angles that move.
+            rests = at_constant_rests(changing_loads(scene), loads).rests
+            energy = closed_form.rest_energy(angles, form, rests)
+            if isinstance(energy, np.ndarray):
+                result.work = result.work + (energy - energy[0])
 
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:
     """Loads at (n,) s: numbers where they are constant, else (n,) arrays; at a jump, the values after it."""
     tables = load_tables(scene)
-    return load_values([value_at(one, 0.0) if is_constant(one) else values_at(one, time) for one in tables])
+    return load_values([value_at(table, 0.0) if is_constant(table) else values_at(table, time) for table in tables])
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
@@ -113,12 +124,6 @@ def at_constant_rests(changing: Sequence[int], loads: LoadValues) -> LoadValues:
     first = 1 + len(loads.pitches)
     rests = [rest if first + i in changing else 0.0 for i, rest in enumerate(loads.rests)]
     return LoadValues(loads.rotor, loads.pitches, rests)
-
-
-def _work_of_rests(scene: Scene, form: RotorForm, angles: Sequence[Array], loads: LoadValues) -> Any:
-    """(n,) J: what `closed_form.power` leaves out of the work of rest angles that move; 0 where none does."""
-    energy = closed_form.rest_energy(angles, form, at_constant_rests(changing_loads(scene), loads).rests)
-    return energy - energy[0] if isinstance(energy, np.ndarray) else 0.0
 
 
 def constant_work(scene: Scene, angles: Array) -> Array:

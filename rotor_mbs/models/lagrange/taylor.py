@@ -33,12 +33,22 @@ _UNROLLED_BLADES = 4
 
 
 def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[Any, Any]], Parameters]:
-    """The closed form of the scene in heyoka's symbols. Raises MethodRefusal where heyoka is not installed.
+    """The closed form of the scene in heyoka's symbols.
 
-    in_momenta   in Hamilton's variables: momenta in place of rates
+    Parameters
+    ----------
+    in_momenta : in Hamilton's variables: momenta in place of rates
 
-    Returns the first-order equations [(symbol, right-hand side)], of angles, rates, and the work where it is not known
-    in closed form; and their numbers, of which the last are offset and slope of each of `changing_loads`.
+    Returns
+    -------
+    equations : first-order, [(symbol, right-hand side)], of angles, rates, and the work where it is not known in closed
+        form
+    parameters : their numbers, of which the last are offset and slope of each of `changing_loads`
+
+    Raises
+    ------
+    MethodRefusal
+        Where heyoka is not installed.
     """
     engine = heyoka()
     parameters = Parameters()
@@ -46,10 +56,11 @@ def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[
     angles, others = state_symbols(form)
     if in_momenta:
         rates = hamilton.rates(angles, others, form, engine.sin, engine.cos)
-        found = hamilton.forces(angles, rates, form, loads, engine.sin, engine.cos)
+        derivatives = hamilton.forces(angles, rates, form, loads, engine.sin, engine.cos)
     else:
-        rates, found = others, closed_form.accelerations(angles, others, form, loads, engine.sin, engine.cos)
-    equations = [*zip(angles, rates, strict=True), *zip(others, found, strict=True)]
+        rates = others
+        derivatives = closed_form.accelerations(angles, rates, form, loads, engine.sin, engine.cos)
+    equations = [*zip(angles, rates, strict=True), *zip(others, derivatives, strict=True)]
     if work_is_integrated(scene):
         working = at_constant_rests(changing_loads(scene), loads)
         equations.append((engine.make_vars("work"), closed_form.power(rates, form, working)))
@@ -97,13 +108,21 @@ def is_compact(scene: Scene) -> bool:
 class Propagation:
     """The equations of a scene under heyoka's Taylor method; see `rotor_mbs.methods.base.Solver`.
 
-    quad         in quad precision; the scene's doubles are taken as exact
-    variational  with the state transition matrix (without the work) as further variables, row by row
-    times        (n,) s, of the samples, increasing from 0 up to the duration; the scene's where it is left out
-    options      of the engine's integrator
-    states       (n, variables) at the samples of the last run, cut before the first row that is not finite
+    Parameters
+    ----------
+    quad : in quad precision; the scene's doubles are taken as exact
+    variational : with the state transition matrix (without the work) as further variables, row by row
+    times : (n,) s, of the samples, increasing from 0 up to the duration; the scene's where it is left out
+    options : of the engine's integrator
 
-    Raises MethodRefusal where heyoka is not installed.
+    Attributes
+    ----------
+    states : (n, variables) at the samples of the last run, cut before the first row that is not finite
+
+    Raises
+    ------
+    MethodRefusal
+        Where heyoka is not installed.
     """
 
     def __init__(

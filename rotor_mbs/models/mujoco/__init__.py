@@ -1,1 +1,1 @@
-"""The rotor as hinges and bodies of the MuJoCo engine, from raw scene data only. Knows no other model."""
+"""The rotor as hinges and bodies of the MuJoCo engine, from raw scene data only."""

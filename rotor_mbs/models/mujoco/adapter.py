@@ -1,4 +1,4 @@
-"""The one place that imports MuJoCo: compiles a model, advances it, reads poses and velocities. Knows no rotor."""
+"""The one place that imports MuJoCo: compiles a model, advances it, reads poses and velocities."""
 
 from __future__ import annotations
 
@@ -17,8 +17,12 @@ from rotor_mbs.solution.trajectory import Array
 _engine: Any = mujoco
 _engine.set_mju_user_warning(lambda _message: None)
 
-# Its warnings of a state that means nothing.
-_WARNINGS = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+# Of positions, velocities and accelerations that are not finite or huge.
+_BAD_STATE_WARNINGS = (
+    _engine.mjtWarning.mjWARN_BADQPOS,
+    _engine.mjtWarning.mjWARN_BADQVEL,
+    _engine.mjtWarning.mjWARN_BADQACC,
+)
 
 # Steps in one call, a few hundredths of a second: the engine looks for no signal and no time limit in between.
 _PORTION = 10_000
@@ -28,13 +32,15 @@ _PORTION = 10_000
 class Poses:
     """Every body and site at n states, world frame; world body left out.
 
-    centre    (n, bodies, 3) m, centres of mass
-    velocity  (n, bodies, 3) m/s, of the centres of mass
-    spin      (n, bodies, 3) rad/s, along the principal axes
-    site      (n, sites, 3) m
-    acceleration  (n, coordinates) rad/s²
-    frame     (n, bodies, 3, 3) body's frame to world frame
-    wrench    (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
+    Attributes
+    ----------
+    centre : (n, bodies, 3) m, centres of mass
+    velocity : (n, bodies, 3) m/s, of the centres of mass
+    spin : (n, bodies, 3) rad/s, along the principal axes
+    site : (n, sites, 3) m
+    acceleration : (n, coordinates) rad/s²
+    frame : (n, bodies, 3, 3) body's frame to world frame
+    wrench : (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
     """
 
     centre: Array
@@ -69,9 +75,16 @@ class Engine:
         self._data.qpos[:], self._data.qvel[:] = angles, rates
 
     def advance(self, step: float, steps: int, loads: Sequence[float], slopes: Sequence[float]) -> tuple[int, str]:
-        """So many equal steps of `step` s; activations (N m, rad) at the start and slopes per s, by actuator.
+        """Take `steps` equal steps of `step` s.
 
-        Returns the steps taken, and why it ended before all were: the time limit, or a state that is not finite; "".
+        Parameters
+        ----------
+        loads, slopes : by actuator, activation (N m or rad) at the start and its slope per s
+
+        Returns
+        -------
+        taken, message
+            The steps taken, and why it ended before all were: the time limit, or a state that is not finite; else "".
         """
         model, data = self._model, self._data
         model.opt.timestep = step
@@ -85,16 +98,11 @@ class Engine:
             _engine.mj_step(model, data, nstep=portion)
             taken += portion
             if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
-                return taken, self._warning() or "MuJoCo: the state is not finite"
+                for warning in _BAD_STATE_WARNINGS:
+                    if data.warning[warning].number:
+                        return taken, f"MuJoCo: {_engine.mju_warningText(warning, data.warning[warning].lastinfo)}"
+                return taken, "MuJoCo: the state is not finite"
         return taken, ""
-
-    def _warning(self) -> str:
-        """What it warns of, in one line; "" where of nothing."""
-        for name in _WARNINGS:
-            warning = getattr(_engine.mjtWarning, name)
-            if self._data.warning[warning].number:
-                return f"MuJoCo: {_engine.mju_warningText(warning, self._data.warning[warning].lastinfo)}"
-        return ""
 
     @property
     def state(self) -> tuple[Array, Array]:
@@ -114,13 +122,10 @@ class Engine:
         motion = np.empty((model.nbody - 1, 6))
         for body, velocity in enumerate(motion, start=1):
             _engine.mj_objectVelocity(model, data, _engine.mjtObj.mjOBJ_BODY, body, velocity, 1)
-        kept = (data.site_xpos.copy(), data.qacc.copy(), data.xmat[1:].reshape(-1, 3, 3).copy())
-        return data.xipos[1:].copy(), motion[:, 3:], motion[:, :3], *kept, self._wrench()
-
-    def _wrench(self) -> Array:
-        """(bodies, 6) as in `Poses`; the engine gives moments about the centre of mass of a body's whole tree."""
-        _engine.mj_rnePostConstraint(self._model, self._data)
-        found = np.array(self._data.cfrc_int[1:])
-        centres = self._data.subtree_com[self._model.body_rootid[1:]]
-        found[:, :3] += np.cross(centres, found[:, 3:])
-        return found
+        centres, sites = data.xipos[1:].copy(), data.site_xpos.copy()
+        accelerations, frames = data.qacc.copy(), data.xmat[1:].reshape(-1, 3, 3).copy()
+        # The engine gives moments about the centre of mass of a body's whole tree.
+        _engine.mj_rnePostConstraint(model, data)
+        wrench = np.array(data.cfrc_int[1:])
+        wrench[:, :3] += np.cross(data.subtree_com[model.body_rootid[1:]], wrench[:, 3:])
+        return centres, motion[:, 3:], motion[:, :3], sites, accelerations, frames, wrench

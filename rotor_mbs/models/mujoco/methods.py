@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
 
 _HINT = "pip install 'rotor_mbs[mujoco]'"
-_MOST_STEPS = 1e10
+_MAX_STEPS = 1e10
 _PURPLE = "#cc79a7"
 
 
@@ -42,8 +42,8 @@ def _items(scene: Scene) -> list[BuiltItem]:
 def _build(integrator: str) -> Callable[[Scene, Any], Solver]:
     def build(scene: Scene, settings: Rk4Settings | ImplicitFastSettings) -> Solver:
         _items(scene)
-        if scene.duration / settings.step > _MOST_STEPS:
-            raise InputError(f"setting step: {settings.step:g} s makes more than {_MOST_STEPS:g} steps")
+        if scene.duration / settings.step > _MAX_STEPS:
+            raise InputError(f"setting step: {settings.step:g} s makes more than {_MAX_STEPS:g} steps")
         from rotor_mbs.models.mujoco.solver import MujocoSolver
 
         return MujocoSolver(scene, integrator, settings.step)

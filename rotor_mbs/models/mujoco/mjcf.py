@@ -1,4 +1,4 @@
-"""The rotor as a model in MuJoCo's own format (MJCF), from raw scene data. Knows no engine.
+"""The rotor as a model in MuJoCo's own format (MJCF), from raw scene data.
 
 World frame: z up, shaft along y. The hub turns about y by the hinge "rotor"; blade i is a child of the hub, mounted at
 its phase about y, and turns about its own z by the hinge "pitch i". Hinge angles are the scene's angles, unwrapped.
@@ -41,7 +41,9 @@ _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco
 class Load:
     """A moment `gain` times a table over time, on a coordinate (0 = rotor).
 
-    gain   1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
+    Attributes
+    ----------
+    gain : 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
     """
 
     name: str
@@ -52,14 +54,14 @@ class Load:
 
 def loads_of(scene: Scene) -> list[Load]:
     """Torque on the rotor, torques of the pitches that move, rest angles that change over time, as far as there are."""
-    found = [Load("torque rotor", 0, 1.0, scene.rotor_torque)] if scene.has_torque else []
+    loads = [Load("torque rotor", 0, 1.0, scene.rotor_torque)] if scene.has_torque else []
     for number in scene.moving_coordinates[1:]:
         torque, rest = scene.pitch_load(number - 1)
         if torque:
-            found.append(Load(f"torque pitch {number}", number, 1.0, torque))
+            loads.append(Load(f"torque pitch {number}", number, 1.0, torque))
         if not is_constant(rest):
-            found.append(Load(f"rest pitch {number}", number, scene.bearing(number - 1)[0], rest))
-    return found
+            loads.append(Load(f"rest pitch {number}", number, scene.bearing(number - 1)[0], rest))
+    return loads
 
 
 def load_segments(scene: Scene) -> tuple[Segment, ...]:
@@ -110,16 +112,16 @@ def text(root: ET.Element) -> str:
 
 def items(scene: Scene) -> list[BuiltItem]:
     """What is built for the scene, in order."""
-    elements = model(scene, "rk4", 1.0).iter()
-    return [BuiltItem(_KINDS[one.tag], one.get("name", one.tag), _detail(one)) for one in elements if one.tag in _KINDS]
-
-
-def _detail(element: ET.Element) -> str:
-    shown = (f"{key} {value}" for key, value in element.attrib.items() if key not in ("name", "type"))
-    return f"{element.get('type', element.tag)}: {', '.join(shown)}" if len(element.attrib) > 1 else element.tag
-
-
-_KINDS = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
+    kinds = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
+    built = []
+    for element in model(scene, "rk4", 1.0).iter():
+        if element.tag in kinds:
+            detail = element.tag
+            if len(element.attrib) > 1:
+                facts = [f"{key} {value}" for key, value in element.attrib.items() if key not in ("name", "type")]
+                detail = f"{element.get('type', element.tag)}: {', '.join(facts)}"
+            built.append(BuiltItem(kinds[element.tag], element.get("name", element.tag), detail))
+    return built
 
 
 def _blade(hub: ET.Element, scene: Scene, number: int) -> None:

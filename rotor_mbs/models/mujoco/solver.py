@@ -42,9 +42,17 @@ class _Row(NamedTuple):
 
 
 class MujocoSolver:
-    """See `rotor_mbs.methods.base.Solver`. integrator: a key of `mjcf.INTEGRATORS`; step: largest time step in s.
+    """See `rotor_mbs.methods.base.Solver`.
 
-    Raises MethodRefusal, with the engine's reason, where the engine does not take the model.
+    Parameters
+    ----------
+    integrator : a key of `mjcf.INTEGRATORS`
+    step : s, the largest time step
+
+    Raises
+    ------
+    MethodRefusal
+        With the engine's reason, where the engine does not take the model.
     """
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
@@ -135,7 +143,8 @@ class MujocoSolver:
         with its end correction, ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here.
         """
         loads = mjcf.loads_of(self._scene)
-        columns, gains = [self._moving.index(load.coordinate) for load in loads], np.array([one.gain for one in loads])
+        columns = [self._moving.index(load.coordinate) for load in loads]
+        gains = np.array([load.gain for load in loads])
         torques = gains * values
         if not self._scene.work_needs_path:
             turned = angles[:, columns] - angles[:1, columns]
@@ -182,5 +191,5 @@ def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torqu
 
     unit = np.eye(2 * n)
     quotients = [(accelerations(here + h * unit) - accelerations(here - h * unit)).T / (2.0 * h) for h in _STEPS]
-    found = limit_at_zero(quotients, 4.0)
-    return Linearization(-found[:, :n], -found[:, n:], accelerations(here[None])[0])
+    slopes = limit_at_zero(quotients, 4.0)
+    return Linearization(-slopes[:, :n], -slopes[:, n:], accelerations(here[None])[0])
