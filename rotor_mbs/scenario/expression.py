@@ -1,4 +1,4 @@
-"""Arithmetic in quotes, "11*pi/12", to a double: parsed, never run as code. Must not know scenes."""
+"""Arithmetic in quotes, "11*pi/12", to a double: parsed, never run as code."""
 
 from __future__ import annotations
 

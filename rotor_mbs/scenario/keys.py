@@ -275,20 +275,22 @@ def read_keys(
     values: dict[str, Any] = {}
     problems: list[KeyProblem] = []
     names: dict[str, list[str]] = {"": []}  # of the keys by table, "" for the top
+    needed = set()  # tables with a key that must be there
     for key in keys.values():
         table, _, name = key["key"].rpartition(".")
         names.setdefault(table, []).append(name)
+        if "optional" not in key:
+            needed.add(table)
     inside = {"": tables}
-    for table in [table for table in names if table]:
+    for table in list(names)[1:]:
         names[""].append(table)
         given = tables.get(table, {})
-        needed = any("optional" not in key for key in keys.values() if key["key"].startswith(f"{table}."))
-        if table not in tables and needed:
-            problems.append(KeyProblem((table,), "is missing", f"a table with {', '.join(names[table])}"))
+        allowed = f"a table with {', '.join(names[table])}"
+        if table not in tables and table in needed:
+            problems.append(KeyProblem((table,), "is missing", allowed))
         elif isinstance(given, dict):
             inside[table] = given
         else:
-            allowed = f"a table with {', '.join(names[table])}"
             problems.append(KeyProblem((table,), f"{shown(given)} is not a table", allowed))
     for field, key in keys.items():
         table, _, name = key["key"].rpartition(".")

@@ -6,7 +6,6 @@ scene it is. Reading with all errors, the hash, the keys of sweeps, units and th
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import functools
 import hashlib
@@ -400,17 +399,17 @@ SCENE_KEYS = {
     "blade_count": _COUNT.metadata,
     **_OWN_KEYS,
 }
-_BY_PATH = {each["key"]: each for each in SCENE_KEYS.values()} | {
-    f"blade.{name}": each for name, each in BLADE_KEYS.items()
+_BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
+    f"blade.{name}": declared for name, declared in BLADE_KEYS.items()
 }
 
 
 def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
     """The dataclass fields of Scene that are of these parts, in order."""
-    return (each for each in fields(Scene) if each.metadata["part"] in parts)
+    return (field for field in fields(Scene) if field.metadata["part"] in parts)
 
 
-_rotor_values = attrgetter(*(each.name for each in scene_fields("rotor")))
+_rotor_values = attrgetter(*(field.name for field in scene_fields("rotor")))
 
 
 def scene_hash(scene: Scene) -> str:
@@ -420,13 +419,13 @@ def scene_hash(scene: Scene) -> str:
     equal ones) do not enter; neither does the tip where no tip path is asked for.
     """
     content: dict[str, object] = {}
-    for each in scene_fields("run", "start", "rotor"):
-        value = getattr(scene, each.name)
-        if each.name == "blades":
+    for field in scene_fields("run", "start", "rotor"):
+        value = getattr(scene, field.name)
+        if field.name == "blades":
             numbers = [name for name in BLADE_KEYS if name != "tip" or scene.wants("tip")]
             content["blades"] = [[_exact(getattr(blade, name), listed=True) for name in numbers] for blade in value]
-        elif not (each.metadata["added"] and value == each.default):
-            content[each.name] = sorted(value) if each.name == "outputs" else _exact(value)
+        elif not (field.metadata["added"] and value == field.default):
+            content[field.name] = sorted(value) if field.name == "outputs" else _exact(value)
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
@@ -465,19 +464,19 @@ def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "") -> S
 def scene_tables(scene: Scene) -> dict[str, Any]:
     """The scene as the tables of a scene file: numbers as they are, keys at their defaults left out."""
     tables: dict[str, Any] = {"blades": len(scene.blades)}
-    for each in fields(Scene):
-        value = getattr(scene, each.name)
-        if not each.metadata["key"] or value == each.default:
+    for field in fields(Scene):
+        value = getattr(scene, field.name)
+        if not field.metadata["key"] or value == field.default:
             continue
-        table, _, name = each.metadata["key"].rpartition(".")
+        table, _, name = field.metadata["key"].rpartition(".")
         written: Any
-        if each.name == "blades":
+        if field.name == "blades":
             written = _blade_tables(scene)
-        elif each.name == "settings":
+        elif field.name == "settings":
             written = dict(value)
-        elif each.metadata["kind"].per_blade and len(set(value)) == 1:
+        elif field.metadata["kind"].per_blade and len(set(value)) == 1:
             written = _listed(value[0])
-        elif each.metadata["kind"].per_blade:
+        elif field.metadata["kind"].per_blade:
             written = [_listed(entry) if entry != () else 0.0 for entry in value]
         else:
             written = _listed(value)
@@ -534,7 +533,7 @@ def _names(path: KeyPath) -> str:
 def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
     """Sets the value at `path` in the tables of a scene; tables that are missing are made, keys are not checked.
 
-    One [blade] for all, or one number or table for every bearing, becomes one for each where the path names one.
+    One [blade] for all, or one number or table for every bearing, becomes one for field where the path names one.
     Raises TableError where the path goes through something that has no such entry.
     """
     here: Any = tables
@@ -563,13 +562,20 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     """What stands at `path`, as one entry per blade where the scene file allows one for all."""
     count = tables.get("blades", 0)
     if path == ("blade",) and isinstance(value, dict):
-        return [copy.deepcopy(value) for _ in range(count)]
+        return [copied(value) for _ in range(count)]
     declared = _BY_PATH.get(_names(path))
     is_per_blade = declared is not None and declared["kind"].per_blade and isinstance(path[-1], str)
     if is_per_blade and (not isinstance(value, list) or is_one_table(value)):
-        return [copy.deepcopy(0.0 if value is None else value) for _ in range(count)]
+        return [copied(0.0 if value is None else value) for _ in range(count)]
     # Whether a list that is missing could be there is for the readers of the keys to say.
     return [0.0] * (last + 1) if value is None else value
+
+
+def copied(value: Any) -> Any:
+    """A copy of tables of a file, with lists and tables of its own."""
+    if isinstance(value, dict):
+        return {name: copied(entry) for name, entry in value.items()}
+    return [copied(entry) for entry in value] if isinstance(value, list) else value
 
 
 def _plain(value: object) -> object:

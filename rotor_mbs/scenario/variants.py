@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rotor_mbs.scenario.keys import MAX_NUMBER
-from rotor_mbs.scenario.scene import Scene, put_value, scene_fields, scene_from_tables
+from rotor_mbs.scenario.scene import Scene, copied, put_value, scene_fields, scene_from_tables
 from rotor_mbs.scenario.toml_file import KeyPath, parse_key
 
 # Field by table and name of the key.
-_START = {tuple(each.metadata["key"].split(".")): each.name for each in scene_fields("start")}
+_START = {tuple(field.metadata["key"].split(".")): field.name for field in scene_fields("start")}
 
 # Rotors that are kept validated: more than a chunk of runs, or an axis of a usual map, has.
 MAX_ROTORS = 512
@@ -24,7 +23,7 @@ class Variants:
     Most sweeps vary the initial state of few rotors: a scene is read for each rotor, then initial states are put in.
     """
 
-    def __init__(self, name: str, tables: Mapping[str, Any], keys: Sequence[str]) -> None:
+    def __init__(self, name: str, tables: dict[str, Any], keys: Sequence[str]) -> None:
         self.keys = tuple(keys)
         self._name = name
         self._tables = tables
@@ -58,7 +57,7 @@ class Variants:
         return scene
 
     def _read(self, values: Sequence[float]) -> Scene:
-        tables = copy.deepcopy(dict(self._tables))
+        tables = copied(self._tables)
         for path, value in zip(self._paths, values, strict=True):
             put_value(tables, path, value)
         return scene_from_tables(tables, self._name)
