@@ -1,6 +1,6 @@
 """The bounds that results are judged by: reference/accuracy.toml, and a user's own file before it.
 
-A run's status and the verdicts of `check` read the same entries. Must not know results.
+A run's status and the verdicts of `check` read the same entries.
 """
 
 from __future__ import annotations
@@ -26,14 +26,7 @@ CHECKS = (
 )  # fmt: skip
 
 
-def _read_bound(value: object) -> float:
-    number = keys.read_number(value)
-    if number < 0.0:
-        raise keys.wrong(f"{keys.shown(value)} is out of range")
-    return number
-
-
-_BOUND = keys.Kind(_read_bound, f"a number from 0 to {keys.MAX_NUMBER:g}")
+_BOUND = keys.where(keys.NUMBER, lambda value: value >= 0.0, f"a number from 0 to {keys.MAX_NUMBER:g}")
 _PATTERN = keys.Kind(keys.read_text, "a text, with patterns of *")
 _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
@@ -84,9 +77,11 @@ class Bounds:
 
     def find(self, check: str, method: str) -> Bound | None:
         """The first that fits, or None."""
-        fitting = (one for one in self.entries if one.check == check and fnmatchcase(method, one.method))
-        of_scene = (one for one in fitting if any(fnmatchcase(self.scene, each) for each in one.scenes.split("|")))
-        return next(of_scene, None)
+        for bound in self.entries:
+            is_of_scene = any(fnmatchcase(self.scene, pattern) for pattern in bound.scenes.split("|"))
+            if is_of_scene and bound.check == check and fnmatchcase(method, bound.method):
+                return bound
+        return None
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
         """Bounds that try `entries` first, then these.

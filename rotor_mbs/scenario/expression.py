@@ -92,4 +92,5 @@ def _applied(called: str, function: Callable[..., float], *arguments: float) -> 
 
 
 def _shown(text: str) -> str:
-    return f"'{text}'" if len(text) <= 40 else f"'{text[:37]}...'"
+    short = text if len(text) <= 40 else f"{text[:37]}..."
+    return f"'{short}'" if short.isprintable() else ascii(short)  # a tab

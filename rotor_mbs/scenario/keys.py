@@ -107,29 +107,6 @@ def read_number(value: object) -> float:
     return float(result)
 
 
-def _read_size(value: object) -> float:
-    result = read_number(value)
-    if result and not SMALLEST <= abs(result) <= LARGEST:
-        raise wrong(f"{shown(value)} is out of range", f"0, or sizes from {SMALLEST:g} to {LARGEST:g}")
-    return result
-
-
-def _read_not_negative(value: object) -> float:
-    result = _read_size(value)
-    if result < 0.0:
-        raise wrong(f"{shown(value)} is out of range")
-    return result
-
-
-def _read_positive(value: object) -> float:
-    result = read_number(value)
-    if result <= 0.0:
-        raise wrong(f"{shown(value)} is out of range")
-    if not SMALLEST <= result <= LARGEST:
-        raise wrong(f"{shown(value)} is out of range", f"sizes from {SMALLEST:g} to {LARGEST:g}")
-    return result
-
-
 def read_text(value: object) -> str:
     """A text that is not blank."""
     if not isinstance(value, str):
@@ -164,10 +141,29 @@ def _read_number_or_text(value: object) -> float | str:
         return read_text(value)
 
 
+def where(
+    kind: Kind, is_right: Callable[[Any], bool], allowed: str, what: str = "{} is out of range", allowed_there: str = ""
+) -> Kind:
+    """What is of `kind` and right; `what` is the message of the others, with {} for the value."""
+
+    def read(value: object) -> Any:
+        result = kind.read(value)
+        if not is_right(result):
+            raise wrong(what.replace("{}", shown(value)), allowed_there)
+        return result
+
+    return Kind(read, allowed)
+
+
 NUMBER = Kind(read_number, "a number{unit}")
-SIZE = Kind(_read_size, "a number{unit}")  # of a rotor
-NOT_NEGATIVE = Kind(_read_not_negative, "a number of at least 0{unit}")
-POSITIVE = Kind(_read_positive, "a number above 0{unit}")
+_SIZES = f"sizes from {SMALLEST:g} to {LARGEST:g}"
+# Numbers of a rotor.
+SIZE = where(
+    NUMBER, lambda x: x == 0.0 or SMALLEST <= abs(x) <= LARGEST, "a number{unit}", allowed_there=f"0, or {_SIZES}"
+)
+NOT_NEGATIVE = where(SIZE, lambda x: x >= 0.0, "a number of at least 0{unit}")
+_ABOVE_ZERO = where(NUMBER, lambda x: x > 0.0, "a number above 0{unit}")
+POSITIVE = where(_ABOVE_ZERO, lambda x: SMALLEST <= x <= LARGEST, _ABOVE_ZERO.allowed, allowed_there=_SIZES)
 NUMBER_OR_TEXT = Kind(_read_number_or_text, "a number or a text")
 TEXT = Kind(read_text, "a text")
 LINE = Kind(_read_line, f"a text of 1 to {MAX_TEXT} characters on one line")
@@ -202,15 +198,19 @@ def choice(names: Sequence[str]) -> Kind:
 
 def read_each(read: Callable[[Any], Any], values: Iterable[Any]) -> tuple[Any, ...]:
     """Every value, read. Raises TableError with the problems of all."""
-    results, problems = [], []
-    for i, value in enumerate(values):
+    return tuple(_read_entries(read, enumerate(values)).values())
+
+
+def _read_entries(read: Callable[[Any], Any], entries: Iterable[tuple[str | int, Any]]) -> dict[Any, Any]:
+    results, problems = {}, []
+    for name, value in entries:
         try:
-            results.append(read(value))
+            results[name] = read(value)
         except TableError as error:
-            problems += error.below(i)
+            problems += error.below(name)
     if problems:
         raise TableError(problems)
-    return tuple(results)
+    return results
 
 
 def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -> Kind:
@@ -232,15 +232,7 @@ def dict_of(kind: Kind, allowed: str) -> Kind:
     def read(value: object) -> dict[str, Any]:
         if not isinstance(value, dict):
             raise wrong(f"{shown(value)} is not a table")
-        results, problems = {}, []
-        for name, entry in value.items():
-            try:
-                results[name] = kind.read(entry)
-            except TableError as error:
-                problems += error.below(name)
-        if problems:
-            raise TableError(problems)
-        return results
+        return _read_entries(kind.read, value.items())
 
     return Kind(read, allowed)
 

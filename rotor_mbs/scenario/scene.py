@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
-from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, wrong
+from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
 from rotor_mbs.scenario.time_table import Table, is_constant, is_one_table, value_at
 from rotor_mbs.scenario.toml_file import KEY_FORM, KeyPath, KeyProblem, TableError, parse_key, shown_key, toml_lines
 
@@ -79,19 +79,6 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / max(abs(element) for element in inertia)
     trace = float(np.trace(J))
     return bool(np.linalg.eigvalsh(0.5 * trace * np.eye(3) - J)[0] >= -INERTIA_TOLERANCE * trace)
-
-
-def _read_outputs_of_scene(value: object) -> tuple[str, ...]:
-    if value == []:
-        raise wrong("0 entries")
-    return _read_outputs(value)
-
-
-def _read_inertia(value: object) -> tuple[float, ...]:
-    inertia: tuple[float, ...] = list_of(keys.SIZE, "", 6, 6).read(value)
-    if not is_rigid_body_inertia(inertia):
-        raise wrong("no rigid body has this inertia")
-    return inertia
 
 
 def _read_load(value: object) -> Table:
@@ -184,12 +171,14 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
 OUTPUT_NAMES = Kind(
     _read_outputs, 'some of "angles", "rates", "tip", "energy", "loads" and outputs of installed packages, each once'
 )
-_OUTPUTS = Kind(_read_outputs_of_scene, OUTPUT_NAMES.allowed)
+_OUTPUTS = where(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
 _POINT = list_of(keys.SIZE, "three numbers x, y, z{unit}, blade frame", 3, 3)
-_INERTIA = Kind(
-    _read_inertia,
+_INERTIA = where(
+    list_of(keys.SIZE, "", 6, 6),
+    is_rigid_body_inertia,
     "six numbers xx yy zz xy xz yz{unit} that a rigid body can have: positive semidefinite, no principal moment above "
     "the sum of the others",
+    "no rigid body has this inertia",
 )
 _LOAD = Kind(
     _read_load, "a number{unit}, or rows [t, number] with t from 0 s up, at most two with one t", over_time=True
@@ -430,7 +419,7 @@ def scene_hash(scene: Scene) -> str:
 
 
 def _exact(value: object, *, listed: bool = False) -> object:
-    """Doubles in hexadecimal, so that the text tells them apart bit for bit; a single one as a list where asked for."""
+    """Doubles in hexadecimal, so that the text tells them apart bit for bit; a single one in a list if `listed`."""
     if isinstance(value, tuple):
         return [_exact(entry) for entry in value]
     exact = value.hex() if isinstance(value, float) else value
@@ -533,24 +522,24 @@ def _names(path: KeyPath) -> str:
 def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
     """Sets the value at `path` in the tables of a scene; tables that are missing are made, keys are not checked.
 
-    One [blade] for all, or one number or table for every bearing, becomes one for field where the path names one.
+    One [blade] for all, or one number or table for every bearing, becomes one for each where the path names one.
     Raises TableError where the path goes through something that has no such entry.
     """
-    here: Any = tables
+    here: Any = tables  # a table or a list
     for depth, part in enumerate(path):
-        if isinstance(part, int) and isinstance(here, list):
-            if part >= len(here):
-                name = shown_key(path[:depth])
-                allowed = f"{name}[0] to {name}[{len(here) - 1}]"
-                raise TableError([KeyProblem(path[:depth], f"has {len(here)} entries", allowed, is_of_key=True)])
-        elif isinstance(part, int) or not isinstance(here, dict):
-            kind = "a table" if isinstance(here, dict) else "a single value"
-            kind = "a list" if isinstance(here, list) else kind
-            raise TableError([KeyProblem(path[:depth], f"is {kind}", KEY_FORM, is_of_key=True)])
+        has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
+        if not has_such_entries:
+            kinds = {dict: "a table", list: "a list"}
+            what = f"is {kinds.get(type(here), 'a single value')}"
+            raise TableError([KeyProblem(path[:depth], what, KEY_FORM, is_of_key=True)])
+        if isinstance(part, int) and part >= len(here):
+            name = shown_key(path[:depth])
+            allowed = f"{name}[0] to {name}[{len(here) - 1}]"
+            raise TableError([KeyProblem(path[:depth], f"has {len(here)} entries", allowed, is_of_key=True)])
         if depth == len(path) - 1:
             here[part] = value
             return
-        inner = here.get(part) if isinstance(part, str) else here[part]
+        inner = here[part] if isinstance(part, int) else here.get(part)
         following = path[depth + 1]
         if isinstance(following, int):
             inner = _as_list(tables, inner, path[: depth + 1], following)

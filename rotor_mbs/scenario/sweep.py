@@ -12,16 +12,14 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scenarios_folder, sweeps_folder
-from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, wrong
+from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, where, wrong
 from rotor_mbs.scenario.scene import OUTPUT_NAMES, Scene, scene_tables, unit_of
 from rotor_mbs.scenario.sweep_design import DRAWN, Axis, Design
 from rotor_mbs.scenario.toml_file import (
-    KEY_FORM,
     KeyPath,
     KeyProblem,
     TableError,
     find_lines,
-    is_key,
     line_of,
     parse_key,
     read_toml,
@@ -40,52 +38,25 @@ _MAX_ROW_ERRORS = 20
 
 
 def _read_key(value: object) -> str:
-    path = keys.LINE.read(value)
-    if not is_key(path):
-        raise wrong(f"{keys.shown(path)} is not the path of a key", KEY_FORM)
-    table = parse_key(path)[0]
+    key: str = keys.LINE.read(value)
+    table = parse_key(key)[0]
     if table in ("blades", "samples", "duration"):
         raise wrong(f"all runs of a dataset share one {table}", "a sweep for each, or a key that keeps the shape")
-    return str(path)
-
-
-def _read_linear(value: object) -> tuple[float, float, int]:
-    table: RangeTable = table_of(RangeTable).read(value)
-    return table.start, table.end, table.count
-
-
-def _read_log(value: object) -> tuple[float, float, int]:
-    start, end, count = _read_linear(value)
-    if min(start, end) <= 0.0:
-        raise wrong("a logarithmic range reaches 0 or less")
-    return start, end, count
-
-
-def _read_range(value: object) -> tuple[float, float]:
-    low, high = list_of(keys.NUMBER, "", 2, 2).read(value)
-    if not low < high:
-        raise wrong("the first number is not below the second")
-    return low, high
-
-
-def _read_normal(value: object) -> tuple[float, float]:
-    mean, deviation = list_of(keys.NUMBER, "", 2, 2).read(value)
-    if not deviation > 0.0:
-        raise wrong("the standard deviation is not above 0")
-    return mean, deviation
-
-
-def _read_share(value: object) -> float:
-    share = keys.read_number(value)
-    if not 0.0 < share < 1.0:
-        raise wrong(f"{keys.shown(value)} is out of range")
-    return share
+    return key
 
 
 _COUNT = keys.whole(2, MAX_COUNT, "a whole number from 2 up")
-_RANGE = Kind(_read_range, "two numbers [low, high]")
-_NORMAL = Kind(_read_normal, "two numbers [mean, standard deviation], the second one above 0")
-_SHARE = Kind(_read_share, "a share between 0 and 1")
+_PAIR = list_of(keys.NUMBER, "", 2, 2)
+_RANGE = where(
+    _PAIR, lambda pair: pair[0] < pair[1], "two numbers [low, high]", "the first number is not below the second"
+)
+_NORMAL = where(
+    _PAIR,
+    lambda pair: pair[1] > 0.0,
+    "two numbers [mean, standard deviation], the second one above 0",
+    "the standard deviation is not above 0",
+)
+_SHARE = where(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a share between 0 and 1")
 _SCENE_NAME = Kind(keys.LINE.read, "a shipped scene's name (paper/fig11), or a TOML file beside this one")
 
 
@@ -98,8 +69,13 @@ class RangeTable:
     count: int = file_key("count", _COUNT)
 
 
-_LINEAR = Kind(_read_linear, "a table with start, end, count")
-_LOG = Kind(_read_log, "a table with start, end, count, both ends above 0")
+_LINEAR = table_of(RangeTable, "a table with start, end, count")
+_LOG = where(
+    _LINEAR,
+    lambda range: min(range.start, range.end) > 0.0,
+    "a table with start, end, count, both ends above 0",
+    "a logarithmic range reaches 0 or less",
+)
 
 
 @dataclass(frozen=True)
@@ -108,8 +84,8 @@ class AxisTable:
 
     key: str = file_key("key", Kind(_read_key, "the path of a number of the scene"))
     values: tuple[float, ...] | None = file_key("values", list_of(keys.NUMBER, "a list of numbers", 1), default=None)
-    linear: tuple[float, float, int] | None = file_key("linear", _LINEAR, default=None)
-    log: tuple[float, float, int] | None = file_key("log", _LOG, default=None)
+    linear: RangeTable | None = file_key("linear", _LINEAR, default=None)  # noqa: RUF009
+    log: RangeTable | None = file_key("log", _LOG, default=None)  # noqa: RUF009
     uniform: tuple[float, float] | None = file_key("uniform", _RANGE, default=None)
     normal: tuple[float, float] | None = file_key("normal", _NORMAL, default=None)
     sobol: tuple[float, float] | None = file_key("sobol", _RANGE, default=None)
@@ -125,7 +101,7 @@ class AxisTable:
         kind = next(name for name in VARIED if getattr(self, name) is not None)
         numbers = getattr(self, kind)
         if kind in ("linear", "log"):
-            return Axis(self.key, kind, numbers[:2], numbers[2])
+            return Axis(self.key, kind, (numbers.start, numbers.end), numbers.count)
         return Axis(self.key, kind, numbers, draws if kind in DRAWN else len(numbers))
 
 
@@ -158,22 +134,22 @@ class SweepTable:
     axis: Sequence[AxisTable] = file_key("axis", _AXES)
 
     def __post_init__(self) -> None:
+        axes = [axis.key for axis in self.axis]
+        drawn = [axis.key for axis in self.axis if any(getattr(axis, kind) is not None for kind in DRAWN)]
+        repeated = [key for key, count in Counter(axes).items() if count > 1]
         problems = []
         if self.test + self.validation >= 1.0:
             allowed = "a share between 0 and 1, less than 1 with validation"
             problems.append(KeyProblem(("test",), "validation and test leave no rows for training", allowed))
-        counts = Counter(axis.key for axis in self.axis)
-        if max(counts.values()) > 1:
-            repeated = counts.most_common(1)[0][0]
-            what = f"{repeated} is varied by more than one axis"
+        if repeated:
+            what = f"{repeated[0]} is varied by more than one axis"
             problems.append(KeyProblem(("axis",), what, "one [[axis]] for a key"))
-        drawn = [axis.key for axis in self.axis if any(getattr(axis, name) is not None for name in DRAWN)]
         if drawn and self.draws is None:
             what = f"{drawn[0]} is random, and draws is missing"
             problems.append(KeyProblem(("axis",), what, "draws = N at the top of the file"))
         if self.draws is not None and not drawn:
-            allowed = f"draws with an axis of {', '.join(DRAWN)}"
-            problems.append(KeyProblem(("axis",), "draws is there, but no axis is random", allowed))
+            what, allowed = "draws is there, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}"
+            problems.append(KeyProblem(("axis",), what, allowed))
         if problems:
             raise TableError(problems)
 

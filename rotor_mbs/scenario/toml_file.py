@@ -75,10 +75,10 @@ class TableError(ValueError):
     def in_file(self, text: str, source: str) -> InputError:
         """The error as lines `source:line: key: what is wrong; allowed: ...`, sorted, for tables read from `text`."""
         lines = find_lines(text)
-        found = sorted((line_of(lines, problem.path), problem.message) for problem in self.problems)
-        shown = [f"{source}:{line}: {message}" for line, message in found[:MAX_PROBLEMS]]
-        if len(found) > MAX_PROBLEMS:
-            shown.append(f"{source}: {len(found) - MAX_PROBLEMS} more errors")
+        messages = sorted((line_of(lines, problem.path), problem.message) for problem in self.problems)
+        shown = [f"{source}:{line}: {message}" for line, message in messages[:MAX_PROBLEMS]]
+        if len(messages) > MAX_PROBLEMS:
+            shown.append(f"{source}: {len(messages) - MAX_PROBLEMS} more errors")
         return InputError(shown)
 
 
@@ -103,14 +103,9 @@ def _shown_name(name: str) -> str:
     return json.dumps(name if len(name) <= 60 else name[:57] + "...")
 
 
-def is_key(text: str) -> bool:
-    """Whether the text has the form of `shown_key`, without odd names."""
-    return _KEY.fullmatch(text) is not None
-
-
 def parse_key(text: str) -> KeyPath:
     """("initial", "angles", 1) of "initial.angles[1]". Raises TableError."""
-    if not is_key(text):
+    if not _KEY.fullmatch(text):
         raise TableError([KeyProblem((), f"{text[:60]!a} is not the path of a key", KEY_FORM, is_of_key=True)])
     return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[A-Za-z_]\w*|[0-9]+", text))
 
