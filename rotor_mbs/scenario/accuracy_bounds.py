@@ -1,6 +1,6 @@
 """The bounds that results are judged by: reference/accuracy.toml, and a user's own file before it.
 
-A run's status and the verdicts of `check` read the same entries. Must not know results.
+A run's status and the verdicts of `check` read the same entries.
 """
 
 from __future__ import annotations
@@ -14,14 +14,21 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.scenario.toml_file import read_toml, shown_path
+from rotor_mbs.scenario.keys import file_key
+from rotor_mbs.scenario.toml_file import TableError, read_toml, shown_path
 
 CHECKS = (
     "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "impulse", "loads", "gap",
     "exact", "published", "reference", "growth", "integrity", "copied", "settings", "steps", "uncertainty", "horizon",
     "frozen", "symmetry", "order", "extrapolated", "ensemble", "printed", "rules", "speed",
 )  # fmt: skip
+
+
+_BOUND = keys.where(keys.NUMBER, lambda value: value >= 0.0, f"a number from 0 to {keys.MAX_NUMBER:g}")
+_PATTERN = keys.Kind(keys.read_text, "a text, with patterns of *")
+_SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +40,18 @@ class Bound:
                          bound may leave them out (infinity, "")
     """
 
-    check: str
-    method: str
-    value: float
-    reason: str
-    fault: float = math.inf
-    known_fault: str = ""
-    scenes: str = "*"
+    check: str = file_key("check", keys.choice(CHECKS))
+    method: str = file_key("method", _PATTERN)
+    value: float = file_key("value", _BOUND)
+    reason: str = file_key("reason", _SENTENCE)
+    fault: float = file_key("fault", _BOUND, default=math.inf)
+    known_fault: str = file_key("known_fault", _SENTENCE, default="")
+    scenes: str = file_key("scenes", _PATTERN, default="*")
+
+
+@dataclass(frozen=True)
+class _BoundsFile:
+    bound: tuple[Bound, ...] = file_key("bound", keys.list_of(keys.table_of(Bound), "one or more [[bound]] tables"))
 
 
 @dataclass(frozen=True)
@@ -65,9 +77,11 @@ class Bounds:
 
     def find(self, check: str, method: str) -> Bound | None:
         """The first that fits, or None."""
-        fitting = (one for one in self.entries if one.check == check and fnmatchcase(method, one.method))
-        of_scene = (one for one in fitting if any(fnmatchcase(self.scene, each) for each in one.scenes.split("|")))
-        return next(of_scene, None)
+        for bound in self.entries:
+            is_of_scene = any(fnmatchcase(self.scene, pattern) for pattern in bound.scenes.split("|"))
+            if is_of_scene and bound.check == check and fnmatchcase(method, bound.method):
+                return bound
+        return None
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
         """Bounds that try `entries` first, then these.
@@ -98,9 +112,9 @@ def load_bounds(own: Path | None = None) -> Bounds:
 
 def read_bounds(path: Path) -> Bounds:
     """The bounds of one TOML file of [[bound]] tables. Raises InputError with every error of the file."""
-    from rotor_mbs.scenario.schema import BoundsTable  # late, with pydantic: 0.15 s
-    from rotor_mbs.scenario.validation import validate_file
-
     text, tables = read_toml(path)
-    file = validate_file(BoundsTable, tables, text, shown_path(path))
-    return Bounds([Bound(**entry.model_dump(exclude_none=True)) for entry in file.bound])
+    try:
+        file: _BoundsFile = keys.table_of(_BoundsFile).read(tables)
+    except TableError as error:
+        raise error.in_file(text, shown_path(path)) from error
+    return Bounds(file.bound)

@@ -1,4 +1,4 @@
-"""The scenes that are shipped, their names, and which ones the arguments of a command mean. Must not know models."""
+"""The scenes that are shipped, their names, and which ones the arguments of a command mean."""
 
 from __future__ import annotations
 
@@ -85,13 +85,21 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
     for argument in arguments:
         try:
             for path in _files(argument):
-                real = _real(path)
+                try:
+                    real = path.resolve()
+                except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a NUL in the name
+                    wrong = "leads to no file; allowed: a readable TOML file"
+                    raise InputError(f"{shown_path(path)}: {wrong}") from error
                 files.setdefault(real, (path, _scene_name(path, real)))
         except InputError as error:
             problems.extend(error.problems)
-    problems.extend(_name_clashes(files.values()))
     scenes = []
+    by_name: dict[str, Path] = {}
     for path, name in files.values():
+        if name in by_name:
+            clash = f"its scene would be named {name}, as that of {shown_path(by_name[name])}"
+            problems.append(f"{shown_path(path)}: {clash}; allowed: different names")
+        by_name.setdefault(name, path)
         try:
             scenes.append(load_scene(path, name))
         except InputError as error:
@@ -103,10 +111,10 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
 
 def only_scene(argument: str) -> Scene:
     """The one scene that `argument` means. Raises InputError where it means several, as for `find_scenes`."""
-    found = find_scenes([argument])
-    if len(found) != 1:
-        raise InputError(f"{argument}: {len(found)} scenes; allowed: the name of one scene, or a TOML file")
-    return found[0]
+    scenes = find_scenes([argument])
+    if len(scenes) != 1:
+        raise InputError(f"{argument}: {len(scenes)} scenes; allowed: the name of one scene, or a TOML file")
+    return scenes[0]
 
 
 def scene_of(given: Scene | str) -> Scene:
@@ -149,25 +157,18 @@ def _files(argument: str) -> list[Path]:
         return paths
     if path.suffix == ".toml":
         return [path]
-    raise InputError(f"{_quoted(argument)}: {_unknown_argument(argument, is_there, shipped)}")
-
-
-def _unknown_argument(argument: str, is_there: bool, shipped: Iterable[str]) -> str:
     if is_there:
-        return "is not a TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
-    if not _NAME.fullmatch(argument):
-        return f"is neither a scene's name nor a TOML file; allowed: pieces {_NAME_RULE}, joined by /"
-    if argument in dict(list_sweeps()):
-        return f"is a sweep; allowed: a scene, or: rotor-mbs sweep {argument}"
-    names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
-    return f"no such scene{nearest(argument, natural_order(names))}; allowed: what `rotor-mbs list` names, or FILE.toml"
-
-
-def _real(path: Path) -> Path:
-    try:
-        return path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a NUL in the name
-        raise InputError(f"{shown_path(path)}: leads to no file; allowed: a readable TOML file") from error
+        wrong = "is not a TOML file; allowed: a scene's name, a folder, a path that ends in .toml"
+    elif not _NAME.fullmatch(argument):
+        wrong = f"is neither a scene's name nor a TOML file; allowed: pieces {_NAME_RULE}, joined by /"
+    elif argument in dict(list_sweeps()):
+        wrong = f"is a sweep; allowed: a scene, or: rotor-mbs sweep {argument}"
+    else:
+        names = {*shipped, *(name.rpartition("/")[0] for name in shipped)}
+        hint = nearest(argument, natural_order(names))
+        wrong = f"no such scene{hint}; allowed: what `rotor-mbs list` names, or FILE.toml"
+    quoted = f"'{argument if len(argument) <= 80 else argument[:77] + '...'}'"
+    raise InputError(f"{quoted if argument.isprintable() else ascii(argument[:80])}: {wrong}")
 
 
 def _scene_name(path: Path, real: Path) -> str:
@@ -181,21 +182,3 @@ def _scene_name(path: Path, real: Path) -> str:
     if stem in RESERVED_GROUPS or any(name.startswith(stem + "/") for name in _shipped()):
         raise InputError(f"{shown_path(path)}: {stem} names a group of results; allowed: another file name")
     return stem
-
-
-def _name_clashes(files: Iterable[tuple[Path, str]]) -> list[str]:
-    first: dict[str, Path] = {}
-    clashes = []
-    for path, name in files:
-        other = first.setdefault(name, path)
-        if other is not path:
-            clashes.append(
-                f"{shown_path(path)}: its scene would be named {name}, as that of {shown_path(other)}; "
-                "allowed: different names"
-            )
-    return clashes
-
-
-def _quoted(argument: str) -> str:
-    text = argument if len(argument) <= 80 else argument[:77] + "..."
-    return f"'{text}'" if text.isprintable() else ascii(text)

@@ -1,4 +1,4 @@
-"""Arithmetic in quotes, "11*pi/12", to a double: parsed, never run as code. Must not know scenes."""
+"""Arithmetic in quotes, "11*pi/12", to a double: parsed, never run as code."""
 
 from __future__ import annotations
 
@@ -92,4 +92,5 @@ def _applied(called: str, function: Callable[..., float], *arguments: float) -> 
 
 
 def _shown(text: str) -> str:
-    return f"'{text}'" if len(text) <= 40 else f"'{text[:37]}...'"
+    short = text if len(text) <= 40 else f"{text[:37]}..."
+    return f"'{short}'" if short.isprintable() else ascii(short)  # a tab

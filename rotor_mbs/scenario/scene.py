@@ -1,21 +1,27 @@
-"""A scene as plain numbers: what every model gets, and all it gets. Must not know a model or a file format.
+"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers. All that every model gets.
 
-Each field of a scene says here which key of the scene file it comes from, its unit, and which part of a scene it is.
-The scene's hash, its rotor key, the units of a sweep and the written scene file are derived from that.
+A key of the scene file is one field of Scene or Blade, which says what its value may be, its unit, and which part of a
+scene it is. Reading with all errors, the hash, the keys of sweeps, units and the written file follow from the fields.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 import json
 import math
-from collections.abc import Iterator
-from dataclasses import Field, dataclass, field, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import Field, dataclass, fields
+from itertools import pairwise
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal
 
-from rotor_mbs.scenario.time_table import Table, is_constant, value_at
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario import keys
+from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
+from rotor_mbs.scenario.time_table import Table, is_constant, is_one_table, value_at
+from rotor_mbs.scenario.toml_file import KEY_FORM, KeyPath, KeyProblem, TableError, parse_key, shown_key, toml_lines
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,6 +31,14 @@ DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
 OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
 ENTRY_POINT_GROUP = "rotor_mbs.quantities"  # a package adds the output that its entry point in this group is called
 
+MAX_BLADES = 10_000
+MAX_SAMPLES = 10_000_000
+MAX_SAMPLE_BYTES = 2 << 30
+# Principal moments may break the triangle inequality by this share of their sum: numbers typed with ten digits do so
+# for a flat body, whose inequality is an equality. It is far above the round-off of the eigenvalues (1e-15).
+INERTIA_TOLERANCE = 1e-9
+
+# label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
 Part = Literal["label", "run", "start", "rotor"]
 
 
@@ -37,23 +51,143 @@ def known_outputs() -> tuple[str, ...]:
     return (*OUTPUTS, *sorted(added - set(OUTPUTS)))
 
 
-def file_key(
-    path: str,
-    unit: str = "1",
-    part: Part = "rotor",
-    *,
-    per_blade: bool = False,
-    over_time: bool = False,
-    added: bool = False,
-) -> dict[str, Any]:
-    """Metadata of a field of Scene that is read from the key `path` of the scene file ("" for none).
+def _read_outputs(value: object) -> tuple[str, ...]:
+    """The built-in outputs in their order, then the others, sorted."""
+    # Installed packages are searched only for what is not built in.
+    is_built_in = isinstance(value, list) and all(name in OUTPUTS for name in value)
+    known = OUTPUTS if is_built_in else known_outputs()
+    outputs = list_of(keys.choice(known), "").read(value)
+    repeated = next((output for output in outputs if outputs.count(output) > 1), None)
+    if repeated:
+        raise wrong(f'"{repeated}" is given more than once')
+    return (*(name for name in OUTPUTS if name in outputs), *sorted(set(outputs) - set(OUTPUTS)))
 
-    part        label: no number of the scene; run: what is computed; start: initial state; rotor: parameters and loads
-    per_blade   the file may have one value for all blades
-    over_time   a value may be a table over time
-    added       the key is younger than the stored hashes: at its default it does not enter them
+
+def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
+    """Whether some distribution of mass >= 0 has this tensor: xx yy zz xy xz yz about the centre of mass, kg m².
+
+    That is so exactly where the second moments ∫r rᵀ dm = ½ tr(J) I - J are positive semidefinite: their eigenvalues
+    are (J2 + J3 - J1)/2, so this is the triangle inequality of the principal moments, and it implies J >= 0.
     """
-    return {"key": path, "unit": unit, "part": part, "per_blade": per_blade, "over_time": over_time, "added": added}
+    if not any(inertia):
+        return True
+    import numpy as np  # late: a point mass, as in every scene of the paper, does without
+
+    xx, yy, zz, xy, xz, yz = inertia
+    if min(xx, yy, zz) < 0.0:
+        return False
+    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / max(abs(element) for element in inertia)
+    trace = float(np.trace(J))
+    return bool(np.linalg.eigvalsh(0.5 * trace * np.eye(3) - J)[0] >= -INERTIA_TOLERANCE * trace)
+
+
+def _read_load(value: object) -> Table:
+    """A table over time, from its rows or a constant; () where it is zero at all times."""
+    if not isinstance(value, list):
+        constant = keys.SIZE.read(value)
+        return ((0.0, constant),) if constant else ()
+    rows: Table = list_of(list_of(keys.SIZE, "", 2, 2), "", 1).read(value)
+    times = [time for time, _ in rows]
+    if times[0] < 0.0:
+        raise wrong("the first time is below 0")
+    for before, time in pairwise(times):
+        if time < before:
+            raise wrong(f"t = {time:g} comes after t = {before:g}")
+    for time, after_next in zip(times, times[2:], strict=False):
+        if time == after_next:
+            raise wrong(f"three rows have t = {time:g}")
+    return rows if any(value for _, value in rows) else ()
+
+
+def _per_blade(kind: Kind) -> Kind:
+    """One value for every pitch bearing, or a list with one for each; kept as a tuple, () where all are zero."""
+
+    def read(value: Any, scene: Mapping[str, Any]) -> tuple[Any, ...]:
+        count = scene.get("blade_count")
+        if not isinstance(value, list) or (kind.over_time and value and is_one_table(value)):
+            entries = (kind.read(value),) * (count or 1)
+        elif count is not None and len(value) != count:
+            raise wrong(f"{counted(len(value), 'number')} in a list for {counted(count, 'blade')}")
+        else:
+            entries = read_each(kind.read, value)
+        _check_bare_pitches("acts on", entries, scene)
+        return entries if any(entries) else ()
+
+    entry = "one or the other" if kind.over_time else "one"
+    allowed = f"{kind.allowed}, or a list with {entry} for each blade"
+    return Kind(read, allowed, in_context=True, per_blade=True, over_time=kind.over_time)
+
+
+def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
+    """An entry for every coordinate."""
+    count = scene.get("blade_count")
+    if isinstance(value, list) and count is not None and len(value) != 1 + count:
+        raise wrong(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
+    numbers: tuple[float, ...] = list_of(keys.NUMBER, "").read(value)
+    return numbers
+
+
+def _read_rates(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
+    rates = _read_angles(value, scene)
+    _check_bare_pitches("a pitch rate for", rates[1:], scene)
+    return rates
+
+
+def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, Any]) -> None:
+    """Raises TableError where an entry is not zero for a blade without pitch inertia."""
+    if "blade_count" not in scene or "blades" not in scene:
+        return
+    bare = [i + 1 for i, blade in enumerate(scene["blades"]) if entries[i] and not blade.has_pitch_inertia]
+    if bare:
+        blades = f"{len(bare)} blades (number {bare[0]} first)"
+        if len(bare) <= 5:
+            blades = f"blade{'s' if len(bare) > 1 else ''} {', '.join(map(str, bare))}"
+        allowed = "0 there: a pitch without inertia is left out of the model"
+        raise wrong(f"{what} {blades}, whose pitch has no inertia", allowed)
+
+
+def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
+    """One [blade] table for all, or a [[blade]] table for each."""
+
+    def read_blade(table: object) -> Blade:
+        if not isinstance(table, dict):
+            raise wrong(f"{shown(table)} is not a table")
+        values, problems = keys.read_keys(BLADE_KEYS, table)
+        if "tip" not in table and "tip" in scene.get("outputs", ()):
+            problems.append(KeyProblem(("tip",), "is missing", BLADE_KEYS["tip"]["allowed"]))
+        if problems:
+            raise TableError(problems)
+        values["tip"] = values["tip"] or values["centre_of_mass"]
+        return Blade(**values)
+
+    count = scene.get("blade_count")
+    if not isinstance(value, list):
+        return (read_blade(value),) * (count or 1)
+    if count is not None and len(value) != count:
+        raise wrong(f"{counted(len(value), '[[blade]] table')} for {counted(count, 'blade')}")
+    return read_each(read_blade, value)
+
+
+OUTPUT_NAMES = Kind(
+    _read_outputs, 'some of "angles", "rates", "tip", "energy", "loads" and outputs of installed packages, each once'
+)
+_OUTPUTS = where(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
+_POINT = list_of(keys.SIZE, "three numbers x, y, z{unit}, blade frame", 3, 3)
+_INERTIA = where(
+    list_of(keys.SIZE, "", 6, 6),
+    is_rigid_body_inertia,
+    "six numbers xx yy zz xy xz yz{unit} that a rigid body can have: positive semidefinite, no principal moment above "
+    "the sum of the others",
+    "no rigid body has this inertia",
+)
+_LOAD = Kind(
+    _read_load, "a number{unit}, or rows [t, number] with t from 0 s up, at most two with one t", over_time=True
+)
+_ANGLES = Kind(_read_angles, "1 + blades numbers{unit}: rotor, then a pitch per blade", in_context=True)
+_RATES = Kind(_read_rates, _ANGLES.allowed, in_context=True)
+_BLADES = Kind(_read_blades, "one [blade] table for all blades, or a [[blade]] table for each", in_context=True)
+_METHODS = list_of(keys.TEXT, "names of methods, as `rotor-mbs list` has them")
+_SETTINGS = keys.dict_of(keys.NUMBER_OR_TEXT, "a table of methods' settings, such as step = 1e-3")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +200,12 @@ class Blade:
     tip             (3,) m, the point whose path is drawn
     """
 
-    mass: float = field(metadata={"unit": "kg"})
-    centre_of_mass: tuple[float, float, float] = field(metadata={"unit": "m"})
-    inertia: tuple[float, float, float, float, float, float] = field(metadata={"unit": "kg m^2"})
-    tip: tuple[float, float, float] = field(metadata={"unit": "m"})
+    mass: float = file_key("mass", keys.POSITIVE, "kg")
+    centre_of_mass: tuple[float, float, float] = file_key("centre_of_mass", _POINT, "m", ": z along the pitch axis")
+    inertia: tuple[float, float, float, float, float, float] = file_key(
+        "inertia", _INERTIA, "kg m^2", optional=(0.0,) * 6
+    )
+    tip: tuple[float, float, float] = file_key("tip", _POINT, "m", ', needed for the output "tip"', optional=())
 
     @property
     def is_point_mass(self) -> bool:
@@ -96,6 +232,14 @@ class Blade:
         return x != 0.0 or y != 0.0 or self.inertia[2] != 0.0
 
 
+def _key(path: str, *declared: Any, part: Part = "rotor", added: bool = False, **more: Any) -> Any:
+    """As `file_key`, with the part of the scene, and whether the key is `added`.
+
+    An added key is younger than the stored hashes: at its default it does not enter them.
+    """
+    return file_key(path, *declared, part=part, added=added, **more)
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
     """A rotor and what happens to it. Blade i hangs at phase 2π(i-1)/len(blades) about the shaft (+y); z is up.
@@ -105,40 +249,40 @@ class Scene:
     pitch_torque                    (blades,) tables over time, N m, between hub and blade; positive as the pitch is
     bearing_stiffness, _damping     (blades,) N m/rad, N m s/rad; of the pitch and of its rate
     bearing_rest                    (blades,) tables over time, rad: pitch at which the spring is unloaded
-    shaft_damping                   N m s/rad
     methods, settings               by which methods `run` computes it, and with what in place of their defaults; () for
                                     what a rule and the methods say
     text                            the TOML text it was read from
+
+    Loads, springs and dampers that are zero throughout are (). The class takes any values: `load_scene`, `parse_scene`
+    and `replace` validate.
     """
 
-    name: str = field(metadata=file_key("", part="label"))
-    title: str = field(metadata=file_key("title", part="label"))
-    figures: tuple[str, ...] = field(metadata=file_key("figures", part="label"))
-    gravity: float = field(metadata=file_key("gravity", "m/s^2"))
-    duration: float = field(metadata=file_key("duration", "s", "run"))
-    samples: int = field(metadata=file_key("samples", part="run"))
-    outputs: tuple[str, ...] = field(metadata=file_key("outputs", part="run"))
-    blades: tuple[Blade, ...] = field(metadata=file_key("blade"))
-    hub_inertia: float = field(metadata=file_key("hub.inertia", "kg m^2"))
-    initial_angles: tuple[float, ...] = field(metadata=file_key("initial.angles", "rad", "start"))
-    initial_rates: tuple[float, ...] = field(metadata=file_key("initial.rates", "rad/s", "start"))
-    rotor_torque: Table = field(default=(), metadata=file_key("torque.rotor", "N m", over_time=True))
-    bearing_stiffness: tuple[float, ...] = field(
-        default=(), metadata=file_key("bearing.stiffness", "N m/rad", per_blade=True)
+    name: str = _key("", keys.TEXT, part="label")
+    title: str = _key("title", keys.LINE, part="label")
+    figures: tuple[str, ...] = _key("figures", list_of(keys.LINE, 'texts, such as ["5"]'), part="label", optional=())
+    gravity: float = _key("gravity", keys.NOT_NEGATIVE, "m/s^2", ", along -z")
+    duration: float = _key("duration", keys.POSITIVE, "s", part="run")
+    samples: int = _key("samples", keys.whole(2, MAX_SAMPLES), "1", ": equally spaced, with both ends", part="run")
+    outputs: tuple[str, ...] = _key("outputs", _OUTPUTS, part="run", optional=DEFAULT_OUTPUTS)
+    blades: tuple[Blade, ...] = _key("blade", _BLADES)
+    hub_inertia: float = _key("hub.inertia", keys.NOT_NEGATIVE, "kg m^2", ", about the shaft", optional=0.0)
+    initial_angles: tuple[float, ...] = _key("initial.angles", _ANGLES, "rad", part="start")
+    initial_rates: tuple[float, ...] = _key("initial.rates", _RATES, "rad/s", part="start")
+    rotor_torque: tuple[tuple[float, float], ...] = _key("torque.rotor", _LOAD, "N m", default=())
+    bearing_stiffness: tuple[float, ...] = _key(
+        "bearing.stiffness", _per_blade(keys.NOT_NEGATIVE), "N m/rad", default=()
     )
-    bearing_damping: tuple[float, ...] = field(
-        default=(), metadata=file_key("bearing.damping", "N m s/rad", per_blade=True)
+    bearing_damping: tuple[float, ...] = _key("bearing.damping", _per_blade(keys.NOT_NEGATIVE), "N m s/rad", default=())
+    shaft_damping: float = _key("shaft.damping", keys.NOT_NEGATIVE, "N m s/rad", default=0.0)
+    pitch_torque: tuple[Table, ...] = _key(
+        "torque.pitch", _per_blade(_LOAD), "N m", ": between hub and blade", default=(), added=True
     )
-    shaft_damping: float = field(default=0.0, metadata=file_key("shaft.damping", "N m s/rad"))
-    pitch_torque: tuple[Table, ...] = field(
-        default=(), metadata=file_key("torque.pitch", "N m", per_blade=True, over_time=True, added=True)
+    bearing_rest: tuple[Table, ...] = _key(
+        "bearing.rest", _per_blade(_LOAD), "rad", ": pitch at which the spring is unloaded", default=(), added=True
     )
-    bearing_rest: tuple[Table, ...] = field(
-        default=(), metadata=file_key("bearing.rest", "rad", per_blade=True, over_time=True, added=True)
-    )
-    methods: tuple[str, ...] = field(default=(), metadata=file_key("methods", part="label"))
-    settings: tuple[tuple[str, float | str], ...] = field(default=(), metadata=file_key("settings", part="label"))
-    text: str = field(default="", metadata=file_key("", part="label"))
+    methods: tuple[str, ...] = _key("methods", _METHODS, part="label", default=())
+    settings: tuple[tuple[str, float | str], ...] = _key("settings", _SETTINGS, part="label", default=())
+    text: str = _key("", keys.TEXT, part="label", default="")
 
     @property
     def phases(self) -> tuple[float, ...]:
@@ -218,9 +362,14 @@ class Scene:
         >>> scene.replace(gravity=9.81, **{"initial.angles[1]": "pi/5", "blade.mass": 1e4}).blades[0].mass
         10000.0
         """
-        from rotor_mbs.scenario.variants import replaced_scene  # late: it builds scenes, and so imports this module
-
-        return replaced_scene(self, changes)
+        tables = scene_tables(self)
+        try:
+            for path, value in changes.items():
+                put_value(tables, parse_key(path), _plain(value))
+            changed = scene_from_tables(tables, self.name)
+        except TableError as error:
+            raise InputError(f"{self.name}: {problem.message}" for problem in error.problems) from error
+        return dataclasses.replace(changed, text=scene_toml(changed))
 
     def wants(self, output: str) -> bool:
         return output in self.outputs
@@ -230,12 +379,26 @@ class Scene:
         return value_at(self.rotor_torque, time)
 
 
+BLADE_KEYS = keys.declared_keys(Blade)
+_OWN_KEYS = keys.declared_keys(Scene)
+_COUNT = file_key("blades", keys.whole(1, MAX_BLADES), "1", ": blade i at 2 pi (i - 1)/blades about the shaft")
+SCENE_KEYS = {
+    "title": _OWN_KEYS["title"],
+    "figures": _OWN_KEYS["figures"],
+    "blade_count": _COUNT.metadata,
+    **_OWN_KEYS,
+}
+_BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
+    f"blade.{name}": declared for name, declared in BLADE_KEYS.items()
+}
+
+
 def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
     """The dataclass fields of Scene that are of these parts, in order."""
-    return (one for one in fields(Scene) if one.metadata["part"] in parts)
+    return (field for field in fields(Scene) if field.metadata["part"] in parts)
 
 
-_rotor_values = attrgetter(*(one.name for one in scene_fields("rotor")))
+_rotor_values = attrgetter(*(field.name for field in scene_fields("rotor")))
 
 
 def scene_hash(scene: Scene) -> str:
@@ -245,22 +408,167 @@ def scene_hash(scene: Scene) -> str:
     equal ones) do not enter; neither does the tip where no tip path is asked for.
     """
     content: dict[str, object] = {}
-    for one in scene_fields("run", "start", "rotor"):
-        value = getattr(scene, one.name)
-        if one.name == "blades":
-            content["blades"] = [_blade_content(blade, with_tip=scene.wants("tip")) for blade in value]
-        elif not (one.metadata["added"] and value == one.default):
-            content[one.name] = sorted(value) if one.name == "outputs" else _exact(value)
+    for field in scene_fields("run", "start", "rotor"):
+        value = getattr(scene, field.name)
+        if field.name == "blades":
+            numbers = [name for name in BLADE_KEYS if name != "tip" or scene.wants("tip")]
+            content["blades"] = [[_exact(getattr(blade, name), listed=True) for name in numbers] for blade in value]
+        elif not (field.metadata["added"] and value == field.default):
+            content[field.name] = sorted(value) if field.name == "outputs" else _exact(value)
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _blade_content(blade: Blade, *, with_tip: bool) -> list[object]:
-    values = [getattr(blade, one.name) for one in fields(Blade) if with_tip or one.name != "tip"]
-    return [_exact(value if isinstance(value, tuple) else (value,)) for value in values]
-
-
-def _exact(value: object) -> object:
-    """Doubles in hexadecimal, so that the text tells them apart bit for bit."""
+def _exact(value: object, *, listed: bool = False) -> object:
+    """Doubles in hexadecimal, so that the text tells them apart bit for bit; a single one in a list if `listed`."""
     if isinstance(value, tuple):
         return [_exact(entry) for entry in value]
-    return value.hex() if isinstance(value, float) else value
+    exact = value.hex() if isinstance(value, float) else value
+    return [exact] if listed else exact
+
+
+def values_per_sample(blades: int, outputs: Sequence[str]) -> int:
+    """Doubles that a run holds per sample: time, angles and rates always; tips, energies and loads where asked for."""
+    energies = 4  # kinetic, potential, work, energy error
+    loads = 6 * (1 + blades) + blades  # force and moment at every root and at the shaft, moments of the pitch actuators
+    asked = 3 * blades * ("tip" in outputs) + energies * ("energy" in outputs) + loads * ("loads" in outputs)
+    return 1 + 2 * (1 + blades) + asked
+
+
+def scene_from_tables(tables: Mapping[str, Any], name: str, text: str = "") -> Scene:
+    """The scene in the tables of a scene file. Raises TableError with every error."""
+    values, problems = keys.read_keys(SCENE_KEYS, tables)
+    if {"blade_count", "samples", "outputs"} <= values.keys():
+        of_sample = values_per_sample(values["blade_count"], values["outputs"])
+        total = values["samples"] * of_sample * 8
+        if total > MAX_SAMPLE_BYTES:
+            what = f"{values['samples']} samples of {of_sample} values of 8 bytes are {total / 2**30:.4g} GiB"
+            problems.append(KeyProblem(("samples",), what, f"at most {MAX_SAMPLE_BYTES >> 30} GiB"))
+    if problems:
+        raise TableError(problems)
+    del values["blade_count"]
+    values["settings"] = tuple(dict(values["settings"]).items())
+    return Scene(name=name, text=text, **values)
+
+
+def scene_tables(scene: Scene) -> dict[str, Any]:
+    """The scene as the tables of a scene file: numbers as they are, keys at their defaults left out."""
+    tables: dict[str, Any] = {"blades": len(scene.blades)}
+    for field in fields(Scene):
+        value = getattr(scene, field.name)
+        if not field.metadata["key"] or value == field.default:
+            continue
+        table, _, name = field.metadata["key"].rpartition(".")
+        written: Any
+        if field.name == "blades":
+            written = _blade_tables(scene)
+        elif field.name == "settings":
+            written = dict(value)
+        elif field.metadata["kind"].per_blade and len(set(value)) == 1:
+            written = _listed(value[0])
+        elif field.metadata["kind"].per_blade:
+            written = [_listed(entry) if entry != () else 0.0 for entry in value]
+        else:
+            written = _listed(value)
+        (tables.setdefault(table, {}) if table else tables)[name] = written
+    return tables
+
+
+def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
+    """One table for equal blades; a tip that only repeats the centre of mass was not given."""
+    tables: list[dict[str, Any]] = []
+    for blade in scene.blades if len(set(scene.blades)) > 1 else scene.blades[:1]:
+        table = {name: _listed(getattr(blade, name)) for name in BLADE_KEYS}
+        if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
+            del table["tip"]
+        tables.append(table)
+    return tables if len(tables) > 1 else tables[0]
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(entry) for entry in value] if isinstance(value, tuple) else value
+
+
+def scene_toml(scene: Scene) -> str:
+    """A scene file that has the scene's numbers bit for bit: reading it gives an equal scene, but for name and text.
+
+    Comments and expressions of the file that the scene was read from are not kept.
+    """
+    top, parts = {}, []
+    for name, value in scene_tables(scene).items():
+        if isinstance(value, dict):
+            parts.append(f"[{name}]\n{toml_lines(value)}")
+        elif name == "blade":
+            parts += [f"[[{name}]]\n{toml_lines(table)}" for table in value]
+        else:
+            top[name] = value
+    return "\n".join([toml_lines(top), *parts])
+
+
+def unit_of(path: KeyPath) -> str:
+    """The unit of the number at a path of a scene file, "1" where it has none."""
+    declared = _BY_PATH.get(_names(path))
+    if declared is None:
+        return "1"
+    kind = declared["kind"]
+    if kind.over_time and len(path) == (5 if kind.per_blade else 4) and path[-1] == 0:  # the time of a row
+        return "s"
+    return str(declared["unit"])
+
+
+def _names(path: KeyPath) -> str:
+    return ".".join(part for part in path if isinstance(part, str))
+
+
+def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
+    """Sets the value at `path` in the tables of a scene; tables that are missing are made, keys are not checked.
+
+    One [blade] for all, or one number or table for every bearing, becomes one for each where the path names one.
+    Raises TableError where the path goes through something that has no such entry.
+    """
+    here: Any = tables  # a table or a list
+    for depth, part in enumerate(path):
+        has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
+        if not has_such_entries:
+            kinds = {dict: "a table", list: "a list"}
+            what = f"is {kinds.get(type(here), 'a single value')}"
+            raise TableError([KeyProblem(path[:depth], what, KEY_FORM, is_of_key=True)])
+        if isinstance(part, int) and part >= len(here):
+            name = shown_key(path[:depth])
+            allowed = f"{name}[0] to {name}[{len(here) - 1}]"
+            raise TableError([KeyProblem(path[:depth], f"has {len(here)} entries", allowed, is_of_key=True)])
+        if depth == len(path) - 1:
+            here[part] = value
+            return
+        inner = here[part] if isinstance(part, int) else here.get(part)
+        following = path[depth + 1]
+        if isinstance(following, int):
+            inner = _as_list(tables, inner, path[: depth + 1], following)
+        here[part] = {} if inner is None else inner
+        here = here[part]
+
+
+def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) -> Any:
+    """What stands at `path`, as one entry per blade where the scene file allows one for all."""
+    count = tables.get("blades", 0)
+    if path == ("blade",) and isinstance(value, dict):
+        return [copied(value) for _ in range(count)]
+    declared = _BY_PATH.get(_names(path))
+    is_per_blade = declared is not None and declared["kind"].per_blade and isinstance(path[-1], str)
+    if is_per_blade and (not isinstance(value, list) or is_one_table(value)):
+        return [copied(0.0 if value is None else value) for _ in range(count)]
+    # Whether a list that is missing could be there is for the readers of the keys to say.
+    return [0.0] * (last + 1) if value is None else value
+
+
+def copied(value: Any) -> Any:
+    """A copy of tables of a file, with lists and tables of its own."""
+    if isinstance(value, dict):
+        return {name: copied(entry) for name, entry in value.items()}
+    return [copied(entry) for entry in value] if isinstance(value, list) else value
+
+
+def _plain(value: object) -> object:
+    """Tuples and NumPy values as the lists and numbers of a TOML file."""
+    if isinstance(value, tuple | list):
+        return [_plain(entry) for entry in value]
+    return value.tolist() if hasattr(value, "tolist") else value

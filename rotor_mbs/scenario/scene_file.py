@@ -1,17 +1,16 @@
-"""The scene file: read strictly from TOML, and written. Must not know models.
-
-Quoted expressions are evaluated here, once for every model.
-"""
+"""The scene file: a scene read from TOML, and a file to start from. Quoted expressions are evaluated here, once."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
+import textwrap
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.scenario.toml_file import parse_toml, read_toml, shown_path, toml_lines
+from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.scene import BLADE_KEYS, SCENE_KEYS, Scene, scene_from_tables, scene_toml
+from rotor_mbs.scenario.toml_file import TableError, parse_toml, read_toml, shown_path, toml_value
+
+__all__ = ["load_scene", "new_scene_text", "parse_scene", "scene_toml"]
 
 
 def load_scene(path: Path | str, name: str | None = None) -> Scene:
@@ -21,7 +20,11 @@ def load_scene(path: Path | str, name: str | None = None) -> Scene:
     entries are counted from 0, as by `Scene.replace`.
     """
     path = Path(path)
-    return _scene(*read_toml(path), path.stem if name is None else name, shown_path(path))
+    text, tables = read_toml(path)
+    if "axis" in tables and "scene" in tables:
+        shown = shown_path(path)
+        raise InputError(f"{shown}: is a sweep; allowed: a scene, or: rotor-mbs sweep {shown}")
+    return _scene(text, tables, path.stem if name is None else name, shown_path(path))
 
 
 def parse_scene(text: str, name: str) -> Scene:
@@ -30,76 +33,53 @@ def parse_scene(text: str, name: str) -> Scene:
 
 
 def _scene(text: str, tables: dict[str, Any], name: str, source: str) -> Scene:
-    from rotor_mbs.scenario.schema import SceneTable  # late, with pydantic: 0.2 s
-    from rotor_mbs.scenario.validation import validate_file
+    try:
+        return scene_from_tables(tables, name, text)
+    except TableError as error:
+        raise error.in_file(text, source) from error
 
-    return validate_file(SceneTable, tables, text, source).to_scene(name, text)
+
+_EXAMPLE: dict[str, Any] = {
+    "title": "My rotor",
+    "blades": 3,
+    "gravity": 9.81,
+    "duration": 10.0,
+    "samples": 1001,
+    "blade.mass": 15000.0,
+    "blade.centre_of_mass": [0.08, 0.0, 15.4],
+    "blade.tip": [0.08, 0.0, 33.4],
+    "initial.angles": ["deg(30)", 0, "pi/4", 0],
+    "initial.rates": [0, 0, 0, 0],
+    "torque.rotor": 1000.0,
+}
 
 
 def new_scene_text() -> str:
-    """A scene file with a comment for every key, to start a scene from."""
-    return Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
-
-
-def validated_scene(tables: Mapping[str, Any], name: str) -> Scene:
-    """The scene in the tables of a scene file, with no text. Raises TableError with every error."""
-    from rotor_mbs.scenario.schema import SceneTable
-    from rotor_mbs.scenario.validation import validate
-
-    return validate(SceneTable, tables).to_scene(name, "")
-
-
-def scene_tables(scene: Scene) -> dict[str, Any]:
-    """The scene as the tables of a scene file: numbers as they are, keys at their defaults left out."""
-    tables: dict[str, Any] = {}
-    for one in fields(Scene):
-        value = getattr(scene, one.name)
-        if not one.metadata["key"] or value == one.default:
-            continue
-        *names, last = one.metadata["key"].split(".")
-        table = tables
-        for name in names:
-            table = table.setdefault(name, {})
-        if one.metadata["per_blade"] and len(set(value)) == 1:
-            table[last] = _listed(value[0])
-        elif one.metadata["per_blade"] and one.metadata["over_time"]:
-            table[last] = [_listed(rows) if rows else 0.0 for rows in value]
-        else:
-            table[last] = _blade_tables(scene) if one.name == "blades" else _listed(value)
-    if scene.settings:
-        tables["settings"] = dict(scene.settings)
-    return {"blades": len(scene.blades), **tables}
-
-
-def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
-    """One table for equal blades; a tip that only repeats the centre of mass was not given."""
-    tables = []
-    for blade in scene.blades:
-        table = {one.name: _listed(getattr(blade, one.name)) for one in fields(Blade)}
-        if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
-            del table["tip"]
-        tables.append(table)
-    return tables[0] if all(table == tables[0] for table in tables) else tables
-
-
-def _listed(value: Any) -> Any:
-    return [_listed(entry) for entry in value] if isinstance(value, tuple) else value
-
-
-def scene_toml(scene: Scene) -> str:
-    """A scene file that has the scene's numbers bit for bit: reading it gives an equal scene, but for name and text.
-
-    Comments and expressions of the file that the scene was read from are not kept.
-    """
-    tables = scene_tables(scene)
-    parts = [toml_lines({key: value for key, value in tables.items() if not _is_table(value)})]
-    for key, value in tables.items():
-        if isinstance(value, dict):
-            parts.append(f"[{key}]\n{toml_lines(value)}")
-        elif _is_table(value):
-            parts += [f"[[{key}]]\n{toml_lines(table)}" for table in value]
+    """A scene file with every key, a value and what is allowed, to start a scene from."""
+    keys = []
+    for declared in SCENE_KEYS.values():
+        if declared["key"] == "blade":
+            keys += [(f"blade.{name}", blade_key) for name, blade_key in BLADE_KEYS.items()]
+        elif declared["key"] != "settings":
+            keys.append((declared["key"], declared))
+    lines: dict[str, list[str]] = {"": ["# A scene: a rotor, its loads and its start. SI units; angles in rad."]}
+    for path, declared in keys:
+        table, _, name = path.rpartition(".")
+        value = _EXAMPLE.get(path, declared.get("optional"))
+        if value == () and declared["unit"] != "1":  # no load
+            value = 0.0
+        entry = f"{name} = {toml_value(value)}"
+        comment = f"optional: {declared['allowed']}" if "optional" in declared else declared["allowed"]
+        first, *more = textwrap.wrap(comment, max(40, 116 - max(34, len(entry))))
+        lines.setdefault(table, []).append(f"{entry:34} # {first}")
+        lines[table] += [f"{'':34} # {rest}" for rest in more]
+    lines[""] += [
+        '# Numbers may be arithmetic in quotes, "11*pi/12", with pi, sqrt(x), hypot(x, y) and deg(x).',
+        "# A table of optional keys may be left out: nothing is then built for it.",
+    ]
+    lines["settings"] = [f"{'# step = 1e-3':34} # optional: {SCENE_KEYS['settings']['allowed']}"]
+    parts = []
+    for table, entries in lines.items():
+        header = [f"[{table}]"] if table else []
+        parts.append("\n".join([*header, *entries, ""]))
     return "\n".join(parts)
-
-
-def _is_table(value: Any) -> bool:
-    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))

@@ -1,146 +1,157 @@
-"""A sweep file, read strictly: a Sweep, or every error of the file at once. Must not know methods or results files.
-
-Importing this module costs 0.2 s (pydantic).
-"""
+"""A sweep file: a scene and what is varied, or every error of the file at once."""
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scenarios_folder, sweeps_folder
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.scene_file import scene_tables
-from rotor_mbs.scenario.schema import OUTPUTS_ALLOWED, Outputs
+from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, where, wrong
+from rotor_mbs.scenario.scene import OUTPUT_NAMES, Scene, scene_tables, unit_of
 from rotor_mbs.scenario.sweep_design import DRAWN, Axis, Design
-from rotor_mbs.scenario.toml_file import KeyPath, TableError, find_lines, line_of, read_toml, shown_path, toml_lines
-from rotor_mbs.scenario.validation import Line, Number, Table, invalid, validate_file
-from rotor_mbs.scenario.variants import KEY_FORM, Variants, is_key, parse_key, unit_of
+from rotor_mbs.scenario.toml_file import (
+    KeyPath,
+    KeyProblem,
+    TableError,
+    find_lines,
+    line_of,
+    parse_key,
+    read_toml,
+    shown_path,
+    toml_lines,
+)
+from rotor_mbs.scenario.variants import Variants
 
 MAX_COUNT = 10**15  # values of a range; too many runs are reported where they are counted
 MAX_ROWS = 10_000_000
 VARIED = ("values", "linear", "log", *DRAWN)
-_OF_ONE_SHAPE = ("blades", "samples", "duration")
 # Keys whose rule is an interval of its own: if the ends of an axis keep it, all values between them do.
 _INTERVALS = ("initial", "gravity", "hub", "shaft", "bearing")
 _ROWS_AT_ONCE = 4096
 _MAX_ROW_ERRORS = 20
 
 
-def _varied_key(key: str) -> str:
-    if not is_key(key):
-        raise invalid("{shown} is not the path of a key", KEY_FORM)
+def _read_key(value: object) -> str:
+    key: str = keys.LINE.read(value)
     table = parse_key(key)[0]
-    if table in _OF_ONE_SHAPE:
-        raise invalid(f"all runs of a dataset share one {table}", "a sweep for each, or a key that keeps the shape")
+    if table in ("blades", "samples", "duration"):
+        raise wrong(f"all runs of a dataset share one {table}", "a sweep for each, or a key that keeps the shape")
     return key
 
 
-def _rising(pair: list[float]) -> list[float]:
-    if not pair[0] < pair[1]:
-        raise invalid("the first number is not below the second")
-    return pair
+_COUNT = keys.whole(2, MAX_COUNT, "a whole number from 2 up")
+_PAIR = list_of(keys.NUMBER, "", 2, 2)
+_RANGE = where(
+    _PAIR, lambda pair: pair[0] < pair[1], "two numbers [low, high]", "the first number is not below the second"
+)
+_NORMAL = where(
+    _PAIR,
+    lambda pair: pair[1] > 0.0,
+    "two numbers [mean, standard deviation], the second one above 0",
+    "the standard deviation is not above 0",
+)
+_SHARE = where(keys.NUMBER, lambda share: 0.0 < share < 1.0, "a share between 0 and 1")
+_SCENE_NAME = Kind(keys.LINE.read, "a shipped scene's name (paper/fig11), or a TOML file beside this one")
 
 
-def _with_spread(pair: list[float]) -> list[float]:
-    if not pair[1] > 0.0:
-        raise invalid("the standard deviation is not above 0")
-    return pair
-
-
-Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-Range = Annotated[Pair, AfterValidator(_rising)]
-Normal = Annotated[Pair, AfterValidator(_with_spread)]
-
-
-class RangeTable(Table):
+@dataclass(frozen=True)
+class RangeTable:
     """`linear` or `log`: `count` values from `start` to `end`, both included."""
 
-    start: Number = Field(description="a number, the first value")
-    end: Number = Field(description="a number, the last value")
-    count: int = Field(ge=2, le=MAX_COUNT, description="a whole number from 2 up")
+    start: float = file_key("start", keys.NUMBER)
+    end: float = file_key("end", keys.NUMBER)
+    count: int = file_key("count", _COUNT)
 
 
-class AxisTable(Table):
+_LINEAR = table_of(RangeTable, "a table with start, end, count")
+_LOG = where(
+    _LINEAR,
+    lambda range: min(range.start, range.end) > 0.0,
+    "a table with start, end, count, both ends above 0",
+    "a logarithmic range reaches 0 or less",
+)
+
+
+@dataclass(frozen=True)
+class AxisTable:
     """One [[axis]]: a key of the scene, and where its values come from."""
 
-    key: Annotated[Line, AfterValidator(_varied_key)] = Field(description="the path of a number of the scene")
-    values: list[Number] | None = Field(None, min_length=1, description="a list of numbers")
-    linear: RangeTable | None = Field(None, description="a table with start, end, count")
-    log: RangeTable | None = Field(None, description="a table with start, end, count, both ends above 0")
-    uniform: Range | None = Field(None, description="two numbers [low, high]")
-    normal: Normal | None = Field(None, description="two numbers [mean, standard deviation], the second one above 0")
-    sobol: Range | None = Field(None, description="two numbers [low, high]")
+    key: str = file_key("key", Kind(_read_key, "the path of a number of the scene"))
+    values: tuple[float, ...] | None = file_key("values", list_of(keys.NUMBER, "a list of numbers", 1), default=None)
+    linear: RangeTable | None = file_key("linear", _LINEAR, default=None)  # noqa: RUF009
+    log: RangeTable | None = file_key("log", _LOG, default=None)  # noqa: RUF009
+    uniform: tuple[float, float] | None = file_key("uniform", _RANGE, default=None)
+    normal: tuple[float, float] | None = file_key("normal", _NORMAL, default=None)
+    sobol: tuple[float, float] | None = file_key("sobol", _RANGE, default=None)
 
-    @field_validator("log")
-    @classmethod
-    def _is_above_zero(cls, log: RangeTable | None) -> RangeTable | None:
-        if log is not None and min(log.start, log.end) <= 0.0:
-            raise invalid("a logarithmic range reaches 0 or less")
-        return log
-
-    @model_validator(mode="after")
-    def _varies_in_one_way(self) -> AxisTable:
+    def __post_init__(self) -> None:
         given = [name for name in VARIED if getattr(self, name) is not None]
         if len(given) != 1:
-            wrong = f"has {' and '.join(given)}" if given else "has no values"
-            raise invalid(wrong, f"exactly one of {', '.join(VARIED)}")
-        return self
+            what = f"has {' and '.join(given)}" if given else "has no values"
+            raise wrong(what, f"exactly one of {', '.join(VARIED)}")
+
+    def axis(self, draws: int) -> Axis:
+        """The axis of a design with so many draws."""
+        kind = next(name for name in VARIED if getattr(self, name) is not None)
+        numbers = getattr(self, kind)
+        if kind in ("linear", "log"):
+            return Axis(self.key, kind, (numbers.start, numbers.end), numbers.count)
+        return Axis(self.key, kind, numbers, draws if kind in DRAWN else len(numbers))
 
 
-class SweepTable(Table):
+_METHODS = list_of(keys.LINE, "a list of methods, model/integrator", 1)
+_SETTINGS = keys.dict_of(keys.NUMBER, "a table of a method's settings, such as tolerance = 1e-15")
+_CHANGE = keys.dict_of(keys.NUMBER, 'a table of keys of the scene and numbers, "blade.mass" = 1e4')
+_DRAWS = keys.whole(1, MAX_COUNT, "a whole number from 1 up, with random axes")
+_AXES = list_of(table_of(AxisTable), "one or more [[axis]] tables", 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepTable:
     """The whole file."""
 
-    title: Line = Field(description="a text of 1 to 200 characters on one line")
-    scene: Line = Field(description="a shipped scene's name (paper/fig11), or a TOML file beside this one")
-    methods: list[Line] = Field(["lagrange/taylor"], min_length=1, description="a list of methods, model/integrator")
-    settings: dict[str, Number] = Field({}, description="a table of a method's settings, such as tolerance = 1e-15")
-    change: dict[str, Number] = Field({}, description='a table of keys of the scene and numbers, "blade.mass" = 1e4')
-    samples: int | None = Field(None, ge=2, description="a whole number from 2 up")
-    outputs: Outputs | None = Field(None, description=f"{OUTPUTS_ALLOWED}, or none: metrics alone")
-    precision: Literal["float64", "float32"] = Field("float64", description='"float64" or "float32"')
-    amplification: bool = Field(False, description="true or false: error amplification and horizon of every run")
-    combine: Literal["grid", "zip"] = Field("grid", description='"grid" or "zip"')
-    draws: int | None = Field(None, ge=1, le=MAX_COUNT, description="a whole number from 1 up, with random axes")
-    seed: int = Field(0, ge=0, le=2**63 - 1, description="a whole number from 0 up")
-    validation: Number = Field(0.0, gt=0, lt=1, description="a share between 0 and 1")
-    test: Number = Field(0.0, gt=0, lt=1, description="a share between 0 and 1, less than 1 with validation")
-    picture: Literal["spread", "map"] | None = Field(None, description='"spread" or "map"')
-    axis: list[AxisTable] = Field(min_length=1, description="one or more [[axis]] tables")
+    title: str = file_key("title", keys.LINE)
+    scene: str = file_key("scene", _SCENE_NAME)
+    methods: Sequence[str] = file_key("methods", _METHODS, default=("lagrange/taylor",))
+    settings: Mapping[str, float] = file_key("settings", _SETTINGS, optional={})
+    change: Mapping[str, float] = file_key("change", _CHANGE, optional={})
+    samples: int | None = file_key("samples", _COUNT, default=None)
+    outputs: Sequence[str] | None = file_key("outputs", OUTPUT_NAMES, note=", or none: metrics alone", default=None)
+    precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
+    amplification: bool = file_key("amplification", keys.FLAG, note=": error growth of every run", default=False)
+    combine: str = file_key("combine", keys.choice(("grid", "zip")), default="grid")
+    draws: int | None = file_key("draws", _DRAWS, default=None)
+    seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number from 0 up"), default=0)
+    validation: float = file_key("validation", _SHARE, default=0.0)
+    test: float = file_key("test", _SHARE, note=", less than 1 with validation", default=0.0)
+    picture: str | None = file_key("picture", keys.choice(("spread", "map")), default=None)
+    axis: Sequence[AxisTable] = file_key("axis", _AXES)
 
-    @field_validator("test")
-    @classmethod
-    def _leaves_rows_for_training(cls, test: float, info: ValidationInfo) -> float:
-        if test + info.data.get("validation", 0.0) >= 1.0:
-            raise invalid("validation and test leave no rows for training")
-        return test
-
-    @field_validator("axis")
-    @classmethod
-    def _names_each_key_once(cls, axes: list[AxisTable]) -> list[AxisTable]:
-        keys = [axis.key for axis in axes]
-        repeated = next((key for key in keys if keys.count(key) > 1), None)
+    def __post_init__(self) -> None:
+        axes = [axis.key for axis in self.axis]
+        drawn = [axis.key for axis in self.axis if any(getattr(axis, kind) is not None for kind in DRAWN)]
+        repeated = [key for key, count in Counter(axes).items() if count > 1]
+        problems = []
+        if self.test + self.validation >= 1.0:
+            allowed = "a share between 0 and 1, less than 1 with validation"
+            problems.append(KeyProblem(("test",), "validation and test leave no rows for training", allowed))
         if repeated:
-            raise invalid(f"{repeated} is varied by more than one axis", "one [[axis]] for a key")
-        return axes
-
-    @field_validator("axis")
-    @classmethod
-    def _draws_where_random(cls, axes: list[AxisTable], info: ValidationInfo) -> list[AxisTable]:
-        drawn = [axis.key for axis in axes if any(getattr(axis, name) is not None for name in DRAWN)]
-        draws = info.data.get("draws")
-        if drawn and draws is None and "draws" in info.data:
-            raise invalid(f"{drawn[0]} is random, and draws is missing", "draws = N at the top of the file")
-        if draws is not None and not drawn:
-            raise invalid("draws is there, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}")
-        return axes
+            what = f"{repeated[0]} is varied by more than one axis"
+            problems.append(KeyProblem(("axis",), what, "one [[axis]] for a key"))
+        if drawn and self.draws is None:
+            what = f"{drawn[0]} is random, and draws is missing"
+            problems.append(KeyProblem(("axis",), what, "draws = N at the top of the file"))
+        if self.draws is not None and not drawn:
+            what, allowed = "draws is there, but no axis is random", f"draws with an axis of {', '.join(DRAWN)}"
+            problems.append(KeyProblem(("axis",), what, allowed))
+        if problems:
+            raise TableError(problems)
 
 
 @dataclass(frozen=True)
@@ -178,7 +189,7 @@ class Sweep:
 
     def problem(self, key: KeyPath, message: str) -> str:
         """A line about what the file says at `key`, for an InputError: for errors that only a caller can find."""
-        return _problem(self.path, self.text, key, message)
+        return f"{shown_path(self.path)}:{line_of(find_lines(self.text), key)}: {message}"
 
     def variants(self) -> Variants:
         """From rows to scenes. They always ask for the energy: every run's balance is checked."""
@@ -197,7 +208,10 @@ def load_sweep(path: Path) -> Sweep:
     if not path.exists() and str(path) in dict(list_scenes()):
         raise InputError(f"{path}: is a scene; allowed: a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}")
     text, tables = read_toml(path)
-    return _sweep(path, text, validate_file(SweepTable, tables, text, shown_path(path)))
+    if "initial" in tables and "blade" in tables:
+        shown = shown_path(path)
+        raise InputError(f"{shown}: is a scene; allowed: a sweep of scenes, or: rotor-mbs run {shown}")
+    return _sweep(path, text, tables)
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
@@ -228,66 +242,49 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
     for key, values in axes.items():
         plain = values.tolist() if isinstance(values, np.ndarray) else values
         listed.append({"key": key, **(plain if isinstance(plain, Mapping) else {"values": plain})})
-    parts = [toml_lines(tables), *("\n[[axis]]\n" + toml_lines(axis) for axis in listed)]
-    text, tables["axis"] = "".join(parts), listed
-    return _sweep(Path("sweep"), text, validate_file(SweepTable, tables, text, "sweep"), scene)
+    text = "".join([toml_lines(tables), *("\n[[axis]]\n" + toml_lines(axis) for axis in listed)])
+    tables["axis"] = listed
+    return _sweep(Path("sweep"), text, tables, scene)
 
 
-Problem = Callable[[KeyPath, str], str]
-
-
-def _problem(path: Path, text: str, key: KeyPath, message: str) -> str:
-    return f"{shown_path(path)}:{line_of(find_lines(text), key)}: {message}"
-
-
-def _sweep(path: Path, text: str, table: SweepTable, base: Scene | None = None) -> Sweep:
-    """What the file's model cannot check: the base scene, the keys of the axes in it, and how many rows there are."""
-    problem = functools.partial(_problem, path, text)
-    base = _changed(base or _base(path, table.scene, problem), table, problem)
-    sweep = Sweep(table, base, _design(table, problem), text, path)
-    _check_rows(sweep)
-    return sweep
-
-
-def _base(path: Path, asked: str, problem: Problem) -> Scene:
-    is_shipped = (scenarios_folder() / f"{asked}.toml").is_file()
+def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | None = None) -> Sweep:
+    """The sweep in the tables of a file; its base is the scene that it names, where none is given."""
     try:
-        return only_scene(str(path.parent / asked) if asked.endswith(".toml") and not is_shipped else asked)
-    except InputError as error:
-        raise InputError(problem(("scene",), f"scene: {error}")) from error
+        table: SweepTable = table_of(SweepTable).read(tables)
+    except TableError as error:
+        raise error.in_file(text, shown_path(path)) from error
 
+    def at(key: str, messages: Iterable[str]) -> InputError:
+        where = f"{shown_path(path)}:{line_of(find_lines(text), (key,))}: {key}"
+        return InputError(f"{where}: {message}" for message in messages)
 
-def _changed(base: Scene, table: SweepTable, problem: Problem) -> Scene:
+    if base is None:
+        is_shipped = (scenarios_folder() / f"{table.scene}.toml").is_file()
+        is_beside = table.scene.endswith(".toml") and not is_shipped
+        try:
+            base = only_scene(str(path.parent / table.scene) if is_beside else table.scene)
+        except InputError as error:
+            raise at("scene", [str(error)]) from error
     changes: dict[str, object] = dict(table.change)
     if table.samples is not None:
         changes["samples"] = table.samples
     if table.outputs:
         changes["outputs"] = table.outputs
     try:
-        return base.replace(**changes) if changes else base
+        base = base.replace(**changes) if changes else base
     except InputError as error:
-        key = next(key for key in ("change", "samples", "outputs") if getattr(table, key))
-        raise InputError([problem((key,), f"{key}: {one}") for one in error.problems]) from error
-
-
-def _design(table: SweepTable, problem: Problem) -> Design:
-    axes = tuple(_axis(axis, table.draws or 0) for axis in table.axis)
+        first = next(key for key in ("change", "samples", "outputs") if getattr(table, key))
+        raise at(first, error.problems) from error
+    axes = tuple(axis.axis(table.draws or 0) for axis in table.axis)
     if table.combine == "zip" and len({axis.count for axis in axes}) > 1:
         counts = ", ".join(f"{axis.key} has {axis.count}" for axis in axes)
-        wrong = f"combine: {counts}; allowed with zip: as many values in every axis"
-        raise InputError(problem(("combine",), wrong))
+        raise at("combine", [f"{counts}; allowed with zip: as many values in every axis"])
     design = Design(axes, table.combine, table.seed)
     if design.count > MAX_ROWS:
-        raise InputError(problem(("axis",), f"axis: {design.count:,} runs; allowed: at most {MAX_ROWS:,}"))
-    return design
-
-
-def _axis(table: AxisTable, draws: int) -> Axis:
-    kind = next(name for name in VARIED if getattr(table, name) is not None)
-    given = getattr(table, kind)
-    if isinstance(given, RangeTable):
-        return Axis(table.key, kind, (given.start, given.end), given.count)
-    return Axis(table.key, kind, tuple(given), draws if kind in DRAWN else len(given))
+        raise at("axis", [f"{design.count:,} runs; allowed: at most {MAX_ROWS:,}"])
+    sweep = Sweep(table, base, design, text, path)
+    _check_rows(sweep)
+    return sweep
 
 
 def _check_rows(sweep: Sweep) -> None:
@@ -301,7 +298,7 @@ def _check_rows(sweep: Sweep) -> None:
             variants.scene(row)
         except TableError as error:
             values = ", ".join(f"{key} = {value:g}" for key, value in zip(variants.keys, row, strict=True))
-            start = "" if error.is_of_keys else f"{values}: "
+            start = "" if all(problem.is_of_key for problem in error.problems) else f"{values}: "
             for problem in error.problems:
                 problems.setdefault(sweep.problem(("axis", i, "key"), f"{start}{problem.message}"))
             if len(problems) >= _MAX_ROW_ERRORS:

@@ -1,4 +1,4 @@
-"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped. Must not know scenes or files.
+"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped.
 
 A grid runs through its axes like the digits of a number, the last axis fastest; all random axes together are one
 digit, the draw. Every row follows from its number alone, so that any part of a sweep can be computed on any computer.

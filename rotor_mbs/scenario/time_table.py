@@ -2,7 +2,7 @@
 last; two rows with equal t are a jump; () where there is no such load.
 
 A step over a kink of a load loses its order: tables are cut into segments on which they are linear, and a run into the
-intervals that an engine integrates one by one. Must not know scenes, or what a load acts on.
+intervals that an engine integrates one by one.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -27,10 +27,10 @@ Table = tuple[tuple[float, float], ...]
 Time = TypeVar("Time", "float", "Array")
 
 # A kink closer to a sample than this share of the sample interval is taken to be on it.
-_ALIGNED = 1e-6
-# Rows kept between two samples where a quadrature or the unwrapping of angles needs them: all steps, or some _ROWS of
-# them where that makes more than _MOST_ROWS.
-_ROWS, _MOST_ROWS = 10, 100
+ALIGNMENT = 1e-6
+# Rows kept between two samples where a quadrature or the unwrapping of angles needs them: all steps, or about MIN_ROWS
+# of them where that makes more than MAX_ROWS.
+MIN_ROWS, MAX_ROWS = 10, 100
 
 
 def value_at(table: Table, time: float) -> float:
@@ -103,21 +103,26 @@ class Segment:
 def segments(tables: Sequence[Table], duration: float) -> tuple[Segment, ...]:
     """The whole duration (s), cut where a table has a kink or a jump; one segment where all are constant."""
     cuts = [0.0, *knots(tables, duration), duration]
+    lines = [_lines(table, cuts) for table in tables]
     return tuple(
-        Segment(start, end, tuple(_line(table, start, end) for table in tables))
-        for start, end in itertools.pairwise(cuts)
+        Segment(start, end, tuple(of_table[i] for of_table in lines))
+        for i, (start, end) in enumerate(itertools.pairwise(cuts))
     )
 
 
-def _line(table: Table, start: float, end: float) -> tuple[Fraction, Fraction]:
-    """Offset and slope of a table that has no kink between `start` and `end`."""
+def _lines(table: Table, cuts: Sequence[float]) -> list[tuple[Fraction, Fraction]]:
+    """Offset and slope between every two cuts, where the table has no kink in between."""
     if is_constant(table):
-        return Fraction(table[0][1] if table else 0), Fraction(0)
-    before = [row for row in table if row[0] <= start] or [table[0]]
-    after = [row for row in table if row[0] >= end] or [table[-1]]
-    (t0, value0), (t1, value1) = (map(Fraction, row) for row in (before[-1], after[0]))
-    slope = (value1 - value0) / (t1 - t0) if t1 > t0 and value1 != value0 else Fraction(0)
-    return value0 - slope * t0, slope
+        return [(Fraction(table[0][1] if table else 0), Fraction(0))] * (len(cuts) - 1)
+    times = [time for time, _ in table]
+    lines = []
+    for start, end in itertools.pairwise(cuts):
+        before = table[max(bisect_right(times, start) - 1, 0)]
+        after = table[min(bisect_left(times, end), len(table) - 1)]
+        (t0, value0), (t1, value1) = (map(Fraction, row) for row in (before, after))
+        slope = (value1 - value0) / (t1 - t0) if t1 > t0 and value1 != value0 else Fraction(0)
+        lines.append((value0 - slope * t0, slope))
+    return lines
 
 
 def values_before(parts: Sequence[Segment], times: Array) -> Array:
@@ -155,17 +160,18 @@ def intervals(parts: Sequence[Segment], samples: int, *, every_sample: bool) -> 
     for part in parts[1:]:
         place = part.start / spacing
         near = round(place)
-        if abs(place - near) <= _ALIGNED:
+        if abs(place - near) <= ALIGNMENT:
             cuts.add(near)
         else:
             cuts.update((math.floor(place), math.ceil(place)))
             between[place] = part.start
-    found = []
+    starts = [part.start for part in parts]
+    stops = []
     for start, end in itertools.pairwise(sorted([*cuts, *between])):
         t0, t1 = (between.get(place, times[math.floor(place)]) for place in (start, end))
-        segment = next(part for part in reversed(parts) if part.start <= 0.5 * (t0 + t1))
-        found.append(Interval(t0, t1, max(1, round(end - start)), end not in between, segment))
-    return found
+        segment = parts[bisect_right(starts, 0.5 * (t0 + t1)) - 1]
+        stops.append(Interval(t0, t1, max(1, round(end - start)), end not in between, segment))
+    return stops
 
 
 def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, int]:
@@ -173,6 +179,6 @@ def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, i
     steps = max(1, math.ceil(span / step * (1.0 - 1e-9)))
     if not rows_between:
         return steps, 1
-    per_row = math.ceil(steps / _ROWS)
+    per_row = math.ceil(steps / MIN_ROWS)
     steps = per_row * math.ceil(steps / per_row)
-    return steps, steps if steps <= _MOST_ROWS else steps // per_row
+    return steps, steps if steps <= MAX_ROWS else steps // per_row

@@ -1,6 +1,6 @@
-"""TOML text: read from a file with limits, and the line on which each key stands. Must not know scenes.
+"""TOML text: read from a file with limits, written, and the line on which each key stands.
 
-Everything that prevents reading is one line of an InputError: `file:line: what is wrong; allowed: ...`.
+Every error is a line of an InputError: `file:line: key: what is wrong; allowed: ...`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ T = TypeVar("T")
 KeyPath = tuple[str | int, ...]
 
 MAX_BYTES = 1 << 20
+MAX_PROBLEMS = 100  # lines for one file; nobody reads more, and a file of 1 MiB can have 300,000
 
 # A dotted key costs the TOML reader the square of its parts in time and memory: 1 MiB of "a.a.a." would need
 # terabytes. Nothing in a scene has more than two parts; the lookbehind keeps this search itself linear.
@@ -25,6 +26,9 @@ _MAX_KEY_PARTS = 32
 _LONG_KEY = re.compile(
     r"(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+)" + f"{{{_MAX_KEY_PARTS}}}"
 )
+KEY_FORM = "the path of a number, such as gravity, blade.mass, initial.angles[1] (entries counted from 0)"
+_PART = r"[A-Za-z_][A-Za-z0-9_]{0,59}(?:\[[0-9]{1,6}\])*"
+_KEY = re.compile(rf"{_PART}(?:\.{_PART})*")
 _MARKS = frozenset("[]{}=,.\n")
 _TOKEN = re.compile(
     r'("{3}(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'{3}(?:[^\']|\'{1,2}(?!\'))*\'{3,5}'  # strings of several lines
@@ -35,24 +39,47 @@ _TOKEN = re.compile(
 
 
 class KeyProblem(NamedTuple):
-    """One error: where it is in the tables as they were read, its message, and whether it is the key that is wrong."""
+    """One error of the tables of a file.
+
+    path        where it is, in the tables as they were read
+    wrong       what is wrong
+    allowed     what is allowed; "" for what the key allows
+    is_of_key   whether it is the key that is wrong, whatever the value is
+    """
 
     path: KeyPath
-    message: str
-    is_of_key: bool
+    wrong: str
+    allowed: str = ""
+    is_of_key: bool = False
+
+    @property
+    def message(self) -> str:
+        where = f"{shown_key(self.path)}: " if self.path else ""
+        return f"{where}{self.wrong}; allowed: {self.allowed}"
 
 
 class TableError(ValueError):
-    """Tables of a file that are not as they should be; `problems` are what is wrong, but for the `left_out` last."""
+    """Tables of a file, or a value in them, that are not as they should be."""
 
-    def __init__(self, problems: Sequence[KeyProblem], left_out: int = 0) -> None:
-        self.problems, self.left_out = tuple(problems), left_out
+    def __init__(self, problems: Sequence[KeyProblem]) -> None:
+        self.problems = tuple(problems)
         super().__init__("; ".join(problem.message for problem in problems))
 
-    @property
-    def is_of_keys(self) -> bool:
-        """Whether all of it is wrong whatever the values are."""
-        return all(problem.is_of_key for problem in self.problems)
+    def below(self, *path: str | int, allowed: str = "") -> list[KeyProblem]:
+        """The problems of a value that stands at `path`, where `allowed` is what its key allows."""
+        return [
+            problem._replace(path=(*path, *problem.path), allowed=problem.allowed or allowed)
+            for problem in self.problems
+        ]
+
+    def in_file(self, text: str, source: str) -> InputError:
+        """The error as lines `source:line: key: what is wrong; allowed: ...`, sorted, for tables read from `text`."""
+        lines = find_lines(text)
+        messages = sorted((line_of(lines, problem.path), problem.message) for problem in self.problems)
+        shown = [f"{source}:{line}: {message}" for line, message in messages[:MAX_PROBLEMS]]
+        if len(messages) > MAX_PROBLEMS:
+            shown.append(f"{source}: {len(messages) - MAX_PROBLEMS} more errors")
+        return InputError(shown)
 
 
 def shown_path(path: Path) -> str:
@@ -74,6 +101,13 @@ def _shown_name(name: str) -> str:
     if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
         return name
     return json.dumps(name if len(name) <= 60 else name[:57] + "...")
+
+
+def parse_key(text: str) -> KeyPath:
+    """("initial", "angles", 1) of "initial.angles[1]". Raises TableError."""
+    if not _KEY.fullmatch(text):
+        raise TableError([KeyProblem((), f"{text[:60]!a} is not the path of a key", KEY_FORM, is_of_key=True)])
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[A-Za-z_]\w*|[0-9]+", text))
 
 
 _TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
@@ -212,7 +246,8 @@ def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict
         if token in "]}":
             del numbers[-1:]
         elif token == ",":
-            numbers[-1:] = [number + 1 for number in numbers[-1:]]
+            if numbers:
+                numbers[-1] += 1
         else:
             lines.setdefault((*path, *numbers), line)
             if token in "[{":

@@ -137,6 +137,7 @@ def test_agrees_with_python_to_the_last_bit(tree: ast.expr) -> None:
 
 @given(st.text() | st.text(alphabet="0123456789.eE+-*/(), pisqrthypot_", max_size=40))
 @example("9" * MAX_LENGTH)
+@example("\t")
 @example("(" * MAX_LENGTH)
 def test_any_text_is_a_finite_number_or_a_value_error(text: str) -> None:
     message = ""

@@ -20,9 +20,15 @@ from hypothesis.extra.numpy import arrays
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, reference_folder, scenarios_folder
-from rotor_mbs.scenario.scene import DEFAULT_OUTPUTS, OUTPUTS, Scene, scene_hash
+from rotor_mbs.scenario.scene import (
+    DEFAULT_OUTPUTS,
+    OUTPUTS,
+    Scene,
+    is_rigid_body_inertia,
+    scene_hash,
+    values_per_sample,
+)
 from rotor_mbs.scenario.scene_file import load_scene
-from rotor_mbs.scenario.schema import is_rigid_body_inertia, values_per_sample
 from rotor_mbs.scenario.toml_file import find_lines, line_of
 
 # The captions: figures, q(0) in rad, dq/dt(0) in rad/s, rotor torque in N m.

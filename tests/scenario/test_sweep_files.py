@@ -11,10 +11,11 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
-from rotor_mbs.scenario.scene_file import scene_tables
+from rotor_mbs.scenario.scene import put_value, scene_tables, unit_of
 from rotor_mbs.scenario.sweep import Sweep, load_sweep, sweep_of
 from rotor_mbs.scenario.sweep_design import Axis, Design, split_rows
-from rotor_mbs.scenario.variants import Variants, parse_key, put_value, unit_of
+from rotor_mbs.scenario.toml_file import parse_key
+from rotor_mbs.scenario.variants import Variants
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
 

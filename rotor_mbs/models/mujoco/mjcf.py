@@ -168,7 +168,7 @@ def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: S
 def _possible(moments: list[float]) -> list[float]:
     """Three principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others.
 
-    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.schema`).
+    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.scene`).
     """
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)

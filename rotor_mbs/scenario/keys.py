@@ -1,0 +1,308 @@
+"""Keys of input files: what a value may be, and tables read by the keys that a dataclass declares.
+
+Reading a value returns what the program keeps of it, or raises TableError with all that is wrong in it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass
+from typing import Any
+
+from rotor_mbs.errors import nearest
+from rotor_mbs.scenario.expression import ALLOWED, ExpressionError, evaluate
+from rotor_mbs.scenario.toml_file import KeyProblem, TableError
+
+MAX_NUMBER = 1e300
+MAX_TEXT = 200  # characters
+# Of what a rotor is and what acts on it, but for zero: inertias, moments and accelerations, products of up to four such
+# numbers, are then between 1e-100 and 1e100, and the product of any three of these is a normal double.
+SMALLEST, LARGEST = 1e-25, 1e25
+_UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")  # Unicode categories: controls, direction marks, line ends
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a value of a file may be.
+
+    read         from the value; where `in_context`, from the value and the values of the keys before it, by field
+    allowed      what a message says is allowed; {unit} stands for the key's unit
+    per_blade    the file may have one value for all blades
+    over_time    a value may be a table over time
+    """
+
+    read: Callable[..., Any]
+    allowed: str
+    in_context: bool = False
+    per_blade: bool = False
+    over_time: bool = False
+
+
+def file_key(path: str, kind: Kind, unit: str = "1", note: str = "", *, default: Any = MISSING, **more: Any) -> Any:
+    """A field of a dataclass that is a key of a file.
+
+    Parameters
+    ----------
+    path
+        The key, with a dot where it is in a table; "" for a field that is not in the file.
+    kind
+        What its value may be.
+    unit
+        Unit of its numbers.
+    note
+        What else a user has to know, after what is allowed.
+    default
+        Of the field and of the key.
+    more
+        optional: the default of the key where the field has none; and what the class adds.
+    """
+    shown_unit = "" if unit == "1" else f" ({unit.replace('^2', '²')})"
+    allowed = kind.allowed.replace("{unit}", shown_unit) + note
+    metadata = {"key": path, "kind": kind, "unit": unit, "allowed": allowed, **more}
+    if default is not MISSING:
+        metadata = {"optional": default, **metadata}
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def wrong(what: str, allowed: str = "") -> TableError:
+    """The error that a value is wrong, with what is allowed where that is not the key's own text."""
+    return TableError([KeyProblem((), what, allowed)])
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """ "1 blade", "3 blades"."""
+    return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
+def shown(value: object) -> str:
+    """The value as the file has it, short and on one line."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value) if abs(value) < 10**30 else "so large a number"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, str):
+        return json.dumps(value if len(value) <= 40 else value[:37] + "...", ensure_ascii=not value.isprintable())
+    if isinstance(value, list | tuple):
+        return "a list"
+    return "a table" if isinstance(value, dict) else "a date or time"
+
+
+def read_number(value: object) -> float:
+    """A finite double, from a number or arithmetic in quotes."""
+    result = value
+    if isinstance(value, str):
+        try:
+            result = evaluate(value)
+        except ExpressionError as error:
+            raise wrong(f"{shown(value)}: {error.wrong}", f"in quotes {ALLOWED}") from error
+    if isinstance(result, bool) or not isinstance(result, int | float):
+        raise wrong(f"{shown(value)} is not a number")
+    if not abs(result) <= MAX_NUMBER:  # so written that NaN fails, too
+        raise wrong(f"{shown(value)} is out of range", f"finite numbers, |x| <= {MAX_NUMBER:g}")
+    return float(result)
+
+
+def read_text(value: object) -> str:
+    """A text that is not blank."""
+    if not isinstance(value, str):
+        raise wrong(f"{shown(value)} is not text")
+    if not value.strip():
+        raise wrong("is empty")
+    return value
+
+
+def _read_line(value: object) -> str:
+    text = read_text(value)
+    if len(text) > MAX_TEXT:
+        raise wrong(f"is {len(text)} characters long")
+    odd = next((char for char in text if unicodedata.category(char) in _UNPRINTABLE), None)
+    if odd is not None:
+        raise wrong(f"contains the control character {odd!a}")
+    return text
+
+
+def _read_flag(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise wrong(f"{shown(value)} is not true or false")
+    return value
+
+
+def _read_number_or_text(value: object) -> float | str:
+    try:
+        return read_number(value)
+    except TableError:
+        if not isinstance(value, str):
+            raise
+        return read_text(value)
+
+
+def where(
+    kind: Kind, is_right: Callable[[Any], bool], allowed: str, what: str = "{} is out of range", allowed_there: str = ""
+) -> Kind:
+    """What is of `kind` and right; `what` is the message of the others, with {} for the value."""
+
+    def read(value: object) -> Any:
+        result = kind.read(value)
+        if not is_right(result):
+            raise wrong(what.replace("{}", shown(value)), allowed_there)
+        return result
+
+    return Kind(read, allowed)
+
+
+NUMBER = Kind(read_number, "a number{unit}")
+_SIZES = f"sizes from {SMALLEST:g} to {LARGEST:g}"
+# Numbers of a rotor.
+SIZE = where(
+    NUMBER, lambda x: x == 0.0 or SMALLEST <= abs(x) <= LARGEST, "a number{unit}", allowed_there=f"0, or {_SIZES}"
+)
+NOT_NEGATIVE = where(SIZE, lambda x: x >= 0.0, "a number of at least 0{unit}")
+_ABOVE_ZERO = where(NUMBER, lambda x: x > 0.0, "a number above 0{unit}")
+POSITIVE = where(_ABOVE_ZERO, lambda x: SMALLEST <= x <= LARGEST, _ABOVE_ZERO.allowed, allowed_there=_SIZES)
+NUMBER_OR_TEXT = Kind(_read_number_or_text, "a number or a text")
+TEXT = Kind(read_text, "a text")
+LINE = Kind(_read_line, f"a text of 1 to {MAX_TEXT} characters on one line")
+FLAG = Kind(_read_flag, "true or false")
+
+
+def whole(lowest: int, highest: int, allowed: str = "") -> Kind:
+    """A whole number, both ends included."""
+
+    def read(value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise wrong(f"{shown(value)} is not a whole number")
+        if not lowest <= value <= highest:
+            raise wrong(f"{shown(value)} is out of range")
+        return value
+
+    return Kind(read, allowed or f"a whole number from {lowest} to {highest}")
+
+
+def choice(names: Sequence[str]) -> Kind:
+    """One of the names."""
+
+    def read(value: object) -> str:
+        if not isinstance(value, str):
+            raise wrong(f"{shown(value)} is not text")
+        if value not in names:
+            raise wrong(f"{shown(value)} is not one of them{nearest(value, names)}")
+        return value
+
+    return Kind(read, f"one of {', '.join(names)}")
+
+
+def read_each(read: Callable[[Any], Any], values: Iterable[Any]) -> tuple[Any, ...]:
+    """Every value, read. Raises TableError with the problems of all."""
+    return tuple(_read_entries(read, enumerate(values)).values())
+
+
+def _read_entries(read: Callable[[Any], Any], entries: Iterable[tuple[str | int, Any]]) -> dict[Any, Any]:
+    results, problems = {}, []
+    for name, value in entries:
+        try:
+            results[name] = read(value)
+        except TableError as error:
+            problems += error.below(name)
+    if problems:
+        raise TableError(problems)
+    return results
+
+
+def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -> Kind:
+    """A list, kept as a tuple."""
+
+    def read(value: object) -> tuple[Any, ...]:
+        if not isinstance(value, list):
+            raise wrong(f"{shown(value)} is not a list")
+        if len(value) < least or (most is not None and len(value) > most):
+            raise wrong(counted(len(value), "entry", "entries"))
+        return read_each(kind.read, value)
+
+    return Kind(read, allowed)
+
+
+def dict_of(kind: Kind, allowed: str) -> Kind:
+    """A table with any keys."""
+
+    def read(value: object) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise wrong(f"{shown(value)} is not a table")
+        return _read_entries(kind.read, value.items())
+
+    return Kind(read, allowed)
+
+
+def table_of(cls: type, allowed: str = "") -> Kind:
+    """A table with the keys that a dataclass declares; its __post_init__ may raise TableError, too."""
+    keys = declared_keys(cls)
+
+    def read(value: object) -> Any:
+        if not isinstance(value, dict):
+            raise wrong(f"{shown(value)} is not a table")
+        values, problems = read_keys(keys, value)
+        if problems:
+            raise TableError(problems)
+        return cls(**values)
+
+    return Kind(read, allowed)
+
+
+def declared_keys(cls: Any) -> dict[str, Mapping[str, Any]]:
+    """By field, the metadata of the keys that a dataclass declares."""
+    return {field.name: field.metadata for field in dataclasses.fields(cls) if field.metadata["key"]}
+
+
+def read_keys(
+    keys: Mapping[str, Mapping[str, Any]], tables: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[KeyProblem]]:
+    """The values by field, without those that have an error, and everything that is wrong.
+
+    A table with a single key must have it where the table is there.
+    """
+    values: dict[str, Any] = {}
+    problems: list[KeyProblem] = []
+    names: dict[str, list[str]] = {"": []}  # of the keys by table, "" for the top
+    needed = set()  # tables with a key that must be there
+    for key in keys.values():
+        table, _, name = key["key"].rpartition(".")
+        names.setdefault(table, []).append(name)
+        if "optional" not in key:
+            needed.add(table)
+    inside = {"": tables}
+    for table in list(names)[1:]:
+        names[""].append(table)
+        given = tables.get(table, {})
+        allowed = f"a table with {', '.join(names[table])}"
+        if table not in tables and table in needed:
+            problems.append(KeyProblem((table,), "is missing", allowed))
+        elif isinstance(given, dict):
+            inside[table] = given
+        else:
+            problems.append(KeyProblem((table,), f"{shown(given)} is not a table", allowed))
+    for field, key in keys.items():
+        table, _, name = key["key"].rpartition(".")
+        path = (table, name) if table else (name,)
+        if table not in inside:
+            continue
+        if name in inside[table]:
+            context = [values] if key["kind"].in_context else []
+            try:
+                values[field] = key["kind"].read(inside[table][name], *context)
+            except TableError as error:
+                problems += error.below(*path, allowed=key["allowed"])
+        elif "optional" in key and not (table in tables and len(names[table]) == 1):
+            values[field] = key["optional"]
+        else:
+            problems.append(KeyProblem(path, "is missing", key["allowed"]))
+    for table, entries in inside.items():
+        for name in entries:
+            if name not in names[table]:
+                what = f"is not a key here{nearest(name, names[table])}"
+                path = (table, name) if table else (name,)
+                problems.append(KeyProblem(path, what, ", ".join(names[table]), is_of_key=True))
+    return values, problems
