@@ -1,7 +1,4 @@
-"""A method's curve in the bench: its ladder of settings, from useless to the round-off floor, and how it is drawn.
-
-Knows numbers, no method.
-"""
+"""A method's curve in the bench: its ladder of settings, from coarse to the round-off floor."""
 
 from __future__ import annotations
 
@@ -13,15 +10,6 @@ STEP, TOLERANCE = "step", "tolerance"
 
 
 @dataclass(frozen=True)
-class Look:
-    """How a curve is drawn: colour ("#0072b2"), line ("-", "--", "-.", ":") and marker, in matplotlib's notation."""
-
-    colour: str
-    line: str
-    marker: str
-
-
-@dataclass(frozen=True)
 class Ladder:
     """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance.
 
@@ -30,7 +18,7 @@ class Ladder:
     fill      the settings that go with one value
     choices   settings that stay the same along the ladder
     variant   what follows the method's name in the curve's name; "" where the choices are the default ones
-    label, look     of the variant; the method's where they are left out
+    label     of the variant; the method's where it is left out
     method, order   name and expected order (None: adaptive step) of the method; filled in by the `Method`
     """
 
@@ -40,7 +28,6 @@ class Ladder:
     choices: Mapping[str, object] = field(default_factory=dict)
     variant: str = ""
     label: str = ""
-    look: Look | None = None
     method: str = ""
     order: float | None = None
 

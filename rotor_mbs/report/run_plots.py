@@ -10,10 +10,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look
+from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look, label_of, look_of
 from rotor_mbs.report.pages.quantities import components
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.paths import paths

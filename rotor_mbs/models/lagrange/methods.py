@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.methods.base import Look, Method, late
+from rotor_mbs.methods.base import Method, late
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.equation_items import equation_items
@@ -20,7 +20,6 @@ from rotor_mbs.solution.linearization import Linearization
 
 _EPS = float(np.finfo(float).eps)
 _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
-_BLUE, _LIGHT_BLUE = "#0072b2", "#56b4e9"
 
 
 @dataclass(frozen=True)
@@ -61,14 +60,11 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
     return linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], torque)
 
 
-def _scipy_method(
-    solver: str, look: Look, settings: type[Settings], ladder: Ladder, medium: float, relative_cost: float
-) -> Method:
+def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, medium: float, relative_cost: float) -> Method:
     """SciPy's solver of that name; medium: relative tolerance of the cost scaling study."""
     return Method(
         name=f"lagrange/{solver.lower()}",
         label=f"closed form, {solver}",
-        look=look,
         settings=settings,
         build=lambda scene, chosen: OdeSolver(
             scene, scipy_integrator(solver, chosen.relative_tolerance, chosen.absolute_tolerance)
@@ -86,7 +82,6 @@ METHODS = (
     Method(
         name="lagrange/taylor",
         label="closed form, Taylor",
-        look=Look(_BLUE, "-", "o"),
         settings=TaylorSettings,
         build=lambda scene, settings: taylor.Propagation(
             scene, tol=settings.tolerance, compact_mode=taylor.is_compact(scene), high_accuracy=True
@@ -108,7 +103,6 @@ METHODS = (
     Method(
         name="lagrange/ode45",
         label="closed form, Dormand-Prince 5(4)",
-        look=Look(_LIGHT_BLUE, "-", "v"),
         settings=Ode45Settings,
         build=lambda scene, chosen: OdeSolver(
             scene, ode45_integrator(chosen.relative_tolerance, chosen.absolute_tolerance)
@@ -120,17 +114,16 @@ METHODS = (
         linearize=_linearize,
     ),
     _scipy_method(
-        "DOP853", Look(_BLUE, "--", "D"), Dop853Settings,
+        "DOP853", Dop853Settings,
         tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14), 1e-9, 20.0,
     ),
     _scipy_method(
-        "Radau", Look(_LIGHT_BLUE, "--", "*"), RadauSettings,
+        "Radau", RadauSettings,
         tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13), 1e-5, 80.0,
     ),
     Method(
         name="reference",
         label="reference, quad precision",
-        look=Look(_BLUE, "-.", "*"),
         settings=ReferenceSettings,
         build=reference.build,
         items=equation_items,
