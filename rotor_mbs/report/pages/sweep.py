@@ -41,14 +41,14 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     if _asked(sweep):
         try:
             panels, caption, line, legend = _asked_picture(sweep)
-            shown = [picture(panels, "asked", caption, f"{caption}. {line}", legend=legend)]
+            shown = [picture(panels, "asked", caption, legend=legend)]
         except (InputError, StoreError) as exc:
             line = f"No picture: {exc}."
         lines.append(line)
     return {
         "title": sweep.attributes["title"],
         "summary": lines,
-        "picture": Section(shown, tables=[table] if shown else []),
+        "plots": Section(shown, tables=[table] if shown else []),
         "statuses": Section(tables=[] if shown else [table]),
         "parameters": Section(tables=[_parameter_table(sweep)]),
         "distributions": Section(_distributions(sweep, ok)),
@@ -142,7 +142,7 @@ def _responses(sweep: StoredSweep, ok: Array) -> list[Picture]:
         caption = f"The largest pitch of each run over the {field_name(key)}"
         label = _axis(field_name(key), sweep.columns[name].units)
         panels = response(parameter, values, label, "largest pitch (rad)", logarithmic=_is_wide(parameter))
-        found.append(picture(panels, f"over-{name}", caption, caption))
+        found.append(picture(panels, f"over-{name}", caption))
     return found
 
 
@@ -161,7 +161,7 @@ def _distributions(sweep: StoredSweep, ok: Array) -> list[Picture]:
         what = f"median {middle}, 5 to 95 % from {low} to {high}"
         caption = _axis(f"{with_capital(column.long_name)}: {what}", column.units)
         panels = distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
-        found.append(picture(panels, f"of-{name}", caption, f"{caption}, over {len(values)} runs."))
+        found.append(picture(panels, f"of-{name}", caption))
     return found
 
 
