@@ -101,7 +101,7 @@ def palette_css() -> str:
 
 def with_light_palette(css: str) -> str:
     """`css` of pictures and the classes of the palette, with light colours in place of variables."""
-    return re.sub(r"var\(--(\w+)\)", lambda found: _VARIABLES[found[1]][0], _CLASS_RULES + css)
+    return re.sub(r"var\(--(\w+)\)", lambda variable: _VARIABLES[variable[1]][0], _CLASS_RULES + css)
 
 
 def with_capital(text: str) -> str:

@@ -135,8 +135,8 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
     axes.set_xticks([], minor=True)
     known = np.concatenate(times)
     known = known[np.isfinite(known) & (known > 0.0)]
-    low, high = (known.min(), known.max()) if len(known) else (1e-3, 1.0)
-    canvas.log_axis(axes, 10.0 ** math.floor(math.log10(low)), high)
+    shortest, longest = (known.min(), known.max()) if len(known) else (1e-3, 1.0)
+    canvas.log_axis(axes, 10.0 ** math.floor(math.log10(shortest)), longest)
     axes.set_ylabel("set-up, run and read-out (s)" if with_setup else "run time (s)")
     return panels
 
@@ -202,7 +202,7 @@ def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, s
 
 def reach_table(curves: Sequence[Record]) -> PageTable:
     """A row per curve: time and ratio for each target."""
-    rows: list[Row] = [[method_cell(curve.name)] for curve in curves]
+    rows = [[method_cell(curve.name)] for curve in curves]
     for target in work_precision.TARGETS_RAD:
         reaches = {curve.name: reach for curve, reach in work_precision.fastest(curves, target)}
         for row, curve in zip(rows, curves, strict=True):
@@ -281,11 +281,12 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
             seconds = _seconds(curve.arrays["run_time_s"][i])
             rows.append([method_cell(curve.name), setting, seconds, status_text(status), claimed, message])
     scene = None if stored is None else scene_of(stored)
-    for name in dict.fromkeys(ladder.method for ladder in ladders()) if scene is not None else ():
-        try:
-            find_method(name).items(scene)
-        except MethodRefusal as exc:
-            rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
+    if scene is not None:
+        for name in dict.fromkeys(ladder.method for ladder in ladders()):
+            try:
+                find_method(name).items(scene)
+            except MethodRefusal as exc:
+                rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
     head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
     caption = "Runs that failed, found from their state, and settings that the budget left out."
     return PageTable(caption, head, rows, numeric=(1, 2)).without_empty_columns()

@@ -225,14 +225,23 @@ def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
     for name, scene in scenes.items():
         runs = compared_runs(scene)
         printed, corrected, exudyn = (runs.get(key) for key in HEADINGS)
+        pitches = {key: number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))) for key, run in runs.items()}
+        turned = {}
+        for key, run in runs.items():
+            rotor = run.array("angles")[:, 0]
+            turned[key] = number(float(rotor[-1] - rotor[0]), 3)
         row = [name]
         if printed is not None and corrected is not None:
             parted, largest = parting(printed, corrected)
             row += ["never" if parted is None else number(parted), number(largest)]
         else:
             row += ["", ""]
-        row += [_largest_pitch(printed), "" if printed is None else prefixed(metric(printed, "energy_gain_J"), "J")]
-        row += [_end(printed), _largest_pitch(corrected)]
+        if printed is not None:
+            row += [pitches["printed"], prefixed(metric(printed, "energy_gain_J"), "J")]
+            row.append(number(float(printed.array("time")[-1]), 3))
+        else:
+            row += ["", "", ""]
+        row.append(pitches.get("corrected", ""))
         if exudyn is not None and corrected is not None:
             gap, time = angle_difference(exudyn, corrected), exudyn.array("time")
             known = horizon(scene)
@@ -240,21 +249,8 @@ def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
             row += [number(float(gap[time[: len(gap)] <= until].max(initial=0.0))), number(until, 3)]
         else:
             row += ["", ""]
-        row += [_turned(run) for run in (printed, corrected, exudyn)]
-        rows.append(row)
+        rows.append([*row, *(turned.get(key, "") for key in HEADINGS)])
     return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
-
-
-def _largest_pitch(run: StoredRun | None) -> str:
-    return "" if run is None else number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0)))
-
-
-def _end(run: StoredRun | None) -> str:
-    return "" if run is None else number(float(run.array("time")[-1]), 3)
-
-
-def _turned(run: StoredRun | None) -> str:
-    return "" if run is None else number(float(run.array("angles")[-1, 0] - run.array("angles")[0, 0]), 3)
 
 
 def _picture(figure: PaperFigure, letter: str, key: str, runs: Mapping[str, StoredRun]) -> Picture:

@@ -9,7 +9,6 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claim_shares import HOLDS, ClaimShares
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.finding import ENERGY_RISE, Finding, Tally, finding
-from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
@@ -38,6 +37,14 @@ def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
     shares = None if study is None else study.shares
     trials = [] if study is None else claim_tables.trial_tables(study.numbers)
     facts = finding(scenes, claims)
+    errata = PageTable(
+        "The errors in the printed equations; all else follows from them",
+        ("Erratum", "Equation", "Printed", "Correct", "Reason"),
+        [
+            (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
+            for e in context.errata
+        ],
+    )
     return {
         "glance": _glance(scenes, context),
         "paper": _paper_table(facts, shares),
@@ -52,7 +59,7 @@ def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
             tables=[claim_tables.claim_table(claims, shares)],
             notes=[] if shares is None else [claim_tables.study_note(shares)],
         ),
-        "errata": Section(tables=[_errata_table(context.errata)]),
+        "errata": Section(tables=[errata]),
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
@@ -206,12 +213,3 @@ def _scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) ->
             cells += [status_cell(run), number(metric(run, "angle_error_whole")), gain]
         rows.append([TableCell(name, href=files[name], note=scene.title), *cells, *[""] * (len(head) - 1 - len(cells))])
     return PageTable("", head, rows, numeric=(2, 4, 5)).without_empty_columns()
-
-
-def _errata_table(errata: Sequence[Erratum]) -> PageTable:
-    rows = [
-        (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
-        for e in errata
-    ]
-    caption = "The errors in the printed equations; all else follows from them"
-    return PageTable(caption, ("Erratum", "Equation", "Printed", "Correct", "Reason"), rows)

@@ -63,7 +63,7 @@ def _map(
     families: dict[str, list[dict[str, object]]] = {}
     for scene, file in files.items():
         own = {run.method: run for run in runs if run.scene == scene}
-        marks = []
+        marks: list[tuple[str, str, str] | None] = []
         for method in methods:
             run = own.get(method)
             if run is None:
@@ -73,7 +73,7 @@ def _map(
             if run.false_success and run.outcome != "false_success":
                 symbol += "!"
             marks.append((run.outcome, symbol, f"{label_of(run.method)}: {text}. {run.message}".strip()))
-        row = {
+        row: dict[str, object] = {
             "scene": scene,
             "href": file,
             "title": titles[scene],
