@@ -12,7 +12,6 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rotor_mbs.methods.ladders import STEP, Ladder
-from rotor_mbs.methods.ladders import Look as Look  # who writes a method finds it here
 from rotor_mbs.methods.settings import Settings as Settings
 
 if TYPE_CHECKING:  # reading the catalogue needs none of them
@@ -48,7 +47,7 @@ class Method:
     Attributes
     ----------
     name : "model/integrator", as on the command line and in files.
-    label, look : how it is called and drawn in tables and figures; label is "model, integrator".
+    label : how it is called in tables and figures: "model, integrator".
     build : (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal where the method
         cannot represent the scene.
     items : (scene) -> what is built for it; raises MethodRefusal likewise.
@@ -78,7 +77,6 @@ class Method:
 
     name: str
     label: str
-    look: Look
     build: Callable[[Scene, Any], Solver]
     items: Callable[[Scene], list[BuiltItem]]
     settings: type[Settings] = Settings
@@ -101,13 +99,13 @@ class Method:
     load: Callable[[], object] = lambda: None
 
     def __post_init__(self) -> None:
-        """Gives the ladders the name, the label, the look and the order of their method."""
+        """Gives the ladders the name, the label and the order of their method."""
         ladders = []
         for ladder in self.ladders:
             if not ladder.method:
                 label = f"{self.label}, {ladder.label}" if ladder.label else self.label
                 order = self.order if ladder.kind == STEP else None
-                ladder = replace(ladder, method=self.name, label=label, look=ladder.look or self.look, order=order)
+                ladder = replace(ladder, method=self.name, label=label, order=order)
             ladders.append(ladder)
         object.__setattr__(self, "ladders", tuple(ladders))
 

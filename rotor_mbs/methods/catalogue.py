@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rotor_mbs.errors import InputError, nearest
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.ladders import Ladder, Look
+from rotor_mbs.methods.ladders import Ladder
 
 REFERENCE = "reference"
 GROUP = "rotor_mbs.methods"
@@ -26,7 +26,7 @@ _BUILT_IN: Mapping[str, tuple[str, ...]] = {
     "rotor_mbs.models.mujoco.methods:METHODS": ("mujoco",),
 }
 
-_UNKNOWN_LOOK = Look("#666666", ":", "D")
+_log = logging.getLogger("rotor_mbs")
 
 
 def methods() -> tuple[Method, ...]:
@@ -127,12 +127,6 @@ def label_of(curve: str) -> str:
     """How a method, or a variant of one by the name of its curve, is called; its name where it is not known here."""
     method = look_up(curve) or _variant(curve)
     return method.label if method else curve
-
-
-def look_of(curve: str) -> Look:
-    """How a method, or a variant of one by the name of its curve, is drawn; in grey where it is not known here."""
-    method = look_up(curve) or _variant(curve)
-    return method.look if method and method.look else _UNKNOWN_LOOK
 
 
 def model_label(model: str) -> str:

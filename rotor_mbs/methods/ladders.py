@@ -1,4 +1,4 @@
-"""A method's curve in the bench: its ladder of settings, from useless to the round-off floor, and how it is drawn."""
+"""A method's curve in the bench: its ladder of settings, from coarse to the round-off floor."""
 
 from __future__ import annotations
 
@@ -7,15 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 STEP, TOLERANCE = "step", "tolerance"
-
-
-@dataclass(frozen=True)
-class Look:
-    """How a curve is drawn: colour ("#0072b2"), line ("-", "--", "-.", ":") and marker, in matplotlib's notation."""
-
-    colour: str
-    line: str
-    marker: str
 
 
 @dataclass(frozen=True)
@@ -29,7 +20,7 @@ class Ladder:
     fill : the settings that go with one value.
     choices : settings that stay the same along the ladder.
     variant : what follows the method's name in the curve's name; "" where the choices are the default ones.
-    label, look : of the variant; the method's where they are left out.
+    label : of the variant; the method's where it is left out.
     method, order : name and expected order (None: adaptive step) of the method; filled in by the `Method`.
     """
 
@@ -39,7 +30,6 @@ class Ladder:
     choices: Mapping[str, object] = field(default_factory=dict)
     variant: str = ""
     label: str = ""
-    look: Look | None = None
     method: str = ""
     order: float | None = None
 

@@ -21,7 +21,7 @@ from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.bench import bench_pages
 from rotor_mbs.report.pages.data_comparison import comparison_page
 from rotor_mbs.report.pages.errata import errata_page
-from rotor_mbs.report.pages.figures import PaperFigure, available, walk_figure
+from rotor_mbs.report.pages.figures import PaperFigure, available, figures_page, walk_figure
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.pages.scene import scene_page
@@ -31,24 +31,37 @@ from rotor_mbs.runs.read import OpenResults, in_memory, is_sweep, open_results
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 
-Part = str | Path | PaperFigure  # a scene by its name, a page by its file, or a figure of the paper
 _GROUPS = 2  # per worker
 _TIMEOUT_S = 600.0
 
+Task = Callable[[OpenResults, Context], Any]  # makes pages by file name, or what a page has of a figure
 OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
 def write_report(
     results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None, *, checked: bool = False
 ) -> Path:
-    """Write the pages about any file that this program writes into the folder `output`.
+    """Write the pages about any file that this program writes into a folder.
 
-    jobs: so many processes, or a pool that is open.
+    Runs, the stability suite, a bench, modes, comparisons, a sweep: what the file has is one site with one navigation.
+    Nothing is written before every page is made.
 
-    Runs, the stability suite, a bench, modes, a sweep: what the file has is one site with one navigation. checked:
-    also a page with the verdicts of `check` on its runs, which takes seconds of its own. Returns the path of the index.
-    Nothing is written before every page is made. Raises StoreError where the file cannot be read or has nothing to
-    report, or where the folder cannot be written.
+    Parameters
+    ----------
+    results, output : the file; the folder, which is made where it does not exist.
+    jobs : so many processes, or a pool that is open.
+    on_page : called with the number of pages that are made, and of all.
+    checked : also a page with the verdicts of `check` on the file's runs, which takes seconds of its own.
+
+    Returns
+    -------
+    Path
+        The index.
+
+    Raises
+    ------
+    StoreError
+        Where the file cannot be read or has nothing to report, or the folder cannot be written.
     """
     if is_sweep(results):
         from rotor_mbs.report.pages.sweep import sweep_page  # late, as below: workers load what most files need
@@ -61,25 +74,30 @@ def write_report(
 
 
 def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -> dict[str, str]:
-    """By file name. What comes first is the index."""
+    """By file name. The first of the main pages is the index."""
     modes, bench, compared = (read_records(opened.path, kind) for kind in ("modes", "bench", "comparison"))
     has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench or compared)
     is_suite = has_runs and is_stability_suite(opened)
     figures = available(opened.scenes) if has_runs and not is_suite else ()
-    has_errata = has_runs and not is_suite and _has_errata(opened)
+    labels: dict[str, str] = {}
+    if has_runs:
+        labels[files.INDEX] = "Stability suite" if is_suite else "Overview"
+    if figures:
+        labels[files.FIGURES] = "The paper's figures"
+    if has_runs and not is_suite and _has_errata(opened):
+        labels[files.ERRATA] = "Errata"
+    if bench:
+        labels[files.BENCH] = "Error against run time"
+    if modes:
+        labels[files.MODES] = "Modes"
     data_files = [f"data--{i + 1}.html" if i else files.COMPARISON for i in range(len(compared))]
-    kinds = [
-        (has_runs, files.INDEX, "Stability suite" if is_suite else "Overview"),
-        (bool(figures), files.WALK, "The paper's figures"),
-        (has_errata, files.ERRATA, "Errata"),
-        (bool(bench), files.BENCH, "Error against run time"),
-        (bool(modes), files.MODES, "Modes"),
-        *((True, file, f"Data against {one.scene}") for file, one in zip(data_files, compared, strict=True)),
-        (has_runs and checked, files.CHECK, "Accuracy check"),
-    ]
-    there = {file: label for has, file, label in kinds if has}
-    names = {file: file if place else files.INDEX for place, file in enumerate(there)}
-    site = [(names[file], label) for file, label in there.items()]
+    for file, record in zip(data_files, compared, strict=True):
+        labels[file] = f"Data against {record.scene}"
+    if has_runs and checked:
+        labels[files.CHECK] = "Accuracy check"
+    names = {file: file for file in labels}
+    names[next(iter(labels))] = files.INDEX
+    site = [(names[file], label) for file, label in labels.items()]
     pages: dict[str, str] = {}
     if is_suite:
         pages |= stability_pages(opened, files.INDEX, site)
@@ -102,7 +120,7 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
 def _has_errata(opened: OpenResults) -> bool:
     """Whether there are checks of printed entries, or runs of the printed equations."""
     printed = {run_selection.PRINTED, *errata_methods().values()}
-    return bool(errata_analysis.entries(opened)) or any(printed & {*one.runs} for one in opened.scenes.values())
+    return bool(errata_analysis.entries(opened)) or any(printed & {*scene.runs} for scene in opened.scenes.values())
 
 
 def _run_pages(
@@ -113,10 +131,11 @@ def _run_pages(
     jobs: Workers,
     on_page: OnPage,
 ) -> dict[str, str]:
-    """The index, errata, error against run time, figures one by one, and a page per scene."""
+    """The index, figures, errata, error against run time, and a page per scene, made in `jobs` processes."""
     if not opened.scenes:
         raise StoreError(f"{opened.path}: no scene in it, nothing to report")
     decided = claims(opened.scenes)
+    has_errata = any(file == files.ERRATA for file, _ in site)
     context = Context(
         opened.path,
         page_names(opened.scenes),
@@ -124,52 +143,58 @@ def _run_pages(
         published.conditions() if decided else {},
         stored_claims(opened) if decided else None,
         by_scene(bench),
-        published.errata() if files.ERRATA in dict(site) else (),
+        published.errata() if has_errata else (),
         site,
     )
-    made: list[Part] = [Path(file) for file in (files.INDEX, files.ERRATA, files.BENCH) if file in dict(site)]
-    made += context.files
-    parts = _parts(context, [*figures, *made], jobs, on_page)
-    pages: dict[str, str] = {}
-    for part in made:
-        pages |= parts[part]
-    if figures:
-        pages[files.WALK] = render("walk", {"figures": [parts[figure] for figure in figures]}, site, files.WALK)
-    return pages
-
-
-def _parts(context: Context, parts: Sequence[Part], jobs: Workers, on_page: OnPage) -> dict[Part, Any]:
-    """The parts, in `jobs` processes (in this one where it is 1)."""
-    found: dict[Part, Any] = {}
-    on_page(0, len(parts))
+    tasks: list[Task] = [partial(_figure, figure) for figure in figures]
+    tasks.append(_index)
+    if has_errata:
+        tasks.append(_errata)
+    if bench:
+        tasks.append(_bench)
+    tasks += [partial(_scene, name) for name in context.files]
+    made: dict[int, Any] = {}
+    on_page(0, len(tasks))
     with pool_of(0 if jobs == 1 else jobs) as pool:
         # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
-        count = min(_GROUPS * pool.workers, len(parts)) if pool.workers > 1 else 1
-        groups = [parts[start::count] for start in range(count)]
+        count = min(_GROUPS * pool.workers, len(tasks)) if pool.workers > 1 else 1
+        groups = [dict(list(enumerate(tasks))[start::count]) for start in range(count)]
         for finished in run_in(pool, partial(make_parts, context), groups, _TIMEOUT_S):
             if finished.value is None:
                 raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")
-            found |= finished.value
-            on_page(len(found), len(parts))
-    return found
+            made |= finished.value
+            on_page(len(made), len(tasks))
+    pages: dict[str, str] = {}
+    for i in range(len(figures), len(tasks)):
+        pages |= made[i]
+    if figures:
+        page = figures_page([made[i] for i in range(len(figures))], opened.scenes)
+        pages[files.FIGURES] = render("figures", page, site, files.FIGURES)
+    return pages
 
 
-def make_parts(context: Context, parts: Sequence[Part]) -> dict[Part, Any]:
-    """The task of a worker: pages, and the content of figures. Raises StoreError."""
+def make_parts(context: Context, tasks: dict[int, Task]) -> dict[int, Any]:
+    """The work of a process: what each task makes, by its number. Raises StoreError."""
     with open_results(context.results) as file:
         opened = in_memory(file)
-        return {part: _part(context, opened, part) for part in parts}
+        return {number: task(opened, context) for number, task in tasks.items()}
 
 
-def _part(context: Context, opened: OpenResults, part: Part) -> Any:
-    """Pages by file name, or what the page of figures takes of one."""
-    site = context.site
-    if isinstance(part, PaperFigure):
-        return walk_figure(part, opened.scenes, context)
-    if part == Path(files.INDEX):
-        return {files.INDEX: render("index", index_page(opened, context), site, files.INDEX)}
-    if part == Path(files.ERRATA):
-        return {files.ERRATA: render("errata", errata_page(opened, context), site, files.ERRATA)}
-    if part == Path(files.BENCH):
-        return bench_pages(opened, files.BENCH, site)
-    return {context.files[str(part)]: render("scene", scene_page(opened.scenes[str(part)], context), site)}
+def _figure(figure: PaperFigure, opened: OpenResults, context: Context) -> dict[str, object]:
+    return walk_figure(figure, opened.scenes, context)
+
+
+def _index(opened: OpenResults, context: Context) -> dict[str, str]:
+    return {files.INDEX: render("index", index_page(opened, context), context.site, files.INDEX)}
+
+
+def _errata(opened: OpenResults, context: Context) -> dict[str, str]:
+    return {files.ERRATA: render("errata", errata_page(opened, context), context.site, files.ERRATA)}
+
+
+def _bench(opened: OpenResults, context: Context) -> dict[str, str]:
+    return bench_pages(opened, files.BENCH, context.site)
+
+
+def _scene(name: str, opened: OpenResults, context: Context) -> dict[str, str]:
+    return {context.files[name]: render("scene", scene_page(opened.scenes[name], context), context.site)}

@@ -52,8 +52,8 @@ def compare_data(
     >>> import rotor_mbs as rm
     >>> scene = rm.scene("paper/fig03")
     >>> run = rm.run(scene, "lagrange/dop853")
-    >>> found = rm.compare_data({"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}, scene)
-    >>> found.status, found.verdict.read[1]
+    >>> comparison = rm.compare_data({"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}, scene)
+    >>> comparison.status, comparison.verdict.read[1]
     ('ok', "rotor = 'rotor_deg' [deg]")
     >>> rm.compare_data({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
     ('rotor: degrees taken as rad',)
@@ -87,10 +87,11 @@ class DataComparison:
         """A row for each channel: errors (rad, rad/s), until when it agrees (s), lag (s), scale, offset."""
         head = ("channel", "largest error", "per growth", *(f"to {level:g}" for level in LEVELS))
         rows = []
-        for one in self.verdict.channels:
-            until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in one.agrees_until)
-            fit = (f"{one.lag_s:.1e}", f"{one.scale - 1.0:.1e}", f"{one.offset:.1e}")
-            rows.append((one.name, f"{one.error_max:.1e} {one.unit}", f"{one.error_per_growth:.1e}", *until, *fit))
+        for channel in self.verdict.channels:
+            errors = (f"{channel.error_max:.1e} {channel.unit}", f"{channel.error_per_growth:.1e}")
+            until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in channel.agrees_until)
+            fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
+            rows.append((channel.name, *errors, *until, *fit))
         return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
 
     def plot(self) -> Panels:
@@ -104,12 +105,12 @@ class DataComparison:
         `pitch_1_growth`, what an error of 1 at the start may have become. Raises InputError where xarray is missing.
         """
         record = self.study.record()
-        found = {
+        variables = {
             name: ("time", record.arrays[name], {"units": column.units, "long_name": column.long_name})
             for name, column in record.columns.items()
         }
         facts = {name: record.attributes[name] for name in ("source", "status", "message", "tolerance")}
-        return need_xarray().Dataset(found, attrs={"scene": record.scene} | facts)
+        return need_xarray().Dataset(variables, attrs={"scene": record.scene} | facts)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""

@@ -50,8 +50,7 @@ def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequenc
     ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
     """
     scene = scene_of(scene)
-    found = compute_modes(scene, speeds, stiffnesses)
-    return Modes(**vars(found), hash=scene_hash(scene))
+    return Modes(**vars(compute_modes(scene, speeds, stiffnesses)), hash=scene_hash(scene))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +130,6 @@ class ModePlots:
         return pages.chart(self._modes.chart)
 
     def _rotation(self) -> LinearModes:
-        for one in self._modes.rotation.values():
-            return one
+        for linear in self._modes.rotation.values():
+            return linear
         raise InputError(f"{self._modes.scene}: no modes over speed; ask for speeds")

@@ -1,7 +1,4 @@
-"""Figures of runs that are in memory, for notebooks and scripts: motion, energy, error, paths of the tips.
-
-Knows solutions and looks; no file, no page, no engine.
-"""
+"""Figures of runs that are in memory, for notebooks and scripts: motion, energy, error, paths of the tips."""
 
 from __future__ import annotations
 
@@ -10,10 +7,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import label_of, look_of
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look
+from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look, label_of, look_of
 from rotor_mbs.report.pages.quantities import components
 from rotor_mbs.report.plots import time_histories
 from rotor_mbs.report.plots.paths import paths
@@ -54,15 +50,15 @@ class RunPlots:
 
         Raises InputError where the run does not have it.
         """
-        values, load = _quantity(self._run, name), next((one for one in LOADS if one.name == name), None)
+        values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
         if load is None or load.plot is None:
-            raise InputError(f"no load {name!r}; allowed: {', '.join(one.name for one in LOADS)}")
-        parts = components(load, values)
-        looks = {one.label: coordinate_look(one.place) for one in parts}
+            raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
+        looks = {}
         rows: dict[str, list[Series]] = {}
-        for one in parts:
-            label = f"{one.group} {load.plot.axis}".strip()
-            rows.setdefault(label, []).append(Series(self._run.time, one.values, looks[one.label]))
+        for part in components(load, values):
+            looks[part.label] = coordinate_look(part.place)
+            label = f"{part.group} {load.plot.axis}".strip()
+            rows.setdefault(label, []).append(Series(self._run.time, part.values, looks[part.label]))
         panels = time_histories.lines(list(rows.items()), height=1.6)
         canvas.legend(panels.axes[0], list(looks.items()))
         return panels

@@ -12,7 +12,7 @@ import pytest
 from support.commands import PROGRAM, rotor_mbs
 
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.sweep_dataset import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep
 
 SWEEP = """title = "two"
 scene = "paper/fig11"

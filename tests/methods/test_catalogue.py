@@ -11,12 +11,12 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods import catalogue
-from rotor_mbs.methods.catalogue import find_method, look_of, methods
+from rotor_mbs.methods.catalogue import find_method, methods
 
 MADE_UP = """
 from dataclasses import dataclass
 import numpy as np
-from rotor_mbs.methods.base import Look, Method, Settings
+from rotor_mbs.methods.base import Method, Settings
 from rotor_mbs.methods.settings import number
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.methods.base import BuiltItem
@@ -35,9 +35,9 @@ class OwnSolver:
         rates = np.full((len(time), 1 + len(self.scene.blades)), self.rate)
         return Trajectory(time, rates * time[:, None] + self.scene.initial_angles, rates)
 
-METHOD = Method(name="made_up/turning", label="made up, turning", look=Look("#123456", "-", "o"),
+METHOD = Method(name="made_up/turning", label="made up, turning",
                 build=OwnSolver, items=lambda scene: [BuiltItem("term", "turning")], settings=OwnSettings)
-TAKEN = Method(name="lagrange/taylor", label="x", look=METHOD.look, build=OwnSolver, items=METHOD.items)
+TAKEN = Method(name="lagrange/taylor", label="x", build=OwnSolver, items=METHOD.items)
 """
 
 
@@ -78,10 +78,9 @@ def test_an_unknown_name_is_refused_with_the_nearest_one(name: str, nearest: str
         catalogue.check_names(["reference"])  # it is computed for every scene, and not asked for by name
 
 
-def test_a_method_not_in_the_catalogue_has_its_name_and_a_grey_look() -> None:
+def test_a_method_not_in_the_catalogue_has_its_name() -> None:
     assert catalogue.look_up("foreign/method") is None
     assert catalogue.label_of("foreign/method") == "foreign/method"
-    assert look_of("foreign/method").colour not in {look_of(method.name).colour for method in methods()}
 
 
 def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
@@ -122,14 +121,14 @@ def test_a_method_of_another_package_is_found_listed_and_run(tmp_path: Path) -> 
 
 
 def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(tmp_path: Path) -> None:
-    entry_points = {"a": "no_such_module:METHOD", "b": "made_up:MISSING", "c": "made_up:Look", "d": "made_up:TAKEN"}
+    entry_points = {"a": "no_such_module:METHOD", "b": "made_up:MISSING", "c": "made_up:np", "d": "made_up:TAKEN"}
     install(tmp_path, "made_up", {**entry_points, "e": "made_up:METHOD"}, MADE_UP)
     shown = run(tmp_path, "-m", "rotor_mbs", "show", "paper/fig03")
     assert shown.returncode == 0, shown.stderr
     assert "made_up/turning" in shown.stdout
     lines = shown.stderr.splitlines()
     assert [line.partition(" left out")[0] for line in lines] == [
-        "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:Look",
+        "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:np",
         "plug-in d of made_up:TAKEN: method lagrange/taylor",
     ]  # fmt: skip
 

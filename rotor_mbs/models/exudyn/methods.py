@@ -12,7 +12,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
+from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice, step
 from rotor_mbs.models.exudyn import schemes
@@ -163,16 +163,13 @@ def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
     )
 
 
-_ORANGE, _YELLOW, _GREEN, _PURPLE = "#d55e00", "#e69f00", "#009e73", "#cc79a7"
-
-# Of a spectral radius: what the names of its curves have, and the line, of tree and of chain. 0.9 is the default.
-_RADII = {0.9: ("", "", "-", "-."), 0.7: ("_rho0.7", "ρ∞ 0.7", "--", "--"), 1.0: ("_rho1.0", "ρ∞ 1", ":", ":")}
-# Of a kind of node: the same, and the marker of generalized-α.
-_NODES = {"euler_parameters": ("", "", "^"), "rotation_vector": ("_rotation_vector", "rotation vector", ">")}
+# What the names and the labels of curves have for a spectral radius, and for a kind of node; the first is the default.
+_RADII = {0.9: ("", ""), 0.7: ("_rho0.7", "ρ∞ 0.7"), 1.0: ("_rho1.0", "ρ∞ 1")}
+_NODES = {"euler_parameters": ("", ""), "rotation_vector": ("_rotation_vector", "rotation vector")}
 
 _TREE_ALPHA_LADDERS = tuple(
-    step_ladder(8, choices={"spectral_radius": radius}, variant=variant, label=label, look=Look(_YELLOW, line, "^"))
-    for radius, (variant, label, line, _) in _RADII.items()
+    step_ladder(8, choices={"spectral_radius": radius}, variant=variant, label=label)
+    for radius, (variant, label) in _RADII.items()
 )
 _CHAIN_ALPHA_LADDERS = tuple(
     step_ladder(
@@ -180,7 +177,6 @@ _CHAIN_ALPHA_LADDERS = tuple(
         choices={"spectral_radius": radius, "node": node},
         variant=of_radius[0] + of_node[0],
         label=", ".join(filter(None, (of_radius[1], of_node[1]))),
-        look=Look(_GREEN, of_radius[3], of_node[2]),
     )
     for (node, of_node), (radius, of_radius) in product(_NODES.items(), _RADII.items())
 )
@@ -191,20 +187,19 @@ _NEWMARK_LADDERS = (
         choices={"node": "rotation_vector"},
         variant="_rotation_vector",
         label="rotation vector",
-        look=Look(_PURPLE, ":", "p"),
     ),
 )
 
 METHODS = (
     _method(
         "exudyn_tree", "rk44", "RK44",
-        look=Look(_YELLOW, "-.", "P"), settings=schemes.Rk44Settings, order=4, fixed_step=True,
+        settings=schemes.Rk44Settings, order=4, fixed_step=True,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
         ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
     ),
     _method(
         "exudyn_tree", "rk67", "RK67",
-        look=Look(_ORANGE, "--", "s"), settings=schemes.Rk67Settings, order=6, fixed_step=True, is_default=True,
+        settings=schemes.Rk67Settings, order=6, fixed_step=True, is_default=True,
         # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
         # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
@@ -212,7 +207,7 @@ METHODS = (
     ),
     _method(
         "exudyn_tree", "dopri5", "DOPRI5",
-        look=Look(_ORANGE, "-", "<"), settings=schemes.Dopri5Settings,
+        settings=schemes.Dopri5Settings,
         ladders=(
             tolerance_ladder(
                 lambda tol: {"relative_tolerance": 0.0, "absolute_tolerance": tol},
@@ -223,18 +218,18 @@ METHODS = (
     ),
     _method(
         "exudyn_tree", "generalized_alpha", "generalized-α",
-        look=Look(_YELLOW, "-", "^"), settings=schemes.AlphaSettings, order=2, fixed_step=True,
+        settings=schemes.AlphaSettings, order=2, fixed_step=True,
         ladders=_TREE_ALPHA_LADDERS, cost_scaling={"step": 1e-2},
     ),
     _method(
         "exudyn_chain", "generalized_alpha", "generalized-α",
-        look=Look(_GREEN, "-.", "^"), settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
+        settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
         ladders=_CHAIN_ALPHA_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
         linearize=late(f"{_LINEARIZATION}:linearize_chain"),
     ),
     _method(
         "exudyn_chain", "newmark_index2", "Newmark index 2",
-        look=Look(_PURPLE, "-", "D"), settings=ChainNewmarkSettings, order=2, fixed_step=True,
+        settings=ChainNewmarkSettings, order=2, fixed_step=True,
         ladders=_NEWMARK_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
     ),
 )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.methods.base import Look, Method, Solver, late
+from rotor_mbs.methods.base import Method, Solver, late
 from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.equation_items import equation_items
@@ -19,7 +19,6 @@ if TYPE_CHECKING:  # the list of methods needs none of them
 
 _EPS = sys.float_info.epsilon
 _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
-_BLUE, _LIGHT_BLUE = "#0072b2", "#56b4e9"
 
 
 @dataclass(frozen=True)
@@ -80,9 +79,7 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
     return linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], torque)
 
 
-def _scipy_method(
-    solver: str, look: Look, settings: type[Settings], ladder: Ladder, medium: float, relative_cost: float
-) -> Method:
+def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, medium: float, relative_cost: float) -> Method:
     """SciPy's solver of that name; medium: relative tolerance of the cost scaling study."""
 
     def build(scene: Scene, chosen: Any) -> Solver:
@@ -93,7 +90,6 @@ def _scipy_method(
     return Method(
         name=f"lagrange/{solver.lower()}",
         label=f"closed form, {solver}",
-        look=look,
         settings=settings,
         build=build,
         items=equation_items,
@@ -109,7 +105,6 @@ METHODS = (
     Method(
         name="lagrange/taylor",
         label="closed form, Taylor",
-        look=Look(_BLUE, "-", "o"),
         settings=TaylorSettings,
         build=_build_taylor,
         items=late("rotor_mbs.models.lagrange.taylor:items"),
@@ -129,7 +124,6 @@ METHODS = (
     Method(
         name="lagrange/ode45",
         label="closed form, Dormand-Prince 5(4)",
-        look=Look(_LIGHT_BLUE, "-", "v"),
         settings=Ode45Settings,
         build=_build_ode45,
         items=equation_items,
@@ -139,17 +133,16 @@ METHODS = (
         linearize=_linearize,
     ),
     _scipy_method(
-        "DOP853", Look(_BLUE, "--", "D"), Dop853Settings,
+        "DOP853", Dop853Settings,
         tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14), 1e-9, 20.0,
     ),
     _scipy_method(
-        "Radau", Look(_LIGHT_BLUE, "--", "*"), RadauSettings,
+        "Radau", RadauSettings,
         tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13), 1e-5, 80.0,
     ),
     Method(
         name="reference",
         label="reference, quad precision",
-        look=Look(_BLUE, "-.", "*"),
         settings=ReferenceSettings,
         build=late("rotor_mbs.models.lagrange.reference:build"),
         arrays=lambda _: ("angle_uncertainty", "error_growth"),

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Look, Method, Solver, late, stability_polynomial
+from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial
 from rotor_mbs.methods.ladders import step_ladder
 from rotor_mbs.methods.settings import Settings, step
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 _HINT = "pip install 'rotor_mbs[mujoco]'"
 _MAX_STEPS = 1e10
-_PURPLE = "#cc79a7"
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
 
 METHODS = (
     _method(
-        "rk4", "RK4", look=Look(_PURPLE, "--", "X"), settings=Rk4Settings, order=4,
+        "rk4", "RK4", settings=Rk4Settings, order=4,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
         ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
         linearize=late("rotor_mbs.models.mujoco.solver:linearize"),
@@ -75,7 +74,7 @@ METHODS = (
     # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
     # The ladder of this first-order method begins where something is left of a motion.
     _method(
-        "implicitfast", "implicit fast", look=Look(_PURPLE, "-.", "h"), settings=ImplicitFastSettings, order=1,
+        "implicitfast", "implicit fast", settings=ImplicitFastSettings, order=1,
         ladders=(step_ladder(10, first=5),), cost_scaling={"step": 1e-3},
     ),
 )  # fmt: skip

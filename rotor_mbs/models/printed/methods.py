@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Look, Method
+from rotor_mbs.methods.base import BuiltItem, Method
 from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.ode45_settings import Ode45Settings
@@ -204,12 +204,11 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
     return f
 
 
-def _method(name: str, label: str, look: Look, errata: Errata | None = None, erratum: str = "") -> Method:
+def _method(name: str, label: str, errata: Errata | None = None, erratum: str = "") -> Method:
     model = PrintedModel(name, errata)
     return Method(
         name=name,
         label=label,
-        look=look,
         build=model.build,
         items=model.items,
         settings=Ode45Settings if erratum else PrintedSettings,
@@ -220,10 +219,9 @@ def _method(name: str, label: str, look: Look, errata: Errata | None = None, err
     )
 
 
-_BLACK = "#000000"
 METHODS = (
-    _method("printed/ode45", "as printed, ode45", Look(_BLACK, "-", "x")),
-    _method("printed_e1/ode45", "E1 alone, ode45", Look(_BLACK, "--", "<"), Errata(e1=True, e2=False, e3=False), "E1"),
-    _method("printed_e2/ode45", "E2 alone, ode45", Look(_BLACK, "-.", ">"), Errata(e1=False, e2=True, e3=False), "E2"),
-    _method("printed_e3/ode45", "E3 alone, ode45", Look(_BLACK, ":", "p"), Errata(e1=False, e2=False, e3=True), "E3"),
+    _method("printed/ode45", "as printed, ode45"),
+    _method("printed_e1/ode45", "E1 alone, ode45", Errata(e1=True, e2=False, e3=False), "E1"),
+    _method("printed_e2/ode45", "E2 alone, ode45", Errata(e1=False, e2=True, e3=False), "E2"),
+    _method("printed_e3/ode45", "E3 alone, ode45", Errata(e1=False, e2=False, e3=True), "E3"),
 )

@@ -23,12 +23,14 @@ from rotor_mbs.report.core.looks import GREY, class_of, palette_css, with_light_
 from rotor_mbs.runs.files import replace_file
 
 GENERATOR = "rotor_mbs report"
-INDEX, ERRATA, WALK = "index.html", "errata.html", "figures.html"
+INDEX, ERRATA, FIGURES = "index.html", "errata.html", "figures.html"
 BENCH, MODES, COMPARISON, CHECK = "bench.html", "modes.html", "comparison.html", "check.html"
 Site = Sequence[tuple[str, str]]  # (file, label) of the main pages of a report, in order
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 _OTHERS = ("bench-", "data--")  # beginnings of the names of other pages than those of scenes
+# Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
+_UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
@@ -37,7 +39,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises StoreError for a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
-    taken = {INDEX, ERRATA, WALK, BENCH, MODES, COMPARISON, CHECK}
+    taken = {INDEX, ERRATA, FIGURES, BENCH, MODES, COMPARISON, CHECK}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
             raise StoreError(f"scene name {scene!r} cannot be made a file name; allowed: no part .. or .")
@@ -62,7 +64,7 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
         if index.is_file() and not _is_ours(index):
             raise StoreError(f"{index}: not a page of rotor_mbs; allowed: another folder for the pages")
         for name, text in pages.items():
-            replace_file(folder / name, text.encode("utf-8"))
+            replace_file(folder / name, _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8"))
         for old in folder.glob("*.html"):
             if old.name not in pages and _is_ours(old):
                 old.unlink()

@@ -1,20 +1,31 @@
-"""Labels and looks of methods, and looks of coordinates, the same in every figure and table."""
+"""How methods and coordinates are drawn, the same in every figure, and the colours of light and dark pages."""
 
 from __future__ import annotations
 
 import re
+import zlib
+from dataclasses import dataclass
 
 from rotor_mbs.methods.catalogue import label_of as label_of
-from rotor_mbs.methods.catalogue import look_of as look_of
-from rotor_mbs.methods.ladders import Look as Look
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a curve is drawn: colour ("#0072b2"), line ("-", "--", "-.", ":") and marker, in matplotlib's notation."""
+
+    colour: str
+    line: str
+    marker: str
+
 
 # Every colour of a picture, and what stands for it on a dark page. A picture has colours of methods or of coordinates,
 # never of both.
 INK, PAPER, GREY = "#000000", "#ffffff", "#666666"
-BLUE, VERMILLION = "#0072b2", "#d55e00"
+BLUE, VERMILLION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
+ORANGE, LIGHT_BLUE = "#e69f00", "#56b4e9"
 _METHODS = {  # Okabe & Ito's, distinguishable with colour blindness; without the yellow, which does not show on white
-    INK: "#e6e9ed", BLUE: "#4fa8e0", VERMILLION: "#ff8a3d", "#009e73": "#2fc498", "#cc79a7": "#e79cc6",
-    "#e69f00": "#f7bd45", "#56b4e9": "#9bd6f8",
+    INK: "#e6e9ed", BLUE: "#4fa8e0", VERMILLION: "#ff8a3d", GREEN: "#2fc498", PURPLE: "#e79cc6",
+    ORANGE: "#f7bd45", LIGHT_BLUE: "#9bd6f8",
 }  # fmt: skip
 _COORDINATES = {  # Tol's muted ones: the rotor, then a blade each
     "#4a5058": "#c9ced4", "#882255": "#e583b2", "#2a8a7e": "#62cdbf", "#5a46b5": "#ab9ff5", "#8a7a1c": "#d6c75c",
@@ -31,6 +42,50 @@ _VARIABLES = {name: (colour, PALETTE[colour]) for colour, name in _CLASSES.items
     "grid": ("#e4e4e4", "#333b44"),
 }
 
+# By the name of a method, or of a curve of the bench: the method's name and its variant.
+_LOOKS = {
+    "reference": Look(BLUE, "-.", "*"),
+    "printed/ode45": Look(INK, "-", "x"),
+    "printed_e1/ode45": Look(INK, "--", "<"),
+    "printed_e2/ode45": Look(INK, "-.", ">"),
+    "printed_e3/ode45": Look(INK, ":", "p"),
+    "lagrange/taylor": Look(BLUE, "-", "o"),
+    "lagrange/ode45": Look(LIGHT_BLUE, "-", "v"),
+    "lagrange/dop853": Look(BLUE, "--", "D"),
+    "lagrange/radau": Look(LIGHT_BLUE, "--", "*"),
+    "exudyn_tree/rk44": Look(ORANGE, "-.", "P"),
+    "exudyn_tree/rk67": Look(VERMILLION, "--", "s"),
+    "exudyn_tree/dopri5": Look(VERMILLION, "-", "<"),
+    "exudyn_tree/generalized_alpha": Look(ORANGE, "-", "^"),
+    "exudyn_tree/generalized_alpha_rho0.7": Look(ORANGE, "--", "^"),
+    "exudyn_tree/generalized_alpha_rho1.0": Look(ORANGE, ":", "^"),
+    "exudyn_chain/generalized_alpha": Look(GREEN, "-.", "^"),
+    "exudyn_chain/generalized_alpha_rho0.7": Look(GREEN, "--", "^"),
+    "exudyn_chain/generalized_alpha_rho1.0": Look(GREEN, ":", "^"),
+    "exudyn_chain/generalized_alpha_rotation_vector": Look(GREEN, "-.", ">"),
+    "exudyn_chain/generalized_alpha_rho0.7_rotation_vector": Look(GREEN, "--", ">"),
+    "exudyn_chain/generalized_alpha_rho1.0_rotation_vector": Look(GREEN, ":", ">"),
+    "exudyn_chain/newmark_index2": Look(PURPLE, "-", "D"),
+    "exudyn_chain/newmark_index2_rotation_vector": Look(PURPLE, ":", "p"),
+    "mujoco/rk4": Look(PURPLE, "--", "X"),
+    "mujoco/implicitfast": Look(PURPLE, "-.", "h"),
+}
+_OTHER_LINES = (":", "-.", "--", "-")
+_OTHER_MARKERS = ("D", "o", "s", "^", "v", "P", "X", "h", "p", "<", ">")
+
+
+def look_of(curve: str) -> Look:
+    """Return how a method, or a curve of the bench, is drawn; one that is not in the table in grey.
+
+    Line and marker of a method of another package follow from its name, the same in every report.
+    """
+    if curve in _LOOKS:
+        return _LOOKS[curve]
+    code = zlib.crc32(curve.encode("utf-8", "replace"))
+    line = _OTHER_LINES[code % len(_OTHER_LINES)]
+    marker = _OTHER_MARKERS[code // len(_OTHER_LINES) % len(_OTHER_MARKERS)]
+    return Look(GREY, line, marker)
+
 
 def class_of(colour: str) -> str:
     """The class of a colour of the palette in the style sheet; "" for another colour."""
@@ -46,7 +101,7 @@ def palette_css() -> str:
 
 def with_light_palette(css: str) -> str:
     """`css` of pictures and the classes of the palette, with light colours in place of variables."""
-    return re.sub(r"var\(--(\w+)\)", lambda found: _VARIABLES[found[1]][0], _CLASS_RULES + css)
+    return re.sub(r"var\(--(\w+)\)", lambda variable: _VARIABLES[variable[1]][0], _CLASS_RULES + css)
 
 
 def with_capital(text: str) -> str:

@@ -73,11 +73,12 @@ def scaled(largest: float) -> tuple[float, str]:
 
 def typeset(text: str) -> str:
     """A sentence with its numbers such as 8.1e+00 and 1e-06 as 8.1 and 10⁻⁶; names such as torque-1e9 stay."""
-    return _COMPUTED.sub(lambda found: power(int(found[2])) if found[1] == "1" else _shortest(found), text)
 
+    def shortest(computed: re.Match[str]) -> str:
+        mantissa, exponent = computed.groups()
+        return power(int(exponent)) if mantissa == "1" else number(float(computed[0]), len(mantissa.replace(".", "")))
 
-def _shortest(found: re.Match[str]) -> str:
-    return number(float(found[0]), len(found[1].replace(".", "")))
+    return _COMPUTED.sub(shortest, text)
 
 
 def minus(text: str) -> str:

@@ -9,7 +9,7 @@ them for a dark page. Coordinates are points from the upper left corner of the f
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
@@ -33,22 +33,17 @@ _SHADES = 16  # of a map
 
 
 def picture(
-    panels: Panels, name: str, caption: str, description: str, notes: Iterable[str] = (),
-    legend: Sequence[LegendEntry] = (),
-) -> Picture:  # fmt: skip
-    """The figure for a page, as an `svg` element with caption and description as its alternative text.
-
-    `name` is unique on the page; `description` says what the figure shows.
-    """
+    panels: Panels, name: str, caption: str, notes: Sequence[str] = (), legend: Sequence[LegendEntry] = ()
+) -> Picture:
+    """The figure for a page, an `svg` element whose alternative text is the caption; `name` is unique on the page."""
     page = _Page(panels.figure)
     with style():
         body = "".join(part for axes in panels.figure.axes for part in page.axes(axes))
     text = (
-        f'<svg viewBox="0 0 {_short(page.width)} {_short(page.height)}" role="img" '
-        f'aria-labelledby="{name}-t {name}-d"><title id="{name}-t">{escape(caption)}</title>'
-        f'<desc id="{name}-d">{escape(description)}</desc>{body}{page.cursor(panels.axes)}</svg>'
+        f'<svg viewBox="0 0 {_short(page.width)} {_short(page.height)}" role="img" aria-labelledby="{name}-t">'
+        f'<title id="{name}-t">{escape(caption)}</title>{body}{page.cursor(panels.axes)}</svg>'
     )
-    return Picture(Markup(text), caption, [note for note in notes if note], legend)
+    return Picture(Markup(text), caption, notes, legend)
 
 
 class _Page:
@@ -68,10 +63,14 @@ class _Page:
         width, height = right - left + 2.0 * _EDGE, bottom - top + 2.0 * _EDGE
         seen = tuple(map(_short, (left - _EDGE, top - _EDGE, width, height)))
         yield '<svg x="{0}" y="{1}" width="{2}" height="{3}" viewBox="{0} {1} {2} {3}">'.format(*seen)
-        drawn = [*axes.patches, *axes.collections, *axes.lines]
-        for artist in sorted((one for one in drawn if one.get_visible()), key=lambda one: one.get_zorder()):
-            draw = self._map if is_map(artist) else self._line if hasattr(artist, "get_xydata") else self._areas
-            yield from draw(artist)
+        artists = [artist for artist in (*axes.patches, *axes.collections, *axes.lines) if artist.get_visible()]
+        for artist in sorted(artists, key=lambda artist: artist.get_zorder()):
+            if is_map(artist):
+                yield from self._map(artist)
+            elif hasattr(artist, "get_xydata"):
+                yield from self._line(artist)
+            else:
+                yield from self._areas(artist)
         yield "</svg>"
         for text in axes.texts:
             x, y = self._placed(text.get_transform().transform(np.atleast_2d(text.get_position())))[0]
@@ -94,8 +93,8 @@ class _Page:
 
     def _placed(self, pixels: Any) -> Array:
         """Display coordinates, in pixels from below, as points from above."""
-        found: Array = np.asarray(pixels) * (self._points, -self._points) + (0.0, self.height)
-        return found
+        points: Array = np.asarray(pixels) * (self._points, -self._points) + (0.0, self.height)
+        return points
 
     def _frame(self, axes: Any, box: Box) -> Iterator[str]:
         """Grid, spines, tick labels and axis labels; of a colour scale the labels alone, on its right."""
@@ -146,7 +145,7 @@ class _Page:
         data = data[np.isfinite(data).all(axis=1)]
         if marker and len(data):
             scale = float(line.get_markersize()) / 6.0
-            shape = re.sub(r"\d*\.?\d+", lambda found: _short(float(found[0]) * scale), marker)
+            shape = re.sub(r"\d*\.?\d+", lambda digits: _short(float(digits[0]) * scale), marker)
             places = self._placed(line.get_transform().transform(data))
             face = hex_colour(line.get_markerfacecolor()) if line.get_markerfacecolor() != "none" else ""
             ink = _ink(line.get_markeredgecolor(), {"": "", PAPER: " open"}.get(face, " filled"))
@@ -212,13 +211,17 @@ def _ticks(axis: Any) -> tuple[Array, Sequence[str]]:
 def _label(axis: Any) -> str:
     """The axis' label, with what its tick labels leave out: "rate − 0.3 (10⁻³ rad/s)" for 0.3 and times 1e-3."""
     label, offset = str(axis.get_label_text()), str(axis.get_major_formatter().get_offset()).replace("−", "-")
-    found = re.fullmatch(r"(?:1e(-?\d+))?([-+].+)?", offset)
-    if not offset or found is None:
+    parts = re.fullmatch(r"(?:1e(-?\d+))?([-+].+)?", offset)
+    if not offset or parts is None:
         return f"{label} {offset}".strip()
+    exponent, shift = parts.groups()
     name, _, unit = label.partition(" (")
-    shift = f" {'−' if float(found[2]) > 0.0 else '+'} {abs(float(found[2])):g}" if found[2] else ""
-    inside = SPACE.join(filter(None, [power(int(found[1])) if found[1] else "", unit.rstrip(")")]))
-    return f"{name}{shift} ({inside})" if inside else name + shift
+    if shift:
+        name += f" {'−' if float(shift) > 0.0 else '+'} {abs(float(shift)):g}"
+    unit = unit.rstrip(")")
+    if exponent:
+        unit = SPACE.join(filter(None, [power(int(exponent)), unit]))
+    return f"{name} ({unit})" if unit else name
 
 
 def _words(x: float, y: float, words: str, anchor: str, size: float = _FONT, colour: str = INK) -> str:

@@ -8,13 +8,12 @@ import numpy as np
 
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.elements import LegendEntry, Picture, Section
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
 from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.core.numbers import prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots.time_histories import Series, lines
 from rotor_mbs.runs.read import StoredRun, StoredScene
-from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, value_at
 from rotor_mbs.solution.trajectory import Array
 
@@ -26,62 +25,56 @@ def drive_section(stored: StoredScene, run: StoredRun | None) -> Section:
     scene = scene_of(stored)
     if scene is None or run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
         return Section()
+    time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
     pictures: list[Picture] = []
     legend: list[LegendEntry] = []
+    rows: list[list[str]] = []
     if scene.has_torque:
-        pictures.append(_shaft(scene, run))
+        torque = _over(time, scene.rotor_torque)
+        powers = [Series(time, torque * rates[:, 0], coordinate_look(0))]
+        rows.append(["Torque on the rotor", *_numbers(torque, "N m"), ""])
+        rows.append(["Its power", *_numbers(powers[0].values, "W"), _work(powers[0])])
         if scene.shaft_damping:
-            names = {"torque on the rotor": coordinate_look(0), "taken by the shaft's damper": _TAKEN}
-            legend += [LegendEntry(name, look) for name, look in names.items()]
+            powers.append(Series(time, scene.shaft_damping * rates[:, 0] ** 2, _TAKEN))
+            rows.append(["Taken by the shaft's damper", *_numbers(powers[1].values, "W"), _work(powers[1])])
+            legend.append(LegendEntry("torque on the rotor", coordinate_look(0)))
+            legend.append(LegendEntry("taken by the shaft's damper", _TAKEN))
+        panels = _from_zero([("torque (N m)", [Series(time, torque, coordinate_look(0))]), ("power (W)", powers)])
+        pictures.append(picture(panels, "drive", "Rotor torque and its power"))
     driven = [i for i in range(len(scene.blades)) if any(scene.pitch_load(i))]
     if driven:
-        pictures.append(_pitches(scene, run, driven))
+        pitches = [Series(time, pitch, coordinate_look(1 + i)) for i, pitch in enumerate(angles.T[1:])]
+        powers = []
+        for i in driven:
+            torque, rest = (_over(time, table) for table in scene.pitch_load(i))
+            stiffness, damping = scene.bearing(i)
+            moment = torque + stiffness * (rest - angles[:, 1 + i]) - damping * rates[:, 1 + i]
+            power = Series(time, moment * rates[:, 1 + i], coordinate_look(1 + i))
+            powers.append(power)
+            if scene.pitch_load(i)[1]:
+                pitches.append(Series(time, rest, _COMMAND))
+            ends = (float(np.abs(angles[:, 1 + i]).max()), float(angles[-1, 1 + i]))
+            rows.append([f"Pitch {i + 1}", *(with_unit(angle, "rad", 4) for angle in ends), ""])
+            rows.append([f"Actuator {i + 1}, power", *_numbers(power.values, "W"), _work(power)])
+        panels = _from_zero([("pitch (rad)", pitches), ("actuators' power (W)", powers)])
+        pictures.append(picture(panels, "pitch-drive", "Pitches, their commands and actuators"))
         legend += [LegendEntry(f"pitch {i + 1}", coordinate_look(1 + i)) for i in range(len(scene.blades))]
         if any(scene.bearing_rest):
             legend.append(LegendEntry("command", _COMMAND))
-    return Section(pictures, legend)
+    table = PageTable("", ("", "Largest", "At the end", "Work"), rows, numeric=(1, 2, 3))
+    return Section(pictures, legend, [table] if rows else [])
 
 
 def _over(time: Array, table: Table) -> Array:
     return np.array([value_at(table, t) for t in time.tolist()])
 
 
-def _shaft(scene: Scene, run: StoredRun) -> Picture:
-    """Torque on the rotor above its power and what the shaft's damper takes."""
-    time, spin = run.array("time"), run.array("rates")[:, 0]
-    torque = _over(time, scene.rotor_torque)
-    power, taken = torque * spin, scene.shaft_damping * spin**2
-    work = float(np.trapezoid(power, time)) if len(time) > 1 else 0.0
-    caption = f"Rotor torque and its power; work {prefixed(work, 'J')}"
-    if scene.shaft_damping:
-        caption += f", of which the shaft's damper takes {prefixed(float(np.trapezoid(taken, time)), 'J')}"
-    most = [prefixed(float(np.abs(x).max()), unit) for x, unit in ((torque, "N m"), (power, "W"))]
-    end = prefixed(float(power[-1]), "W")
-    described = f"{caption}: torque up to {most[0]}, power up to {most[1]}, {end} at the end."
-    curves = [Series(time, power, coordinate_look(0))]
-    if scene.shaft_damping:
-        curves.append(Series(time, taken, _TAKEN))
-    rows = [("torque (N m)", [Series(time, torque, coordinate_look(0))]), ("power (W)", curves)]
-    return picture(_from_zero(rows), "drive", caption, described)
+def _numbers(values: Array, unit: str) -> list[str]:
+    return [prefixed(float(np.abs(values).max()), unit), prefixed(float(values[-1]), unit)]
 
 
-def _pitches(scene: Scene, run: StoredRun, driven: list[int]) -> Picture:
-    """Pitches with their commands, above the power of the actuators (torque, spring and damper) on the blades."""
-    time, angles, rates = run.array("time"), run.array("angles")[:, 1:], run.array("rates")[:, 1:]
-    pitches = [Series(time, x, coordinate_look(1 + i)) for i, x in enumerate(angles.T)]
-    powers, ends = [], []
-    for i in driven:
-        torque, rest = (_over(time, table) for table in scene.pitch_load(i))
-        stiffness, damping = scene.bearing(i)
-        moment = torque + stiffness * (rest - angles[:, i]) - damping * rates[:, i]
-        powers.append(Series(time, moment * rates[:, i], coordinate_look(1 + i)))
-        ends.append(f"pitch {i + 1} ends at {with_unit(float(angles[-1, i]), 'rad', 4)}")
-        if scene.pitch_load(i)[1]:
-            pitches.append(Series(time, rest, _COMMAND))
-    most = prefixed(max(float(np.abs(one.values).max()) for one in powers), "W")
-    described = f"Pitches and the power of their actuators: {'; '.join(ends)}; power up to {most}."
-    rows = [("pitch (rad)", pitches), ("actuators' power (W)", powers)]
-    return picture(_from_zero(rows), "pitch-drive", "Pitches, their commands and actuators", described)
+def _work(power: Series) -> str:
+    return prefixed(float(np.trapezoid(power.values, power.time)), "J")
 
 
 def _from_zero(rows: Sequence[tuple[str, Sequence[Series]]]) -> Panels:

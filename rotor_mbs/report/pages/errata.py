@@ -17,8 +17,8 @@ from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages import Context
-from rotor_mbs.report.pages.scene_tables import status_text
-from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.report.pages.scene_tables import metric, status_text
+from rotor_mbs.runs.read import OpenResults, StoredScene
 
 _TOKEN = re.compile(
     r"(?:(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)|q̇(?P<rate_index>\d)|(?P<name>[A-Za-zα-ω]))(?P<square>[²³]?)"
@@ -33,60 +33,52 @@ def errata_page(opened: OpenResults, context: Context) -> dict[str, object]:
     """The content of the page of errata."""
     entries = checked_entries(opened)
     agreeing = [entry for entry in entries if entry.agrees]
+    differing = [entry for entry in entries if not entry.agrees]
+    differing_table = PageTable(
+        f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3)",
+        ("Equation", "Entry", "Printed", "Correct", "Relative difference", "Explained by"),
+        [
+            (e.equation, e.entry, e.printed, e.right, number(e.difference), e.explained_by or "nothing")
+            for e in differing
+        ],
+        numeric=(4,),
+    )
+    agreeing_rows = [(e.equation, e.entry, e.printed, number(e.difference)) for e in agreeing]
     return {
-        "errata": [(one, matrices(entries, one.stands_in)) for one in context.errata],
-        "differing": Section(tables=[_differing_table([one for one in entries if not one.agrees], len(entries))]),
+        "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in context.errata],
+        "differing": Section(tables=[differing_table]),
         "effects": Section(tables=[_effects_table(opened.scenes, context.files)]),
-        "agreeing": _agreeing_table(agreeing),
+        "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows, numeric=(3,)),
         "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
     }
 
 
-def _differing_table(entries: Sequence[CheckedEntry], checked: int) -> PageTable:
-    head = ("Equation", "Entry", "Printed", "Correct", "Relative difference", "Explained by")
-    rows = [
-        (e.equation, e.entry, e.printed, e.right, number(e.difference), e.explained_by or "nothing") for e in entries
-    ]
-    caption = f"{len(entries)} of {checked} printed entries differ from what follows from (3)"
-    return PageTable(caption, head, rows, numeric=(4,))
-
-
-def _agreeing_table(entries: Sequence[CheckedEntry]) -> PageTable:
-    head = ("Equation", "Entry", "Printed", "Relative difference")
-    rows = [(e.equation, e.entry, e.printed, number(e.difference)) for e in entries]
-    return PageTable("", head, rows, numeric=(3,))
-
-
 def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
+    """What each erratum alone does: the largest angle change up to the horizon and over the whole run, energy gain."""
     head = ["Scene"]
     for erratum in errata_methods():
         head += [
             f"{erratum}: {what}" for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain")
         ]
-    rows = []
+    rows: list[Row] = []
     for name, scene in scenes.items():
         runs = [scene.methods.get(method) for method in errata_methods().values()]
+        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title)]
+        for run in runs:
+            if run is None:
+                row += ["", "", ""]
+                continue
+            status = "" if run.status == "ok" else status_text(run.status)
+            row.append(TableCell(number(metric(run, "angle_error_max")), note=status))
+            row += [number(metric(run, "angle_error_whole")), prefixed(metric(run, "energy_gain_J"), "J")]
         if any(run is not None for run in runs):
-            cells = [cell for run in runs for cell in _effect_cells(run)]
-            rows.append([TableCell(name, href=files[name], note=scene.title), *cells])
+            rows.append(row)
     return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
-
-
-def _effect_cells(run: StoredRun | None) -> Row:
-    """What one erratum does: the largest angle change up to the horizon and over the whole run, the energy gain."""
-    if run is None:
-        return ["", "", ""]
-    facts = run.attributes
-    return [
-        TableCell(number(facts.get("angle_error_max")), note="" if run.status == "ok" else status_text(run.status)),
-        number(facts.get("angle_error_whole")),
-        prefixed(facts.get("energy_gain_J"), "J"),
-    ]
 
 
 def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, list[list[Cell]]]]:
     """(equation, rows of its matrix) of those of `equations` that are matrices."""
-    found = []
+    shown = []
     for equation in equations:
         places = {}
         for entry in entries:
@@ -95,8 +87,8 @@ def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[
                 places[int(place[1]), int(place[2])] = entry
         if places:
             rows, columns = (range(1, 1 + max(place[axis] for place in places)) for axis in (0, 1))
-            found.append((equation, [[_cell(places.get((row, column))) for column in columns] for row in rows]))
-    return found
+            shown.append((equation, [[_cell(places.get((row, column))) for column in columns] for row in rows]))
+    return shown
 
 
 def _cell(entry: CheckedEntry | None) -> Cell:
@@ -110,24 +102,24 @@ def _row(text: str) -> str | None:
     """MathML of a formula; None where a part of it is not understood."""
     parts, at = [], 0
     while at < len(text):
-        found = _TOKEN.match(text, at)
-        if found is None:
+        token = _TOKEN.match(text, at)
+        if token is None:
             return None
-        parts.append(_element(found))
-        at = found.end()
+        parts.append(_element(token))
+        at = token.end()
     return "<mrow>" + "".join(parts) + "</mrow>"
 
 
-def _element(found: re.Match[str]) -> str:
-    if found["number"]:
-        return f"<mn>{found['number']}</mn>"
-    if found["sign"]:
-        return f"<mo>{found['sign'].replace('-', '−')}</mo>"
-    if found["space"]:
+def _element(token: re.Match[str]) -> str:
+    if token["number"]:
+        return f"<mn>{token['number']}</mn>"
+    if token["sign"]:
+        return f"<mo>{token['sign'].replace('-', '−')}</mo>"
+    if token["space"]:
         return '<mspace width="0.2em"/>'
-    base = f"<mi>{found['name']}</mi>"
-    if found["trig"]:
-        base = f"<msub><mi>{found['trig']}</mi><mn>{found['index']}</mn></msub>"
-    elif found["rate_index"]:
-        base = f"<msub><mover><mi>q</mi><mo>˙</mo></mover><mn>{found['rate_index']}</mn></msub>"
-    return f"<msup>{base}<mn>{_POWERS[found['square']]}</mn></msup>" if found["square"] else base
+    base = f"<mi>{token['name']}</mi>"
+    if token["trig"]:
+        base = f"<msub><mi>{token['trig']}</mi><mn>{token['index']}</mn></msub>"
+    elif token["rate_index"]:
+        base = f"<msub><mover><mi>q</mi><mo>˙</mo></mover><mn>{token['rate_index']}</mn></msub>"
+    return f"<msup>{base}<mn>{_POWERS[token['square']]}</mn></msup>" if token["square"] else base

@@ -1,6 +1,6 @@
 """The paper's figures: what each shows, and how it is drawn, for a manuscript and on the page that goes through them.
 
-The page sets the models side by side and says what is the same and what differs.
+Both set the models side by side.
 """
 
 from __future__ import annotations
@@ -15,26 +15,22 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.report.core import canvas, svg
-from rotor_mbs.report.core.elements import LegendEntry, Picture
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section
 from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look, label_of, with_capital
-from rotor_mbs.report.core.numbers import fixed, minus, number, prefixed, with_unit
+from rotor_mbs.report.core.numbers import minus, number, prefixed, with_unit
 from rotor_mbs.report.pages import Context
-from rotor_mbs.report.pages.claim_tables import description_of, unit_of
-from rotor_mbs.report.pages.comparison_pictures import parting
-from rotor_mbs.report.pages.quantities import angle_difference
+from rotor_mbs.report.pages.claim_tables import number_table
+from rotor_mbs.report.pages.quantities import VISIBLE, angle_difference, parting
 from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.report.plots import paths
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
-from rotor_mbs.solution.status import COMPLETE
 
-_ROUNDING = 1e-9  # rad
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
 # The models that are compared, by key, in order from left to right.
 HEADINGS = {"printed": "As printed", "corrected": "Corrected model", "exudyn": "Exudyn"}
@@ -49,47 +45,44 @@ class PaperFigure:
     panels: tuple[tuple[str, str], ...]
 
 
-def _figure(number: str, kind: str, **panels: str) -> PaperFigure:
-    return PaperFigure(number, kind, tuple((letter.strip("_"), f"paper/{name}") for letter, name in panels.items()))
-
-
 FIGURES = (
-    _figure("3", MOTION, _="fig03"),
-    _figure("4", PATHS, a="fig03", b="fig04b"),
-    _figure("5", MOTION, _="fig05"),
-    _figure("6", MOTION, _="fig06"),
-    _figure("7", PATHS, a="fig05", b="fig06"),
-    _figure("8", MOTION, _="fig08"),
-    _figure("9", MOTION, _="fig09"),
-    _figure("10", PATHS, a="fig08", b="fig09"),
-    _figure("11", MOTION, _="fig11"),
-    _figure("12", MOTION, _="fig12"),
-    _figure("13", PATHS, a="fig11", b="fig13b"),
-    _figure("14", PATHS, a="fig14a", b="fig14b", c="fig14c"),
-    PaperFigure("15", TORQUES, tuple((f"{n} kN·m", f"paper/fig15-{n}kNm") for n in (1, 10, 50, 100))),
-    _figure("16", PATHS, a="fig15-1kNm", b="fig15-100kNm"),
+    PaperFigure("3", MOTION, (("", "paper/fig03"),)),
+    PaperFigure("4", PATHS, (("a", "paper/fig03"), ("b", "paper/fig04b"))),
+    PaperFigure("5", MOTION, (("", "paper/fig05"),)),
+    PaperFigure("6", MOTION, (("", "paper/fig06"),)),
+    PaperFigure("7", PATHS, (("a", "paper/fig05"), ("b", "paper/fig06"))),
+    PaperFigure("8", MOTION, (("", "paper/fig08"),)),
+    PaperFigure("9", MOTION, (("", "paper/fig09"),)),
+    PaperFigure("10", PATHS, (("a", "paper/fig08"), ("b", "paper/fig09"))),
+    PaperFigure("11", MOTION, (("", "paper/fig11"),)),
+    PaperFigure("12", MOTION, (("", "paper/fig12"),)),
+    PaperFigure("13", PATHS, (("a", "paper/fig11"), ("b", "paper/fig13b"))),
+    PaperFigure("14", PATHS, (("a", "paper/fig14a"), ("b", "paper/fig14b"), ("c", "paper/fig14c"))),
+    PaperFigure("15", TORQUES, tuple((f"{n} kN m", f"paper/fig15-{n}kNm") for n in (1, 10, 50, 100))),
+    PaperFigure("16", PATHS, (("a", "paper/fig15-1kNm"), ("b", "paper/fig15-100kNm"))),
 )
 
 
 def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
     """The figures of which `scenes` has a panel, with the panels that it has."""
-    found = (
-        PaperFigure(one.number, one.kind, tuple(panel for panel in one.panels if panel[1] in scenes)) for one in FIGURES
-    )
-    return tuple(one for one in found if one.panels)
+    figures = []
+    for figure in FIGURES:
+        panels = tuple(panel for panel in figure.panels if panel[1] in scenes)
+        if panels:
+            figures.append(replace(figure, panels=panels))
+    return tuple(figures)
 
 
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """The scene's runs by the keys of HEADINGS, those that have samples of angles and rates."""
-    exudyn = [
-        run for name, run in run_selection.corrected_runs(scene).items()
-        if (method := look_up(name)) and "exudyn" in method.distributions and run_selection.has_samples(run)
-    ]  # fmt: skip
-    found: dict[str, StoredRun] = {}
-    for key, run in [*run_selection.sides(scene).items(), *(("exudyn", run) for run in exudyn[:1])]:
-        if run not in found.values() and "angles" in run and "rates" in run:
-            found[key] = run
-    return found
+    candidates = run_selection.sides(scene)
+    for name, run in run_selection.corrected_runs(scene).items():
+        method = look_up(name)
+        if method and "exudyn" in method.distributions and run_selection.has_samples(run):
+            if run not in candidates.values():
+                candidates["exudyn"] = run
+            break
+    return {key: run for key, run in candidates.items() if "angles" in run and "rates" in run}
 
 
 def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
@@ -112,17 +105,17 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
         paths.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
         return
     labels = (histories.ANGLE_AXIS, histories.RATE_AXIS)
-    for one, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
+    for panel, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
         if figure.kind == MOTION:
             run = next(iter(runs.values()))
-            histories.draw_coordinates(one, run.array("time"), run.array(name), label)
+            histories.draw_coordinates(panel, run.array("time"), run.array(name), label)
         else:
             series = [
                 histories.Series(run.array("time"), run.array(name)[:, 0], torque_look(place))
                 for place, run in enumerate(runs.values())
             ]
-            histories.draw_lines(one, series, label)
-            histories.set_range(one, np.concatenate([run.values for run in series])[:, None])
+            histories.draw_lines(panel, series, label)
+            histories.set_range(panel, np.concatenate([curve.values for curve in series])[:, None])
     axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)
     axes[1].set_title("(b) angular velocity", loc="left")
@@ -152,7 +145,7 @@ def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str]
     have, StoreError where the file cannot be read or the folder cannot be written.
     """
     with open_results(results) as opened:
-        have = {one.number: one for one in available(opened.scenes)}
+        have = {figure.number: figure for figure in available(opened.scenes)}
         asked = list(dict.fromkeys(numbers)) or list(have)
         unknown = [number for number in asked if number not in have]
         if unknown or not have:
@@ -192,117 +185,82 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
     return panels
 
 
+def figures_page(figures: Sequence[Mapping[str, object]], scenes: Mapping[str, StoredScene]) -> dict[str, object]:
+    """The content of the page that goes through the figures, from that of each (`walk_figure`)."""
+    shown = {name: scenes[name] for figure in available(scenes) for _, name in figure.panels}
+    return {"figures": figures, "models": Section(tables=[model_table(shown)])}
+
+
 def walk_figure(figure: PaperFigure, scenes: Mapping[str, StoredScene], context: Context) -> dict[str, object]:
     """The part of the page about one figure."""
-    claims = (claim for claim in context.claims if claim.published.is_number)
-    numbers = [claim for claim in claims if claim.published.figure == figure.number]
+    numbers = [claim for claim in context.claims if claim.published.figure == figure.number]
     pictures = panel_runs(figure, scenes)
     is_torques = figure.kind == TORQUES  # all in one picture per model
     panels = []
     for letter, name in [("", figure.panels[0][1])] if is_torques else figure.panels:
-        row = pictures.get(letter, {})
-        same, different = _torques(figure, scenes, row) if is_torques else same_and_different(scenes[name])
         panels.append({
             "letter": letter,
             "scene": name,
             "href": context.files[name],
             "conditions": _conditions(scenes[name], with_torque=not is_torques),
-            "pictures": [_picture(figure, letter, key, runs, f"{same} {different}") for key, runs in row.items()],
-            "same": same,
-            "different": different,
+            "pictures": [_picture(figure, letter, key, runs) for key, runs in pictures.get(letter, {}).items()],
         })  # fmt: skip
     return {
         "number": figure.number,
         "kind": figure.kind,
         "legend": [LegendEntry(label, look) for label, look in legend(figure, scenes)],
         "panels": panels,
-        "numbers": [_number(claim) for claim in numbers],
-        "has_rounding_number": any(claim.published.rounding for claim in numbers),
+        "numbers": number_table(numbers),
     }
 
 
-def _torques(
-    figure: PaperFigure, scenes: Mapping[str, StoredScene], row: Mapping[str, Mapping[str, StoredRun]]
-) -> tuple[str, str]:
-    """What is the same and what is not in a figure of torques."""
-    gaps = [gap for _, name in figure.panels if (gap := _exudyn_gap(scenes[name])) is not None]
-    same = "The same: every torque accelerates the rotor from rest"
-    same += f"; Exudyn and the corrected model differ by {with_unit(max(gaps)[0], 'rad')} at most." if gaps else "."
-    turned = [
-        f"{HEADINGS[key]}: {', '.join(_turned(run, at) for at, run in runs.items())}" for key, runs in row.items()
-    ]
-    return same, (
-        "Not the same: in the corrected model the blades stay at zero pitch and the rotor turns by "
-        f"τt²/(2·3·m·(c²+d²)). Turned at the end: {'; '.join(turned)}."
-    )
+def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
+    """How far the printed model and Exudyn are from the corrected model, a row per scene."""
+    head = (
+        "Scene", f"As printed: {VISIBLE:g} rad off from (s)", "largest difference (rad)", "largest pitch (rad)",
+        "largest energy gain", "ends at (s)", "Corrected: largest pitch (rad)", "Exudyn: difference (rad)", "up to (s)",
+        "turned by the end (rad): as printed", "corrected", "Exudyn",
+    )  # fmt: skip
+    rows: list[Row] = []
+    for name, scene in scenes.items():
+        runs = compared_runs(scene)
+        printed, corrected, exudyn = (runs.get(key) for key in HEADINGS)
+        pitches = {key: number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))) for key, run in runs.items()}
+        turned = {}
+        for key, run in runs.items():
+            rotor = run.array("angles")[:, 0]
+            turned[key] = number(float(rotor[-1] - rotor[0]), 3)
+        row = [name]
+        if printed is not None and corrected is not None:
+            parted, largest = parting(printed, corrected)
+            row += ["never" if parted is None else number(parted), number(largest)]
+        else:
+            row += ["", ""]
+        if printed is not None:
+            row += [pitches["printed"], prefixed(metric(printed, "energy_gain_J"), "J")]
+            row.append(number(float(printed.array("time")[-1]), 3))
+        else:
+            row += ["", "", ""]
+        row.append(pitches.get("corrected", ""))
+        if exudyn is not None and corrected is not None:
+            gap, time = angle_difference(exudyn, corrected), exudyn.array("time")
+            known = horizon(scene)
+            until = float(time[-1]) if known is None else min(known, float(time[-1]))
+            row += [number(float(gap[time[: len(gap)] <= until].max(initial=0.0))), number(until, 3)]
+        else:
+            row += ["", ""]
+        rows.append([*row, *(turned.get(key, "") for key in HEADINGS)])
+    return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
 
 
-def _turned(run: StoredRun, torque: str) -> str:
-    return f"{number(float(run.array('angles')[-1, 0] - run.array('angles')[0, 0]), 3)} rad at {torque}"
-
-
-def _picture(figure: PaperFigure, letter: str, key: str, runs: Mapping[str, StoredRun], message: str) -> Picture:
+def _picture(figure: PaperFigure, letter: str, key: str, runs: Mapping[str, StoredRun]) -> Picture:
     panels = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
     if figure.kind != PATHS:
         panels.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
     draw(figure, panels.axes, runs)
     heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
     caption = with_capital(label) if label.startswith(heading.lower()) else f"{heading}: {label}"
-    return svg.picture(panels, f"f{figure.number}{letter}-{key}", caption, message)
-
-
-def _number(claim: Claim) -> str:
-    item = claim.published
-    assert item.of is not None  # every number has it
-    published, printed, corrected = (
-        fixed(value, item.decimals) for value in (item.value, claim.printed.value, claim.corrected.value)
-    )
-    return (
-        f"{with_capital(description_of(item.of))}: published {published} {unit_of(item.of)}; as printed {printed}; "
-        f"corrected model {corrected}."
-    )
-
-
-def same_and_different(scene: StoredScene) -> tuple[str, str]:
-    """What the printed model, the corrected one and Exudyn have in common on a scene, and how they differ."""
-    runs = compared_runs(scene)
-    printed, corrected = runs.get("printed"), runs.get("corrected")
-    same, different = [], []
-    if printed is not None and corrected is not None:
-        parted, largest = parting(printed, corrected)
-        if parted is None or parted > 0.0:
-            until = "throughout" if parted is None else f"up to {with_unit(parted, 's', 3)}"
-            same.append(f"the printed model moves as the corrected one {until}")
-        pitches = [float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0)) for run in (corrected, printed)]
-        if pitches[0] < _ROUNDING and pitches[1] > 1e-3:
-            reach = with_unit(pitches[1], "rad")
-            different.append(f"no blade pitches in the corrected model; in print the pitches reach {reach}")
-        if parted is not None:
-            most = with_unit(largest, "rad")
-            different.append(f"the printed angles differ from the corrected ones by up to {most}")
-    gap = _exudyn_gap(scene)
-    if gap is not None:
-        near, until = with_unit(gap[0], "rad"), with_unit(gap[1], "s", 3)
-        same.append(f"Exudyn and the corrected model differ by no more than {near} up to {until}")
-    gain = None if printed is None else metric(printed, "energy_gain_J")
-    if gain is not None and gain > 1e3:
-        different.append(f"the energy of the printed model rises by {prefixed(gain, 'J')} without work done")
-    if printed is not None and printed.status not in COMPLETE:
-        end = with_unit(float(printed.array("time")[-1]), "s", 3)
-        different.append(f"it diverges, and ode45 stops at {end}")
-    common = f"The same: {'; '.join(same)}." if same else ""
-    return common, f"Not the same: {'; '.join(different) or 'nothing visible'}."
-
-
-def _exudyn_gap(scene: StoredScene) -> tuple[float, float] | None:
-    """rad, the difference of Exudyn from the corrected model up to a time, and that time in s; None without both."""
-    runs = compared_runs(scene)
-    if not {"corrected", "exudyn"} <= set(runs):
-        return None
-    gap, known = angle_difference(runs["exudyn"], runs["corrected"]), horizon(scene)
-    time = runs["exudyn"].array("time")[: len(gap)]
-    until = min(math.inf if known is None else known, float(time[-1]))
-    return float(gap[time <= until].max(initial=0.0)), until
+    return svg.picture(panels, f"f{figure.number}{letter}-{key}", caption)
 
 
 def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:
@@ -315,7 +273,7 @@ def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:
     if with_torque and not scene.has_constant_torque:
         parts.append("a torque that changes over time")
     elif with_torque and scene.torque_at(0.0):
-        parts.append(f"rotor torque {prefixed(scene.torque_at(0.0), 'N·m')}")
+        parts.append(f"rotor torque {prefixed(scene.torque_at(0.0), 'N m')}")
     return f"{', '.join(parts)}, g = {number(scene.gravity, 3)} m/s², {with_unit(scene.duration, 's', 4)}."
 
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from rotor_mbs.analysis import run_selection
+from rotor_mbs.analysis.claim_shares import HOLDS, ClaimShares
 from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.finding import ENERGY_RISE, Finding, finding
-from rotor_mbs.analysis.published import Erratum
+from rotor_mbs.analysis.finding import ENERGY_RISE, Finding, Tally, finding
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import Look, label_of, look_of
-from rotor_mbs.report.core.numbers import number, prefixed, with_unit
+from rotor_mbs.report.core.numbers import number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables
 from rotor_mbs.report.pages.bench import cost_legend, cost_picture
-from rotor_mbs.report.pages.comparison_pictures import energy_of_scenes, key_picture
-from rotor_mbs.report.pages.scene_tables import horizon, metric, status_cell, status_text, versions
+from rotor_mbs.report.pages.scene import key_picture
+from rotor_mbs.report.pages.scene_tables import horizon, method_cell, metric, status_cell, status_text, versions
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import paths
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
@@ -27,23 +28,38 @@ Scenes = Mapping[str, StoredScene]
 _SHADES = (-12, -10, -8, -6, -4, -2, 0)
 _MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
 _FAILED = "✗"
-_NAMED = 4  # methods at most in the sentence on agreement; of more, the best and the worst
+_LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 
 
 def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
     """The content of the index. Tables are folded, below what it opens with."""
     scenes, claims, study = opened.scenes, context.claims, context.study
     shares = None if study is None else study.shares
-    trials = [] if study is None else claim_tables.trial_tables(study.numbers)[:1]
-    notes = [] if shares is None else [claim_tables.headline(shares), claim_tables.study_note(shares)]
-    general = [text for key, text in context.conditions.items() if not key.startswith("fig")]
-    general += [] if study is None else [claim_tables.numbers_headline(study.numbers)]
+    trials = [] if study is None else claim_tables.trial_tables(study.numbers)
+    facts = finding(scenes, claims)
+    errata = PageTable(
+        "The errors in the printed equations; all else follows from them",
+        ("Erratum", "Equation", "Printed", "Correct", "Reason"),
+        [
+            (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
+            for e in context.errata
+        ],
+    )
     return {
         "glance": _glance(scenes, context),
+        "paper": _paper_table(facts, shares),
+        "methods": Section(tables=[_agreement_table(facts)]),
+        "heat": heat_map(scenes, context.files),
         "scenes": Section(tables=[_scene_table(scenes, context.files)]),
-        "numbers": Section(tables=[claim_tables.number_table(claims), *trials], notes=general),
-        "claims": Section(tables=[claim_tables.claim_table(claims, shares)], notes=notes),
-        "errata": Section(tables=[_errata_table(context.errata)]),
+        "numbers": Section(
+            tables=[claim_tables.number_table(claims), *trials],
+            notes=[text for key, text in context.conditions.items() if not key.startswith("fig")],
+        ),
+        "claims": Section(
+            tables=[claim_tables.claim_table(claims, shares)],
+            notes=[] if shares is None else [claim_tables.study_note(shares)],
+        ),
+        "errata": Section(tables=[errata]),
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
@@ -53,21 +69,19 @@ def _glance(scenes: Scenes, context: Context) -> dict[str, object]:
     """What the index opens with; what the file has no data for is None."""
     name = _shown_scene(scenes, context.claims)
     sides = list(run_selection.sides(scenes[name]).values())
-    benched = next((one for one in context.curves if one in scenes), "")
+    benched = next((scene for scene in context.curves if scene in scenes), "")
     tips = next((run for run in reversed(sides) if "tip" in run), None)
     own = [claim for claim in context.claims if name in claim.published.scenes]
     curves = context.curves.get(benched, ())
-    cost = cost_picture(curves, f"Error against run time of all methods, {benched}")
-    described = f"{name}: paths of the tips"
     return {
-        "sentences": short_sentences(finding(scenes, context.claims)),
         "scene": name,
         "viewer": viewer(scenes[name], {label_of(run.method): run for run in sides}),
-        "still": None if tips is None else picture(paths.paths(tips.array("tip")), "still", name, described),
+        "still": None
+        if tips is None
+        else picture(paths.paths(tips.array("tip")), "still", f"{name}: paths of the tips"),
         "crest": key_picture(sides, own, horizon(scenes[name]), "crest"),
         "energy": _energy(scenes),
-        "cost": None if cost is None else replace(cost, legend=cost_legend(curves)),
-        "heat": heat_map(scenes, context.files),
+        "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
     }
 
 
@@ -80,55 +94,80 @@ def _shown_scene(scenes: Scenes, claims: Sequence[Claim]) -> str:
     return next((name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1), next(iter(scenes)))
 
 
-def short_sentences(facts: Finding) -> list[str]:
-    """Three at most: what the paper's numbers come from, what is wrong with that, and how well it is known."""
-    found = []
-    numbers, corrected = facts.numbers, facts.numbers_corrected
-    if numbers is not None:
-        share = f"all {numbers.of}" if numbers.count == numbers.of else f"{numbers.count} of {numbers.of}"
-        other = "" if corrected is None else f"; with their three errors corrected, {corrected.count or 'none'}"
-        found.append(f"The paper's equations as printed give {share} published numbers{other}.")
-    if facts.energy is not None and facts.energy.rises.count:
-        rises, gain = facts.energy.rises, facts.energy.gain
-        most = "" if gain is None else f", up to {prefixed(gain, 'J')}"
-        for name, until_then in facts.energy.ended_early.items():
-            most += f"; in {name} {prefixed(until_then, 'J')} before its run breaks off"
-        found.append(f"As printed they make energy from nothing in {rises.count} of {rises.of} scenes{most}.")
-    known = {one.method: one.angle_error for one in facts.agreement if one.angle_error is not None}
-    if known:
-        count = len({method.partition("/")[0] for method in known})
-        models = "The corrected model agrees" if count == 1 else f"{count} independent corrected models agree"
-        ranked = sorted(known.items(), key=lambda item: item[1])
-        shown = ranked if len(ranked) <= _NAMED else [ranked[0], ranked[-1]]
-        each = ", ".join(f"{with_unit(error, 'rad')} ({label_of(method)})" for method, error in shown)
-        found.append(f"{models} with a quad-precision reference to {each}, up to each scene's horizon.")
-    return found
+def _paper_table(facts: Finding, shares: ClaimShares | None) -> PageTable:
+    """How much of the paper the printed and the corrected equations reproduce, and the energy that both gain."""
+    rows: list[Row] = []
+    if facts.numbers is not None:
+        rows.append(["Published numbers reproduced", _of(facts.numbers), _of(facts.numbers_corrected)])
+    if facts.numbers is not None and shares is not None:
+        counts = [f"{shares.count(method)[HOLDS]} of {len(shares.claims)}" for method in shares.methods]
+        rows.append(["Published claims that hold", *counts])
+    if facts.energy is not None:
+        gain = facts.energy.gain
+        rises = f"Scenes in which energy rises by more than {ENERGY_RISE:g} of its scale without work"
+        rows.append([rises, _of(facts.energy.rises), ""])
+        rows.append(["Largest spurious energy gain of a complete run", prefixed(gain, "J"), ""])
+    return PageTable("", ("", "As printed", "Corrected model"), rows, numeric=(1, 2))
+
+
+def _of(tally: Tally | None) -> str:
+    return "" if tally is None else f"{tally.count} of {tally.of}"
+
+
+def _agreement_table(facts: Finding) -> PageTable:
+    """The errors of each corrected model over all scenes."""
+    head = (
+        "Method", "Runs ok", "Largest angle error up to each scene's horizon (rad)", "Largest energy drift (relative)",
+        "Longest run",
+    )  # fmt: skip
+    rows: list[Row] = [
+        [
+            method_cell(row.method), _of(row.runs), number(row.angle_error), number(row.energy_drift),
+            prefixed(row.longest_s, "s"),
+        ]
+        for row in facts.agreement
+    ]  # fmt: skip
+    return PageTable("", head, rows, (1, 2, 3, 4)).without_empty_columns()
 
 
 def _energy(scenes: Scenes) -> Picture | None:
-    """A mark per scene for the printed model's gain, and for the worst corrected model's drift."""
+    """A mark per scene for the printed model's gain, and for each corrected model's drift."""
     rows: dict[str, list[tuple[float, Look]]] = {}
-    drawn: dict[str, Look] = {}
-    made = 0
+    looks: dict[str, Look] = {}
     for name, scene in scenes.items():
+        corrected = run_selection.corrected_runs(scene)
         marks = []
         for run in scene.methods.values():
             gain, scale = metric(run, "energy_gain_J"), metric(run, "energy_scale_J")
-            is_printed = run.method == run_selection.PRINTED
-            if gain is None or not scale or not (is_printed or run.method in run_selection.corrected_runs(scene)):
-                continue
-            value = gain / scale if is_printed else metric(run, "energy_drift_max")
+            value = None
+            if run.method == run_selection.PRINTED and gain is not None and scale:
+                value = gain / scale
+            elif run.method in corrected and scale:
+                value = metric(run, "energy_drift_max")
             if value is not None and math.isfinite(value):
-                marks.append((value, look_of(run.method)))
-                drawn[run.method] = look_of(run.method)
-                made += is_printed and value > ENERGY_RISE
+                looks[run.method] = Look(look_of(run.method).colour, "", look_of(run.method).marker)
+                marks.append((value, looks[run.method]))
         if marks:
             rows[name.removeprefix("paper/")] = marks
-    if run_selection.PRINTED not in drawn:
+    if run_selection.PRINTED not in looks:
         return None
-    caption = f"Energy made from nothing: the printed equations, more than a thousandth in {made} of {len(rows)} scenes"
-    legend = [LegendEntry(label_of(name), Look(look.colour, "", look.marker)) for name, look in drawn.items()]
-    return picture(energy_of_scenes(rows), "energy-scenes", caption, f"{caption}.", legend=legend)
+    caption = "Spurious energy gain as printed, and energy drift of the corrected models"
+    legend = [LegendEntry(label_of(name), look) for name, look in looks.items()]
+    return picture(energy_of_scenes(rows), "energy-scenes", caption, legend=legend)
+
+
+def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels:
+    """A row per scene, a mark per model: its energy error, of the scene's energy scale, logarithmic."""
+    panels = canvas.panels((0.19 * len(rows) + 0.25,), "energy error / energy scale of the scene")
+    axes = panels.axes[0]
+    for row, marks in enumerate(rows.values()):
+        for value, look in marks:
+            canvas.curve(axes, [min(max(value, _LOWEST_ENERGY), 1e3)], [row], look, markersize=5.5)
+    axes.set(xscale="log", xlim=(_LOWEST_ENERGY / 3.0, 3e3), ylim=(len(rows) - 0.4, -0.6))
+    canvas.ticks(axes.xaxis, {10.0**e: power(e) for e in range(round(math.log10(_LOWEST_ENERGY)), 4, 3)})
+    canvas.ticks(axes.yaxis, dict(enumerate(rows)))
+    panels.figure.subplots_adjust(left=0.25)
+    return panels
 
 
 def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:
@@ -174,12 +213,3 @@ def _scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) ->
             cells += [status_cell(run), number(metric(run, "angle_error_whole")), gain]
         rows.append([TableCell(name, href=files[name], note=scene.title), *cells, *[""] * (len(head) - 1 - len(cells))])
     return PageTable("", head, rows, numeric=(2, 4, 5)).without_empty_columns()
-
-
-def _errata_table(errata: Sequence[Erratum]) -> PageTable:
-    rows = [
-        (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
-        for e in errata
-    ]
-    caption = "The errors in the printed equations; all else follows from them"
-    return PageTable(caption, ("Erratum", "Equation", "Printed", "Correct", "Reason"), rows)

@@ -12,7 +12,7 @@ from rotor_mbs.analysis.campbell import FloquetTable, LinearModes, SceneModes, S
 from rotor_mbs.analysis.modes import GROWTH, multiblade
 from rotor_mbs.report.core.canvas import Panels, curve, growth_map, log_axis, panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
+from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
 
@@ -21,43 +21,42 @@ SPEED_AXIS = "rotor speed (rad/s)"
 _HARMONICS = (1, 2, 3, 6)
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 # Growth over a turn beyond which the colours of the chart end.
-_MOST_GROWTH = 1e3
+MAX_GROWTH = 1e3
 
 
 def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
     """What the template has of the modes of some scenes."""
-    return {"scenes": [_scene_part(one, f"scene{i}") for i, one in enumerate(modes)]}
+    return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)]}
 
 
 def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
     """What the page has of a scene; `name` is unique on the page."""
     rest = next(iter(modes.rest.values()), None)
     rotation = next(iter(modes.rotation.values()), None)
-    campbell, fastest = _rotation(rotation, modes.scene, name)
+    pictures, fastest = _rotation(rotation, modes.scene, name)
     return {
         "id": name,
         "name": modes.scene,
         "title": modes.title,
-        "lead": _lead(modes),
+        "agreement": _agreement(modes),
+        "notes": ([floquet_sentence(modes.floquet)] if modes.floquet is not None else []) + list(modes.notes),
         "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
-        "campbell": campbell,
+        "campbell": pictures,
         "fastest": fastest,
         "turning": _turning(modes, name),
     }
 
 
-def _lead(modes: SceneModes) -> list[str]:
-    sentences = []
+def _agreement(modes: SceneModes) -> dict[str, object] | None:
+    """The models whose modes were found, and how much their frequencies differ; None with one model."""
     sources = max((list(kind.values()) for kind in (modes.rest, modes.rotation)), key=len)
-    if len(sources) > 1:
-        labels = ", ".join(f"{one.label} ({one.source})" for one in sources)
-        verdict = "agree on every frequency" if modes.agrees else "do not agree on the frequencies"
-        sentences.append(
-            f"{with_capital(labels)} {verdict}: the largest relative difference is {number(modes.disagreement)}."
-        )
-    if modes.floquet is not None:
-        sentences.append(f"{with_capital(floquet_sentence(modes.floquet))}.")
-    return [*sentences, *modes.notes]
+    if len(sources) < 2:
+        return None
+    return {
+        "models": [f"{linear.label} ({linear.source})" for linear in sources],
+        "agrees": modes.agrees,
+        "difference": modes.disagreement,
+    }
 
 
 def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Section, Section]:
@@ -71,45 +70,45 @@ def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Sect
     caption = (
         "Campbell diagram: damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
     )
-    drawn = [picture(campbell(rotation), f"{name}-campbell", caption, caption)]
+    drawn = [picture(campbell(rotation), f"{name}-campbell", caption)]
     if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
         caption = "Damping ratios and growth rates"
-        drawn.append(picture(damping(rotation), f"{name}-damping", caption, caption))
+        drawn.append(picture(damping(rotation), f"{name}-damping", caption))
     legend = [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
     return Section(drawn, legend), fastest
 
 
-def _tables(one: LinearModes, i: int, state: str) -> list[PageTable]:
+def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
     """The tables of the i-th speed; state: the beginning of their captions, which differ on the whole page."""
     return [
-        _mode_table(f"{state}: modes by the {one.label} ({one.source})", one, i),
-        _shape_table(f"{state}: shapes, the largest amplitude 1", one, i),
+        _mode_table(f"{state}: modes by the {linear.label} ({linear.source})", linear, i),
+        _shape_table(f"{state}: shapes, the largest amplitude 1", linear, i),
     ]
 
 
-def _mode_table(caption: str, first: LinearModes, i: int) -> PageTable:
+def _mode_table(caption: str, linear: LinearModes, i: int) -> PageTable:
     """Frequencies at the i-th speed."""
     columns = {
-        "undamped (Hz)": first.undamped_frequencies / (2.0 * math.pi),
-        "undamped (rad/s)": first.undamped_frequencies,
-        "damped (rad/s)": first.damped_frequencies,
-        "damping ratio": first.damping_ratios,
-        "growth rate (1/s)": first.growth_rates,
-        "backward whirl (rad/s)": first.whirl[0],
-        "forward whirl (rad/s)": first.whirl[1],
+        "undamped (Hz)": linear.undamped_frequencies / (2.0 * math.pi),
+        "undamped (rad/s)": linear.undamped_frequencies,
+        "damped (rad/s)": linear.damped_frequencies,
+        "damping ratio": linear.damping_ratios,
+        "growth rate (1/s)": linear.growth_rates,
+        "backward whirl (rad/s)": linear.whirl[0],
+        "forward whirl (rad/s)": linear.whirl[1],
     }
-    rows = [[name, *(_shown(float(x[i, k]), 7) for x in columns.values())] for k, name in enumerate(first.names)]
+    rows = [[name, *(_shown(float(x[i, k]), 7) for x in columns.values())] for k, name in enumerate(linear.names)]
     return PageTable(caption, ("Mode", *columns), rows, range(1, 1 + len(columns))).without_empty_columns()
 
 
-def _shape_table(caption: str, one: LinearModes, i: int) -> PageTable:
+def _shape_table(caption: str, linear: LinearModes, i: int) -> PageTable:
     """Moduli of the amplitudes in multiblade coordinates."""
-    amplitudes = np.abs(one.multiblade_shapes[i])
+    amplitudes = np.abs(linear.multiblade_shapes[i])
     rows = []
-    for name, shape in zip(one.names, amplitudes, strict=True):
+    for name, shape in zip(linear.names, amplitudes, strict=True):
         largest = max(float(shape.max()), 1e-300)
         rows.append([name, *(_shown(float(value) / largest, 3) for value in shape)])
-    head = ("Shape", "rotor", *multiblade(one.blades)[0])
+    head = ("Shape", "rotor", *multiblade(linear.blades)[0])
     return PageTable(caption, head, rows, tuple(range(1, len(head))))
 
 
@@ -126,10 +125,10 @@ def _turning(modes: SceneModes, name: str) -> Section:
     drawn: list[Picture] = []
     if len(table.speeds) > 1 and np.isfinite(table.largest).any():
         caption = "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
-        drawn.append(picture(multipliers(table), f"{name}-multipliers", caption, caption))
+        drawn.append(picture(multipliers(table), f"{name}-multipliers", caption))
     if modes.chart is not None:
         caption = "Stability chart: growth over a turn under gravity; a line bounds what is stable"
-        drawn.append(picture(chart(modes.chart), f"{name}-chart", caption, caption))
+        drawn.append(picture(chart(modes.chart), f"{name}-chart", caption))
     rows: list[Row] = []
     for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
         cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
@@ -197,10 +196,10 @@ def multipliers(table: FloquetTable) -> Panels:
     return panel
 
 
-def chart(found: StabilityChart) -> Panels:
+def chart(table: StabilityChart) -> Panels:
     """Growth over a turn as colour over speed and stiffness, with the boundary of stability."""
     panel = panels((3.6,), SPEED_AXIS)
     label = "growth over a turn (powers of ten)"
-    growth_map(panel, found.speeds, found.stiffnesses, found.largest, _MOST_GROWTH, label, 1.0 + GROWTH)
+    growth_map(panel, table.speeds, table.stiffnesses, table.largest, MAX_GROWTH, label, 1.0 + GROWTH)
     panel.axes[0].set_ylabel("bearing stiffness (N m/rad)")
     return panel

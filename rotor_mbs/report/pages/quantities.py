@@ -5,8 +5,7 @@ Those that are judged against the reference, such as loads, are drawn of the ref
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,12 +19,12 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.report.plots.time_histories import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
-from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities
-from rotor_mbs.solution.quantities import sizes as lengths
+from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Array
 
 Runs = Mapping[str, StoredRun]
 Curves = dict[str, Series]  # by method
+VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 
 
 class Component(NamedTuple):
@@ -40,62 +39,77 @@ class Component(NamedTuple):
 def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
     """The quantities of the scene with a plot: built in, or of an installed package that its outputs name."""
     parsed = scene_of(scene)
-    found = known_quantities(parsed.outputs if parsed is not None else ())
-    return [(one, one.plot) for one in found if one.plot is not None and one.is_over_time]
+    quantities = known_quantities(parsed.outputs if parsed is not None else ())
+    return [(quantity, quantity.plot) for quantity in quantities if quantity.plot is not None and quantity.is_over_time]
 
 
 def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> list[tuple[str, str, Section]]:
-    """(id, heading, section) of each such quantity that one of `runs` has."""
-    found = []
+    """(id, heading, section) of each such quantity that one of `runs` has.
+
+    Sizes on a logarithmic axis; a quantity of one component with a curve per run; others with pictures of each run, or
+    of the reference alone where the quantity is judged against it.
+    """
+    sections = []
     for quantity, plot in plotted_quantities(scene):
         own = {method: run for method, run in runs.items() if quantity.name in run}
-        if own:
-            name = f"quantity-{quantity.name}"
-            found.append((name, plot.title, _section(quantity, plot, own, name, horizon)))
-    return found
+        if not own:
+            continue
+        name = f"quantity-{quantity.name}"
+        if plot.logarithmic:
+            curves = magnitudes(quantity, own)
+            shown = error_picture(curves, plot.axis, name, plot.title, horizon) if visible(curves) else None
+            section = Section([] if shown is None else [shown], run_legend(visible(curves)))
+        elif len(quantity.dimensions) == 1:
+            lines = {
+                method: Series(
+                    run.array("time"), run.array(quantity.name), Look(look_of(method).colour, look_of(method).line, "")
+                )
+                for method, run in own.items()
+            }
+            panels = histories.lines([(plot.axis, list(lines.values()))], horizon)
+            legend = [LegendEntry(label_of(method), line.look) for method, line in lines.items()]
+            section = Section([picture(panels, name, plot.title)], legend)
+        else:
+            section = _components_section(quantity, plot, own, name, horizon)
+        sections.append((name, plot.title, section))
+    return sections
 
 
-def _section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:
-    """Sizes on a logarithmic axis; all runs on one axis where there is one component; else pictures of each run."""
-    if plot.logarithmic:
-        curves = sizes(quantity, runs)
-        shown = error_picture(curves, plot.axis, name, plot.title, horizon) if visible(curves) else None
-        return Section([] if shown is None else [shown], run_legend(list(visible(curves))))
-    if len(quantity.dimensions) == 1:
-        lines = {
-            m: Series(run.array("time"), run.array(quantity.name), Look(look_of(m).colour, look_of(m).line, ""))
-            for m, run in runs.items()
-        }
-        ranges = "; ".join(
-            f"{label_of(m)} from {number(float(one.values.min()), 3)} to {number(float(one.values.max()), 3)}"
-            for m, one in lines.items()
-        )
-        described = f"{plot.title} over time, in {quantity.units}: {ranges}."
-        panels = histories.lines([(plot.axis, list(lines.values()))], horizon)
-        return Section(
-            [picture(panels, name, plot.title, described)],
-            [LegendEntry(label_of(m), one.look) for m, one in lines.items()],
-        )
+def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, horizon: float | None) -> Section:
     rule = quantity.judgement
     is_compared = rule is not None and rule.with_reference and REFERENCE in runs
-    drawn = {REFERENCE: runs[REFERENCE]} if is_compared else runs
     pictures: list[Picture] = []
-    for i, run in enumerate(drawn.values()):
-        pictures += _pictures(quantity, plot, run, f"{name}-{i}", horizon)
-    first = next(iter(drawn.values()))
-    parts = components(quantity, first.array(quantity.name), first.labels)
-    legend = {one.label: LegendEntry(one.label, coordinate_look(one.place)) for one in parts}
+    legend: dict[str, LegendEntry] = {}
+    for i, run in enumerate([runs[REFERENCE]] if is_compared else runs.values()):
+        parts = components(quantity, run.array(quantity.name), run.labels)
+        for k, group in enumerate(dict.fromkeys(part.group for part in parts)):
+            lines = [part for part in parts if part.group == group]
+            series = [Series(run.array("time"), part.values, coordinate_look(part.place)) for part in lines]
+            caption = with_capital(label_of(run.method)) + (f", {group} axis" if group else "")
+            pictures.append(picture(histories.lines([(plot.axis, series)], horizon), f"{name}-{i}-{k}", caption))
+            legend |= {part.label: LegendEntry(part.label, coordinate_look(part.place)) for part in lines}
     if not is_compared:
         return Section(pictures, list(legend.values()))
-    errors = _errors(quantity, runs)
-    title = "Largest difference from the reference"
-    shown = error_picture(errors, f"difference ({quantity.units})", f"{name}-error", title, horizon)
+    exact = runs[REFERENCE].array(quantity.name)
+
+    def difference(run: StoredRun) -> Array:
+        """The largest over blades, at the samples that both have; of vectors the length."""
+        values = run.array(quantity.name)
+        n = min(len(values), len(exact))
+        return _largest(sizes(quantity, values[:n] - exact[:n]))
+
+    others = {method: run for method, run in runs.items() if method != REFERENCE}
+    errors = _curves(others, quantity.name, difference)
+    shown = error_picture(
+        errors, f"difference ({quantity.units})", f"{name}-error", "Largest difference from the reference", horizon,
+        legend=run_legend(visible(errors)),
+    )  # fmt: skip
     if shown is not None:
-        pictures.append(replace(shown, legend=run_legend(list(visible(errors)))))
-    return Section(pictures, list(legend.values()), [_extremes(quantity, runs[REFERENCE].array("time"), parts)])
+        pictures.append(shown)
+    return Section(pictures, list(legend.values()), [_extremes(quantity, runs[REFERENCE])])
 
 
-def sizes(quantity: Quantity, runs: Runs) -> Curves:
+def magnitudes(quantity: Quantity, runs: Runs) -> Curves:
     """The largest magnitude of the quantity over its components, of each run that has it."""
     return _curves(runs, quantity.name, lambda run: _largest(np.abs(run.array(quantity.name))))
 
@@ -103,13 +117,13 @@ def sizes(quantity: Quantity, runs: Runs) -> Curves:
 def _curves(runs: Runs, name: str, measure: Callable[[StoredRun], Array]) -> Curves:
     """What `measure` makes of each run that has the array `name`, over the run's first samples."""
     values = {method: measure(run) for method, run in runs.items() if name in run}
-    return {m: Series(runs[m].array("time")[: len(x)], x, look_of(m)) for m, x in values.items()}
+    return {method: Series(runs[method].array("time")[: len(x)], x, look_of(method)) for method, x in values.items()}
 
 
-def _largest(sizes: Array) -> Array:
+def _largest(values: Array) -> Array:
     """(n,) of (n, ...): the largest over the components."""
-    found: Array = sizes.reshape(len(sizes), -1).max(axis=1)
-    return found
+    largest: Array = values.reshape(len(values), -1).max(axis=1)
+    return largest
 
 
 def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[Component]:
@@ -129,64 +143,39 @@ def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) ->
     ]
 
 
-def _pictures(quantity: Quantity, plot: Plot, run: StoredRun, name: str, horizon: float | None) -> Iterator[Picture]:
-    """One per group of components."""
-    parts = components(quantity, run.array(quantity.name), run.labels)
-    for i, group in enumerate(dict.fromkeys(one.group for one in parts)):
-        lines = [one for one in parts if one.group == group]
-        series = [Series(run.array("time"), one.values, coordinate_look(one.place)) for one in lines]
-        largest = prefixed(max(float(np.abs(one.values).max()) for one in lines), quantity.units)
-        caption = with_capital(label_of(run.method)) + (f", {group} axis" if group else "")
-        described = f"{plot.title} over time, {caption}: {quantity.long_name}, up to {largest}."
-        yield picture(histories.lines([(plot.axis, series)], horizon), f"{name}-{i}", caption, described)
-
-
-def _errors(quantity: Quantity, runs: Runs) -> Curves:
-    """The largest difference from the reference over blades, at the samples that both have; vectors by their length."""
-    exact = runs[REFERENCE].array(quantity.name)
-
-    def off(run: StoredRun) -> Array:
-        values = run.array(quantity.name)
-        n = min(len(values), len(exact))
-        return _largest(lengths(quantity, values[:n] - exact[:n]))
-
-    return _curves({method: run for method, run in runs.items() if method != REFERENCE}, quantity.name, off)
-
-
-def _extremes(quantity: Quantity, time: Array, parts: Sequence[Component]) -> PageTable:
+def _extremes(quantity: Quantity, run: StoredRun) -> PageTable:
     """Smallest and largest value of each component, with their times."""
+    time = run.array("time")
     rows = []
-    for one in parts:
-        places = (int(one.values.argmin()), int(one.values.argmax()))
-        cells = [
-            text for k in places for text in (prefixed(float(one.values[k]), quantity.units), number(float(time[k]), 4))
-        ]
-        rows.append([f"{one.label} {one.group}".strip(), *cells])
+    for part in components(quantity, run.array(quantity.name), run.labels):
+        row = [f"{part.label} {part.group}".strip()]
+        for k in (int(part.values.argmin()), int(part.values.argmax())):
+            row += [prefixed(float(part.values[k]), quantity.units), number(float(time[k]), 4)]
+        rows.append(row)
     head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
     return PageTable("Extremes in the reference", head, rows, numeric=(1, 2, 3, 4))
 
 
 def error_picture(
     curves: Curves, axis: str, name: str, caption: str, horizon: float | None = None, others: Sequence[Series] = (),
-    *, signed: bool = False,
+    legend: Sequence[LegendEntry] = (), *, signed: bool = False,
 ) -> Picture | None:  # fmt: skip
     """The curves and `others`, which have no marker; None where there is nothing to draw or to note."""
     if not curves:
         return None
-    exact = [label_of(method) for method in curves if method not in visible(curves)]
+    shown = visible(curves)
+    exact = [label_of(method) for method in curves if method not in shown]
     notes = [f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else []
-    sizes = {label_of(method): float(np.abs(one.values).max()) for method, one in curves.items()}
-    largest = "; ".join(f"{label} up to {number(size)}" for label, size in sizes.items())
-    panels = histories.errors([*others, *visible(curves).values()], axis, horizon, signed=signed)
-    return picture(panels, name, caption, f"{caption}, logarithmic axis: {largest}", notes)
+    panels = histories.errors([*others, *shown.values()], axis, horizon, signed=signed)
+    return picture(panels, name, caption, notes, legend)
 
 
 def visible(curves: Curves) -> Curves:
     """The curves that a logarithmic axis can show."""
-    return {method: one for method, one in curves.items() if np.abs(one.values).max() > LOWEST}
+    return {method: curve for method, curve in curves.items() if np.abs(curve.values).max() > LOWEST}
 
 
-def run_legend(methods: Sequence[str]) -> list[LegendEntry]:
+def run_legend(methods: Iterable[str]) -> list[LegendEntry]:
     """An entry per method, as its error curves are drawn."""
     return [LegendEntry(label_of(method), look_of(method)) for method in methods]
 
@@ -198,18 +187,23 @@ def differences(runs: Runs, reference: StoredRun | None) -> Curves:
     return _curves(runs, "angles", lambda run: angle_difference(run, reference))
 
 
-def angle_difference(one: StoredRun, other: StoredRun) -> Array:
+def angle_difference(first: StoredRun, second: StoredRun) -> Array:
     """(common samples,) rad: the largest over the coordinates."""
-    n = min(len(one.array("time")), len(other.array("time")))
-    found: Array = np.abs(one.array("angles")[:n] - other.array("angles")[:n]).max(axis=1)
-    return found
+    n = min(len(first.array("time")), len(second.array("time")))
+    largest: Array = np.abs(first.array("angles")[:n] - second.array("angles")[:n]).max(axis=1)
+    return largest
+
+
+def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
+    """When the angles of both first differ by VISIBLE (s; None: never), and the largest difference (rad)."""
+    gap = angle_difference(printed, corrected)
+    apart = np.flatnonzero(gap > VISIBLE)
+    return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))
 
 
 def energy_picture(runs: Runs, horizon: float | None = None) -> tuple[Picture | None, list[str]]:
     """Total energy less work, from its start (J), of each run that has it; None without. The methods that are drawn."""
     curves = _curves(runs, "energy_error", lambda run: run.array("energy_error"))
-    caption = (
-        "Energy that comes from nothing (total energy less work, from its start): filled marks gained, open ones lost"
-    )
-    shown = error_picture(curves, "|energy from nothing| (J)", "energy", caption, horizon, signed=True)
+    caption = "Total energy less work, from its start: filled marks gained, open ones lost"
+    shown = error_picture(curves, "|energy error| (J)", "energy", caption, horizon, signed=True)
     return shown, list(visible(curves))

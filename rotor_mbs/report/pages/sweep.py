@@ -25,32 +25,45 @@ from rotor_mbs.solution.trajectory import Array
 
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
-_RESPONSE, _MOST_RESPONSES = "pitch_max", 3
-_MOST_POINTS = 200  # of a distribution
-_MOST_RUNS = 1000  # that have a point
-_MOST_GROWTH = 1e4  # the colours end there: the pitch has turned many times
+_RESPONSE, _MAX_RESPONSES = "pitch_max", 3
+_MAX_POINTS = 200  # of a distribution
+_MAX_RUNS = 1000  # that have a point
+_MAX_GROWTH = 1e4  # the colours end there: the pitch has turned many times
 MEDIAN, GROWTH, BOUNDARY = Look(BLUE, "-", ""), Look(VERMILLION, "--", ""), Look(VERMILLION, "-", "")
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 
 def sweep_page(sweep: StoredSweep) -> dict[str, object]:
-    """What the template needs."""
+    """The content of the page."""
     statuses = np.asarray(sweep.column("status"))
-    ok, lines = statuses == STATUSES.index("ok"), [with_capital(sweep.attributes["summary"].rstrip(".")) + "."]
-    shown, table = _responses(sweep, ok), _status_table(statuses)
+    ok = statuses == STATUSES.index("ok")
+    lines = [with_capital(sweep.attributes["summary"].rstrip(".")) + "."]
+    plots = _responses(sweep, ok)
     if _asked(sweep):
         try:
             panels, caption, line, legend = _asked_picture(sweep)
-            shown = [picture(panels, "asked", caption, f"{caption}. {line}", legend=legend)]
+            plots = [picture(panels, "asked", caption, legend=legend)]
         except (InputError, StoreError) as exc:
             line = f"No picture: {exc}."
         lines.append(line)
+    codes, counts = np.unique(statuses, return_counts=True)
+    status_rows = [
+        (status_text(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / len(statuses):.1f} %")
+        for code, count in sorted(zip(codes.tolist(), counts.tolist(), strict=True), key=lambda pair: -pair[1])
+    ]
+    parameter_rows = []
+    for key in sweep.keys:
+        name = parameter_name(key)
+        values, unit = sweep.column(name), sweep.columns[name].units
+        limits = [f"{text}{SPACE}{unit}" for text in apart(float(np.nanmin(values)), float(np.nanmax(values)))]
+        parameter_rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
+    head = ("Parameter", "Key", "From", "To", "Values")
     return {
         "title": sweep.attributes["title"],
         "summary": lines,
-        "picture": Section(shown, tables=[table] if shown else []),
-        "statuses": Section(tables=[] if shown else [table]),
-        "parameters": Section(tables=[_parameter_table(sweep)]),
+        "plots": Section(plots),
+        "statuses": Section(tables=[PageTable("", ("Status", "Runs", "Share"), status_rows, (1, 2))]),
+        "parameters": Section(tables=[PageTable("", head, parameter_rows, (2, 3, 4))]),
         "distributions": Section(_distributions(sweep, ok)),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
         "versions": versions(sweep.attributes),
@@ -58,11 +71,11 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
 
 
 def field_name(key: str) -> str:
-    """A varied parameter as one speaks of it: "initial pitch of blade 2" for "initial.angles[2]"."""
-    found = _COORDINATE.fullmatch(key)
-    if found is None:
+    """A varied parameter as one speaks of it: "initial pitch angle of blade 2" for "initial.angles[2]"."""
+    parts = _COORDINATE.fullmatch(key)
+    if parts is None:
         return re.sub(r"[._]", " ", key)
-    is_rate, coordinate = found[1] == "rates", int(found[2])
+    is_rate, coordinate = parts[1] == "rates", int(parts[2])
     if not coordinate:
         return "initial rotor speed" if is_rate else "initial rotor angle"
     return f"initial pitch {'rate' if is_rate else 'angle'} of blade {coordinate}"
@@ -71,22 +84,9 @@ def field_name(key: str) -> str:
 def save_picture(sweep: StoredSweep, path: Path) -> str:
     """The picture that the sweep's file asks for, as a file; a line about it. Raises InputError, StoreError."""
     panels, _, line, legend = _asked_picture(sweep)
-    canvas.legend(panels.axes[0], [(one.label, one.look) for one in legend])
+    canvas.legend(panels.axes[0], [(entry.label, entry.look) for entry in legend])
     panels.save(path)
     return f"{path}: {line}"
-
-
-def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
-    """With caption, what it says, legend."""
-    if _asked(sweep) == "spread":
-        return _spread(sweep)
-    start = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"])).initial_angles
-    found = stability_map(sweep, max(map(abs, start[1:]), default=0.0))
-    y_label, x_label = (_axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys)
-    panels, has_line = map_panels(found, x_label, y_label)
-    line = f"The pitches grow {GROWN:g}-fold in {found.unstable.sum()} of {found.growth.size} runs."
-    caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
-    return panels, caption, line, [LegendEntry(f"{GROWN:g} times its start", BOUNDARY)] if has_line else []
 
 
 def _asked(sweep: StoredSweep) -> str:
@@ -97,58 +97,51 @@ def _asked(sweep: StoredSweep) -> str:
         return ""
 
 
-def _spread(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
-    found = spread_of(sweep)
-    line = (
-        f"Nearby starts part with the largest Lyapunov exponent {found.exponent:.3f} ± {found.uncertainty:.3f} per s "
-        f"({found.pairs} pairs, {found.start:.2f} to {found.end:.2f} s)."
-    )
-    legend = [
-        LegendEntry(f"10 to 90 % of {found.pairs} pairs", MEDIAN, 8.0),
-        LegendEntry("median", MEDIAN),
-        LegendEntry(f"growth {found.exponent:.2f} ± {found.uncertainty:.2f} per s", GROWTH),
-    ]
-    return spread_panels(found), "Separation of nearby starts", line, legend
-
-
-def _status_table(statuses: Array) -> PageTable:
-    codes, counts = np.unique(statuses, return_counts=True)
-    total = int(counts.sum())
-    rows = [
-        (status_text(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / total:.1f} %")
-        for code, count in sorted(zip(codes.tolist(), counts.tolist(), strict=True), key=lambda pair: -pair[1])
-    ]
-    return PageTable("How the runs ended", ("Status", "Runs", "Share"), rows, (1, 2))
-
-
-def _parameter_table(sweep: StoredSweep) -> PageTable:
-    rows = []
-    for key in sweep.keys:
-        values, unit = sweep.column(parameter_name(key)), sweep.columns[parameter_name(key)].units
-        limits = [f"{text}{SPACE}{unit}" for text in apart(float(np.nanmin(values)), float(np.nanmax(values)))]
-        rows.append((field_name(key), key, *limits, str(len(np.unique(values)))))
-    return PageTable("Varied parameters", ("Parameter", "Key", "From", "To", "Values"), rows, (2, 3, 4))
+def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
+    """That picture, its caption, its result in a line, its legend."""
+    if _asked(sweep) == "spread":
+        spread = spread_of(sweep)
+        rate = f"{spread.exponent:.3f} ± {spread.uncertainty:.3f} per s"
+        line = (
+            f"Nearby starts part with the largest Lyapunov exponent {rate} ({spread.pairs} pairs, {spread.start:.2f} "
+            f"to {spread.end:.2f} s)."
+        )
+        legend = [
+            LegendEntry(f"10 to 90 % of {spread.pairs} pairs", MEDIAN, 8.0),
+            LegendEntry("median", MEDIAN),
+            LegendEntry(f"growth {rate}", GROWTH),
+        ]
+        return spread_panels(spread), "Separation of nearby starts", line, legend
+    start = parse_scene(str(sweep.attributes["scene_toml"]), str(sweep.attributes["base_scene"])).initial_angles
+    growth = stability_map(sweep, max(map(abs, start[1:]), default=0.0))
+    y_label, x_label = (_axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys)
+    panels, has_line = map_panels(growth, x_label, y_label)
+    line = f"The pitches grow {GROWN:g}-fold in {growth.unstable.sum()} of {growth.growth.size} runs."
+    caption = "Growth of the pitches: the largest pitch of a run, of the largest at its start"
+    return panels, caption, line, [LegendEntry(f"{GROWN:g} times its start", BOUNDARY)] if has_line else []
 
 
 def _responses(sweep: StoredSweep, ok: Array) -> list[Picture]:
     """The largest pitch of each run that ended well, over each of the first parameters that were varied."""
     values = sweep.column(_RESPONSE)[ok] if _RESPONSE in sweep.columns else np.empty(0)
-    found = []
-    for key in sweep.keys[:_MOST_RESPONSES]:
+    if len(values) < 2 or not np.isfinite(values).all():
+        return []
+    pictures = []
+    for key in sweep.keys[:_MAX_RESPONSES]:
         name = parameter_name(key)
         parameter = sweep.column(name)[ok]
-        if len(values) < 2 or not np.isfinite(values).all() or not np.ptp(parameter):
-            continue
-        caption = f"The largest pitch of each run over the {field_name(key)}"
-        label = _axis(field_name(key), sweep.columns[name].units)
-        panels = response(parameter, values, label, "largest pitch (rad)", logarithmic=_is_wide(parameter))
-        found.append(picture(panels, f"over-{name}", caption, caption))
-    return found
+        if np.ptp(parameter):
+            label = _axis(field_name(key), sweep.columns[name].units)
+            panels = response(parameter, values, label, "largest pitch (rad)", logarithmic=_is_wide(parameter))
+            pictures.append(
+                picture(panels, f"over-{name}", f"The largest pitch of each run over the {field_name(key)}")
+            )
+    return pictures
 
 
 def _distributions(sweep: StoredSweep, ok: Array) -> list[Picture]:
     """A picture for each number of the runs that ended well."""
-    found = []
+    pictures = []
     left_out = {*map(parameter_name, sweep.keys), *_COUNTS}
     for name, column in sweep.columns.items():
         if column.dimensions != ("run",) or name in left_out or sweep.column(name).dtype.kind != "f":
@@ -161,8 +154,8 @@ def _distributions(sweep: StoredSweep, ok: Array) -> list[Picture]:
         what = f"median {middle}, 5 to 95 % from {low} to {high}"
         caption = _axis(f"{with_capital(column.long_name)}: {what}", column.units)
         panels = distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
-        found.append(picture(panels, f"of-{name}", caption, f"{caption}, over {len(values)} runs."))
-    return found
+        pictures.append(picture(panels, f"of-{name}", caption))
+    return pictures
 
 
 def _axis(label: str, unit: str) -> str:
@@ -190,12 +183,12 @@ def spread_panels(spread: Spread) -> Panels:
     return panel
 
 
-def map_panels(found: StabilityMap, x_label: str, y_label: str) -> tuple[Panels, bool]:
+def map_panels(growth: StabilityMap, x_label: str, y_label: str) -> tuple[Panels, bool]:
     """Growth of the pitches as colour over both axes, and whether there is the line where they grew tenfold."""
     panel = panels((3.8,), x_label)
     axes = panel.axes[0]
     label = "largest pitch, of its start (powers of ten)"
-    has_line = growth_map(panel, found.x, found.y, found.growth, _MOST_GROWTH, label, GROWN)
+    has_line = growth_map(panel, growth.x, growth.y, growth.growth, _MAX_GROWTH, label, GROWN)
     axes.ticklabel_format(style="plain")
     axes.set_ylabel(y_label)
     panel.figure.subplots_adjust(left=0.18)
@@ -205,7 +198,7 @@ def map_panels(found: StabilityMap, x_label: str, y_label: str) -> tuple[Panels,
 def response(parameter: Array, values: Array, x_label: str, y_label: str, *, logarithmic: bool) -> Panels:
     """A number of each run over a parameter that was varied, a point per run."""
     panel = panels((3.0,), x_label)
-    shown = np.linspace(0, len(values) - 1, min(len(values), _MOST_RUNS)).round().astype(int)
+    shown = np.linspace(0, len(values) - 1, min(len(values), _MAX_RUNS)).round().astype(int)
     curve(panel.axes[0], parameter[shown], values[shown], Look(BLUE, "", "o"), markersize=3.5, markerfacecolor=BLUE)
     if logarithmic:
         log_axis(panel.axes[0], float(parameter.min()), float(parameter.max()), "x")
@@ -217,8 +210,8 @@ def distribution(values: Array, label: str, *, logarithmic: bool) -> Panels:
     """How many runs have how large a value: the share of runs up to each value, as a rising curve."""
     panel = panels((1.9,), label)
     known = np.sort(values[np.isfinite(values) & ((values > 0.0) | (not logarithmic))])
-    if len(known) > _MOST_POINTS:
-        known = known[np.linspace(0, len(known) - 1, _MOST_POINTS).round().astype(int)]
+    if len(known) > _MAX_POINTS:
+        known = known[np.linspace(0, len(known) - 1, _MAX_POINTS).round().astype(int)]
     curve(panel.axes[0], known, np.linspace(0.0, 100.0, len(known)), MEDIAN)
     if logarithmic:
         log_axis(panel.axes[0], known[0], known[-1], "x")

@@ -38,7 +38,8 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
     scene = scene_of(stored)
     if scene is None:
         return None
-    moves = {name: found for name, run in runs.items() if (found := _motion(run, 1 + len(scene.blades))) is not None}
+    motions = {name: _motion(run, 1 + len(scene.blades)) for name, run in runs.items()}
+    moves = {name: motion for name, motion in motions.items() if motion is not None}
     if not moves:
         return None
     end = max(float(time[-1]) for time, _ in moves.values())
@@ -55,9 +56,15 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
         ],
         "models": [{"name": name, **packed(*move, step)} for name, move in moves.items()],
     }
-    notes = [
-        note for name, (time, angles) in moves.items() if (note := _coarseness(name, angles_at(time, angles, step)))
-    ]
+    notes = []
+    for name, (time, angles) in moves.items():
+        largest = float(np.abs(np.diff(angles_at(time, angles, step), axis=0)).max(initial=0.0))
+        if largest > _COARSE:
+            turned = with_unit(largest, "rad")
+            notes.append(
+                f"{with_capital(name)} turns by up to {turned} from one frame to the next, the limit of the page's "
+                "data: in between the picture goes evenly."
+            )
     return {"data": script_json(data), "models": list(moves), "magnified": magnification(scene), "notes": notes}
 
 
@@ -77,17 +84,6 @@ def angles_at(time: Array, angles: Array, step: float) -> Array:
     count = math.floor(float(time[-1]) / step + 1e-9) + 1
     at = np.minimum(np.arange(count) * step, time[-1])
     return np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
-
-
-def _coarseness(name: str, shown: Array) -> str:
-    """A sentence where a coordinate turns far between two frames: which way it took in between is not known there."""
-    largest = float(np.abs(np.diff(shown, axis=0)).max(initial=0.0))
-    if largest <= _COARSE:
-        return ""
-    return (
-        f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame to the next, the limit of the "
-        "page's data: in between the picture goes evenly."
-    )
 
 
 def magnification(scene: Scene) -> int | None:

@@ -60,5 +60,5 @@ def projected(points: Array) -> Array:
     right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
     level = np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.0])
     up = np.array([0.0, 0.0, np.cos(_ELEVATION)]) - np.sin(_ELEVATION) * level
-    found: Array = points @ np.stack([right, up], axis=1)
-    return found
+    seen: Array = points @ np.stack([right, up], axis=1)
+    return seen

@@ -60,9 +60,9 @@ def draw_coordinates(axes: Any, time: Array, values: Array, label: str, first: i
 
 def draw_lines(axes: Any, series: Sequence[Series], label: str, scale: float = 1.0) -> None:
     """The curves over one vertical axis, divided by `scale`."""
-    for one in series:
-        time, values = thin(one.time, one.values)
-        canvas.curve(axes, time, values / scale, one.look)
+    for curve in series:
+        time, values = thin(curve.time, curve.values)
+        canvas.curve(axes, time, values / scale, curve.look)
     axes.set_ylabel(label)
 
 
@@ -82,10 +82,10 @@ def lines(rows: Sequence[tuple[str, Sequence[Series]]], horizon: float | None = 
     panels = canvas.panels((height,) * len(rows), TIME_AXIS)
     for axes, (label, series) in zip(panels.axes, rows, strict=True):
         has_prefix = "(" in label and "(rad" not in label
-        largest = max(float(np.abs(one.values).max()) for one in series)
+        largest = max(float(np.abs(curve.values).max()) for curve in series)
         scale, prefix = scaled(largest if has_prefix else 1.0)
         draw_lines(axes, series, label.replace("(", f"({prefix}", 1), scale)
-        mark_time(axes, max(float(one.time[-1]) for one in series), horizon)
+        mark_time(axes, max(float(curve.time[-1]) for curve in series), horizon)
     return panels
 
 
@@ -93,15 +93,19 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, *
     """Magnitudes on a logarithmic axis from 1 or less; signed: markers are filled where a value is above zero."""
     panels = canvas.panels((2.9,), TIME_AXIS)
     axes, known = panels.axes[0], []
-    for one in series:
-        time, values = _peaks(one.time, one.values)
+    for curve in series:
+        time, values = curve.time, curve.values
+        if len(time) > 2 * _BINS:  # of each interval the sample of the largest magnitude
+            intervals = np.array_split(np.arange(len(time)), _BINS)
+            index = [interval[np.abs(values[interval]).argmax()] for interval in intervals]
+            time, values = time[index], values[index]
         sizes = np.where(np.abs(values) > LOWEST, np.minimum(np.abs(values), np.inf if signed else _HIGHEST), np.nan)
         first, step = len(time) // 30, max(1, len(time) // 8)
-        canvas.curve(axes, time, sizes, one.look, 1.0 if one.look.marker else 1.8, markevery=(first, step))
+        canvas.curve(axes, time, sizes, curve.look, 1.0 if curve.look.marker else 1.8, markevery=(first, step))
         if signed:
             above = np.arange(first, len(time), step)[values[first::step] > 0.0]
-            look = replace(one.look, line="")
-            canvas.curve(axes, time[above], sizes[above], look, markerfacecolor=one.look.colour)
+            look = replace(curve.look, line="")
+            canvas.curve(axes, time[above], sizes[above], look, markerfacecolor=curve.look.colour)
         known += sizes[np.isfinite(sizes)].tolist()
     canvas.log_axis(axes, max(min([*known, 1.0] if known else [LOWEST]), LOWEST), max(known, default=1e-9))
     axes.set_ylabel(label)
@@ -130,10 +134,10 @@ def thin(time: Array, values: Array) -> tuple[Array, Array]:
     """The ends, and the smallest and the largest sample of each of some equal intervals: no peak is lost."""
     if len(time) <= 2 * _BINS:
         return time, values
-    found = [0, len(time) - 1]
+    chosen = [0, len(time) - 1]
     for interval in np.array_split(np.arange(len(time)), _BINS):
-        found += [interval[values[interval].argmin()], interval[values[interval].argmax()]]
-    index = np.unique(found)
+        chosen += [interval[values[interval].argmin()], interval[values[interval].argmax()]]
+    index = np.unique(chosen)
     return time[index], values[index]
 
 
@@ -142,14 +146,6 @@ def is_cut(values: Array) -> bool:
     largest = np.abs(values).max(axis=1)
     usual = float(np.quantile(largest, 0.9))
     return bool(min(largest.max(), _STILL * largest[-5:].max()) > _RUNAWAY * usual > 0.0)
-
-
-def _peaks(time: Array, values: Array) -> tuple[Array, Array]:
-    """The sample of the largest magnitude of each interval."""
-    if len(time) > 2 * _BINS:
-        index = [one[np.abs(values[one]).argmax()] for one in np.array_split(np.arange(len(time)), _BINS)]
-        time, values = time[index], values[index]
-    return time, values
 
 
 def mark_time(axes: Any, end: float, horizon: float | None) -> None:
