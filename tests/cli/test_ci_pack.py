@@ -15,7 +15,7 @@ import pytest
 import yaml
 from support.checking import results_file, shipped
 
-from rotor_mbs.analysis.verdicts import Verdict
+from rotor_mbs.analysis.checks import Check, Where
 from rotor_mbs.cli import main
 from rotor_mbs.report.pages import check as verdict_formats
 from rotor_mbs.studies.check import regressions
@@ -86,8 +86,8 @@ def test_an_earlier_file_that_is_none_is_bad_input(earlier: Path, tmp_path: Path
     ],
 )
 def test_a_margin_may_shrink_by_the_factor(before: float, now: float, passes: bool) -> None:
-    def verdict(value: float) -> Verdict:
-        return Verdict("energy", "scene", "method", "balance", value, 1.0, "of scale", "")
+    def verdict(value: float) -> Check:
+        return Check("energy", Where("scene", "method", "balance"), value, 1.0, "", "of scale")
 
     [found] = regressions([verdict(now)], [verdict(before)], 10.0)
     assert found.passed == passes
@@ -116,8 +116,8 @@ def test_trend_and_badge(earlier: Path, tmp_path: Path) -> None:
     assert re.fullmatch(r"\d+ passed", shown["message"])
 
 
-def _many(count: int) -> list[Verdict]:
-    return [Verdict("tip", f"s{i}|<b>", "m/i", "tip", 1.0 + i, 1.0, "m", "look") for i in range(count)]
+def _many(count: int) -> list[Check]:
+    return [Check("tip", Where(f"s{i}|<b>", "m/i", "tip"), 1.0 + i, 1.0, "look", "m") for i in range(count)]
 
 
 def test_the_summary_has_the_ten_worst_and_no_markup_of_names() -> None:
