@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from rotor_mbs.analysis.verdicts import Verdict
+from rotor_mbs.analysis.checks import Check
 from rotor_mbs.cli.terminal import ProgressLine
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import check_names
@@ -30,8 +30,6 @@ def check(arguments: argparse.Namespace) -> int:
     else:
         with ProgressLine() as progress:
             found = study.check_default_set(bounds, arguments.jobs, progress)
-    if arguments.speed:
-        found += study.check_speed(bounds)
     if found and earlier is not None:
         found += study.regressions(found, earlier, arguments.shrink)
     _write(arguments, found)
@@ -40,17 +38,15 @@ def check(arguments: argparse.Namespace) -> int:
     failed = [verdict for verdict in found if not verdict.passed]
     for verdict in found if arguments.verbose else failed:
         print(formats.line(verdict), file=stream)
-    if arguments.margins:
-        print(formats.margins(found), file=stream)
     if arguments.github:
         _tell_github(found, stream)
     runs = ", ".join(f"{count} {method}" for method, count in study.judged_runs(found).items())
     print(f"runs judged: {runs or 'none'}", file=stream)
     print(f"{len(found) - len(failed)} passed, {len(failed)} failed", file=stream)
-    return 1 if failed or not found else 0
+    return 1 if failed else 0
 
 
-def _tell_github(found: list[Verdict], stream: TextIO) -> None:
+def _tell_github(found: list[Check], stream: TextIO) -> None:
     """The worst failures as annotations; a table into the job's summary, where a job has one."""
     failed = [verdict for verdict in formats.worst_first(found) if not verdict.passed]
     for verdict in failed[: formats.WORST]:
@@ -64,17 +60,10 @@ def _tell_github(found: list[Verdict], stream: TextIO) -> None:
             raise StoreError(f"{place} (GITHUB_STEP_SUMMARY): cannot be written: {exc.strerror}") from exc
 
 
-def _write(arguments: argparse.Namespace, found: list[Verdict]) -> None:
+def _write(arguments: argparse.Namespace, found: list[Check]) -> None:
     if arguments.junit is not None:
         replace_file(arguments.junit, formats.junit(found))
-    for path, text in (
-        (arguments.json, formats.as_json),
-        (arguments.trend, formats.trend),
-        (arguments.badge, formats.badge),
-    ):
-        if path == _STANDARD_OUTPUT:
-            print(text(found))
-        elif path is not None:
-            replace_file(path, text(found).encode())
-    if not found:
-        print("nothing to check: the file has no run", file=sys.stderr)
+    if arguments.json == _STANDARD_OUTPUT:
+        print(formats.as_json(found))
+    elif arguments.json is not None:
+        replace_file(arguments.json, formats.as_json(found).encode())
