@@ -1,4 +1,4 @@
-"""Whether stored data are those of the method they are stored under: copies, settings, steps. Reads the store alone."""
+"""Whether stored data are those of the method they are stored under: copies, settings, steps."""
 
 from __future__ import annotations
 
@@ -82,22 +82,12 @@ def steps_off(scene: Scene, run: StoredRun, name: str) -> tuple[float, str] | No
         expected = (scene.samples - 1) * math.ceil(interval / float(run.settings["step"]) - 1e-9)
     else:
         known = expected_settings().get(run.method)
-        if known is None or name not in known["steps"] or _differ(run.settings, known["settings"]):
+        if known is None or name not in known["steps"] or not same_settings(run.settings, known["settings"]):
             return None
         expected = known["steps"][name]
     return abs(float(steps) / expected - 1.0), f"{steps} steps, {expected} by settings and duration"
 
 
-def defaults_faults(method: str) -> list[str]:
-    """Where a method's defaults are not the settings that its bounds were found with."""
-    found = look_up(method)
-    known = expected_settings().get(method)
-    if found is None or known is None:
-        return ["no settings on file"]
-    return _differ(found.defaults, known["settings"])
-
-
-def _differ(settings: Mapping[str, object], expected: Mapping[str, object]) -> list[str]:
-    names = {**settings, **expected}
-    return [f"{name} is {settings.get(name)}, {expected.get(name)} on file" for name in names
-            if settings.get(name) != expected.get(name)]  # fmt: skip
+def same_settings(settings: Mapping[str, object], expected: Mapping[str, object]) -> bool:
+    """Compare settings; one that is not there is None, which TOML has no word for."""
+    return all(settings.get(name) == expected.get(name) for name in {**settings, **expected})

@@ -1,4 +1,4 @@
-"""The accuracy check: verdicts on a results file, or on a default set that is computed for the purpose."""
+"""The accuracy check: a results file against bounds, or a default set that is computed for the purpose."""
 
 from __future__ import annotations
 
@@ -10,34 +10,30 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from rotor_mbs.analysis.run_integrity import defaults_faults
-from rotor_mbs.analysis.verdicts import Verdict, judged, verdicts
-from rotor_mbs.errors import RotorError, StoreError
+from rotor_mbs.analysis.checks import Check, Where, checks_of, make_check
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.freeze import changed_arrays
-from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.studies.run import OnProgress, ignore_progress
 from rotor_mbs.runs.table import MISSING
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.scenario.accuracy_bounds import Bounds, expected_settings
+from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies.check_probes import SPEED_RATIOS, measure, measured, probe, probes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_files
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
-_TIMEOUT_S, _PROBE_S = 60.0, 90.0
-_OF_EVERY_RUN = "status"  # a check that each run has one verdict of
+_TIMEOUT_S = 60.0
+_OF_EVERY_RUN = "status"  # the name of a check that each run has one of
 # A value below a few units in the last place of a double is rounding: its change says nothing.
 _ROUNDING = 2.0**-50
 
 
 def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
-    """Scenes, and methods by scene name, that are computed where no file is given.
+    """Return the scenes, and the methods by scene name, that are computed where no file is given.
 
     Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method.
     """
@@ -51,165 +47,138 @@ def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
     return [*paper, *own], methods
 
 
-def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Verdict]:
-    """Verdicts on what is stored, and on whether every scene has a run of each required method.
+def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
+    """Check what is stored, and whether every scene has a run of each required method.
 
-    Raises StoreError, InputError.
+    Raises
+    ------
+    InputError
+        Where there is nothing to judge: no run of a method, as in a bench file or a file of references.
+    StoreError
+        Where the file cannot be read.
     """
-    found = judge_file(path, bounds)
-    there = {(one.scene, one.method) for one in found}
-    scenes = dict.fromkeys(one.scene for one in found if one.check == _OF_EVERY_RUN)
-    wanted = [(scene, method) for scene in scenes for method in required]
-    return [*found, *(_required(*one, "not in the file", is_missing=one not in there) for one in wanted)]
+    checks = judge_file(path, bounds)
+    if all(check.passed and check.where.method == REFERENCE for check in checks):
+        raise InputError(f"{path}: nothing to judge: it has no run of a method")
+    stored = {(check.where.scene, check.where.method) for check in checks}
+    for scene in dict.fromkeys(check.where.scene for check in checks if check.name == _OF_EVERY_RUN):
+        for method in required:
+            checks.append(_required(scene, method, "not in the file", is_missing=(scene, method) not in stored))
+    return checks
 
 
-def check_default_set(bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress) -> list[Verdict]:
-    """Computes the set and judges it, and the frozen references and bounds that it is judged by."""
-    found = [*judge_bounds(bounds), *judge_frozen(bounds), *judge_defaults(bounds)]
+def check_default_set(bounds: Bounds, workers: int, on_progress: OnProgress = ignore_progress) -> list[Check]:
+    """Compute the default set and check it, and the frozen references that it is judged by."""
+    checks = judge_frozen(bounds)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
         report = run_scenes(*default_set(), path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
-        found += [_required(one.case.scene.name, one.case.method, one.result.message) for one in report.not_computed]
-        found += judge_file(path, bounds)
-    return found + judge_probes(probes(), bounds, workers)
+        checks += [_required(run.case.scene.name, run.case.method, run.result.message) for run in report.not_computed]
+        checks += judge_file(path, bounds)
+    return checks
 
 
-def check_speed(bounds: Bounds) -> list[Verdict]:
-    """Run times against those on file, one after the other; meaningful on an idle machine alone."""
-    return judge_probes([probe("speed", "paper/fig11", method) for method in SPEED_RATIOS], bounds, 1)
+def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) -> Check:
+    return Check("required", Where(scene, method, "run"), float(is_missing), 0.0, hint, "missing")
 
 
-def judge_file(path: Path, bounds: Bounds) -> list[Verdict]:
-    """Verdicts on what is there: runs, or a sweep. Raises StoreError, InputError."""
+def judge_file(path: Path, bounds: Bounds) -> list[Check]:
+    """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError, InputError."""
     if is_sweep(path):
         return _judge_sweep(StoredSweep(path, allow_damaged_runs=True), bounds)
     try:
         with ExitStack() as stack:
             results = stack.enter_context(open_results(path, verify=False))
             shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
-            found = verdicts(results, shipped, bounds)
+            checks = checks_of(results, shipped, bounds)
     except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
         raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
     if path.resolve() in shipped_files():  # their digests stand beside them
-        found = [one for one in found if one.check != "integrity"] + judge_frozen(bounds, [path])
-    return found
+        checks = [check for check in checks if check.name != "integrity"] + judge_frozen(bounds, [path])
+    return checks
 
 
-def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Verdict]:
+def _judge_sweep(sweep: StoredSweep, bounds: Bounds) -> list[Check]:
     """Whether all runs are there, and as they were written; their energies were judged when they were computed."""
-    scene = str(sweep.attributes.get("base_scene", "sweep"))
+    where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")
     missing = int((sweep.column("status") == MISSING).sum())
     damaged = len(sweep.damaged_runs)
-    look = f"{missing} runs missing; the sweep's own command computes them"
+    absent = f"{missing} runs missing; the sweep's own command computes them"
     changed = f"{damaged} runs changed after they were written" if damaged else "every run as written"
     return [
-        judged(bounds, "complete", scene, "*", "runs", missing, "runs", look),
-        judged(bounds, "integrity", scene, "*", "runs", damaged, "runs", changed),
+        make_check(bounds, "complete", where, missing, "runs", absent),
+        make_check(bounds, "integrity", where, damaged, "runs", changed),
     ]
 
 
-def _required(scene: str, method: str, look: str, *, is_missing: bool = True) -> Verdict:
-    return Verdict("required", scene, method, "run", float(is_missing), 0.0, "missing", look)
+def judged_runs(checks: Iterable[Check]) -> Counter[str]:
+    """Count the runs of each method that were judged, so that whoever reads misses a run that is not there."""
+    return Counter(
+        check.where.method for check in checks if check.name == _OF_EVERY_RUN and check.where.method != REFERENCE
+    )
 
 
-def judged_runs(found: Iterable[Verdict]) -> Counter[str]:
-    """How many runs of each method were judged, so that a run that is not there is missed by whoever reads."""
-    return Counter(one.method for one in found if one.check == _OF_EVERY_RUN and one.method != REFERENCE)
-
-
-def judge_bounds(bounds: Bounds) -> list[Verdict]:
-    """Every shipped bound below what a known fault gives: else it would let that fault pass."""
-    return [
-        Verdict("bound", "bounds", one.method, one.check, one.value, one.fault, "as its check", one.known_fault)
-        for one in bounds.entries
-        if math.isfinite(one.fault)
-    ]
-
-
-def judge_defaults(bounds: Bounds) -> list[Verdict]:
-    """Every built-in method's defaults against the settings that its bounds were found with."""
-    found = []
-    for method in expected_settings():
-        faults = defaults_faults(method)
-        look = "; ".join(faults) or "those that the bounds were found with"
-        found.append(judged(bounds, "settings", "defaults", method, "defaults", len(faults), "faults", look))
-    return found
-
-
-def judge_frozen(bounds: Bounds, paths: Sequence[Path] = ()) -> list[Verdict]:
-    """Every shipped reference, or those of `paths`, against the digests beside its file, one verdict a scene."""
-    found = []
+def judge_frozen(bounds: Bounds, paths: Sequence[Path] = ()) -> list[Check]:
+    """Compare the shipped references, or those of `paths`, with the digests beside their files: a check per scene."""
+    checks = []
     for path in paths or shipped_files():
         with open_results(path) as results:
             try:
                 scenes = changed_arrays(results)
             except StoreError as exc:
-                found.append(judged(bounds, "frozen", path.stem, REFERENCE, "all", math.nan, "arrays", str(exc)))
+                where = Where(path.stem, REFERENCE, "all")
+                checks.append(make_check(bounds, "frozen", where, math.nan, "arrays", str(exc)))
                 continue
         for scene, names in scenes.items():
-            look = f"{path.name}: {', '.join(names)} not as frozen" if names else "as frozen"
-            channel = ", ".join(names) or "all"
-            found.append(judged(bounds, "frozen", scene, REFERENCE, channel, len(names), "arrays", look))
-    return found
+            hint = f"{path.name}: {', '.join(names)} not as frozen" if names else "as frozen"
+            where = Where(scene, REFERENCE, ", ".join(names) or "all")
+            checks.append(make_check(bounds, "frozen", where, len(names), "arrays", hint))
+    return checks
 
 
-def judge_probes(cases: Sequence[Case], bounds: Bounds, workers: int) -> list[Verdict]:
-    """Verdicts on measurements, in the order of `cases`; a measurement that was lost fails."""
-    available = [case for case in cases if case.method == "*" or find_method(case.method).is_installed]
-    found: dict[Case, list[Verdict]] = {}
-    with local_pool(workers) as pool:
-        for end in run_in(pool, measure, available, _PROBE_S):
-            if isinstance(end.error, RotorError):
-                raise end.error
-            found[end.task] = end.value or [measured(end.task, "all", math.nan, "", end.message)]
-    return [judge_measured(one, bounds) for case in available for one in found[case]]
+def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> list[Check]:
+    """Compare margins: a check "against" for every earlier one, how many times its margin has shrunk.
 
+    Parameters
+    ----------
+    new, old : checks of two files, made with the same bounds.
+    factor : allowed ratio of the earlier margin to the present one, at least 1.
 
-def judge_measured(one: Verdict, bounds: Bounds) -> Verdict:
-    """A measured number against its bound."""
-    return replace(one, bound=bounds.of(one.check, one.method).value)
+    Returns
+    -------
+    A check for every one of `old`, and one for a run that is gone. The value is NaN, which fails, where `new` lacks the
+    check or the run, and infinite where a check that passed fails. What failed before and fails now is no regression.
 
-
-def regressions(new: Sequence[Verdict], old: Sequence[Verdict], factor: float) -> list[Verdict]:
-    """A verdict "against" for every earlier one, how many times its margin has shrunk; one for a run that is gone.
-
-    new, old   verdicts of the same checks, made with the same bounds
-    factor     allowed ratio of the earlier margin to the present one, at least 1
-
-    The value is NaN, which fails, where `new` lacks the verdict or the run, and infinite where a verdict that passed
-    fails. A verdict that failed before and fails now is no regression.
-
+    Examples
+    --------
     >>> from dataclasses import replace
-    >>> was = Verdict("energy", "paper/fig08", "exudyn_tree/rk67", "balance", 1e-12, 1e-9, "of scale", "")
-    >>> [found] = regressions([replace(was, value=6.4e-11)], [was], factor=10.0)
-    >>> round(found.value), found.passed
+    >>> where = Where("paper/fig08", "exudyn_tree/rk67", "balance")
+    >>> before = Check("energy", where, 1e-12, 1e-9, "", "of scale")
+    >>> [change] = regressions([replace(before, value=6.4e-11)], [before], factor=10.0)
+    >>> round(change.value), change.passed
     (64, False)
     """
-    present = {_key(verdict): verdict for verdict in new}
-    runs = {(verdict.scene, verdict.method) for verdict in new}
-    gone = {(one.scene, one.method): replace(one, check="run", channel="all") for one in old}
-    earlier = [one for one in old if (one.scene, one.method) in runs]
-    earlier += [one for run, one in gone.items() if run not in runs]
-    return [_compared(present.get(_key(verdict)), verdict, factor) for verdict in earlier]
+    present = {(check.name, check.where): check for check in new}
+    runs = {check.where[:2] for check in new}
+    gone = {
+        check.where[:2]: replace(check, name="run", where=check.where._replace(channel="all"))
+        for check in old
+        if check.where[:2] not in runs
+    }
+    changes = []
+    for check in [*(check for check in old if check.where[:2] in runs), *gone.values()]:
+        now = present.get((check.name, check.where))
+        if now is None:
+            value, hint = math.nan, "was judged in the earlier file and is not in this one"
+        else:
+            value = _shrinkage(now, check)
+            hint = f"{check.value:.2e} before, {now.value:.2e} now, bound {now.bound:.2e} {now.unit}; {now.hint}"
+        where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
+        changes.append(Check("against", where, value, factor, hint, "times the margin"))
+    return changes
 
 
-def _key(verdict: Verdict) -> tuple[str, str, str, str]:
-    return verdict.check, verdict.scene, verdict.method, verdict.channel
-
-
-def _compared(new: Verdict | None, old: Verdict, factor: float) -> Verdict:
-    if new is None:
-        value, look = math.nan, "was judged in the earlier file and is not in this one"
-    else:
-        value = _shrinkage(new, old)
-        look = f"{old.value:.2e} before, {new.value:.2e} now, bound {new.bound:.2e} {new.unit}; {new.look_at}"
-    channel = f"{old.check}: {old.channel}"
-    return replace(
-        old, check="against", channel=channel, value=value, bound=factor, unit="times the margin", look_at=look
-    )
-
-
-def _shrinkage(new: Verdict, old: Verdict) -> float:
+def _shrinkage(new: Check, old: Check) -> float:
     if not new.passed:
         return math.inf if old.passed else 1.0
     if not old.passed:

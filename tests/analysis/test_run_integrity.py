@@ -1,4 +1,4 @@
-"""Copies, settings and steps, by runs made by hand."""
+"""Copies, settings and steps, of constructed runs."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from support.scenes import paper
 from support.stored import Arrays
 
-from rotor_mbs.analysis.run_integrity import copies, defaults_faults, settings_faults, steps_off
-from rotor_mbs.methods.catalogue import look_up
+from rotor_mbs.analysis.run_integrity import copies, same_settings, settings_faults, steps_off
+from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.scenario.accuracy_bounds import expected_settings
 
 TIME = np.linspace(0.0, 3.0, 100)
@@ -97,11 +97,6 @@ def test_steps_of_an_adaptive_method_are_those_on_file() -> None:
     assert off("lagrange/ode45", steps, name, relative_tolerance=1e-3) is None
 
 
-def test_a_default_that_is_not_on_file_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert defaults_faults("exudyn_tree/rk44") == []
-    assert defaults_faults("of/another") == ["no settings on file"]
-    known = expected_settings()["exudyn_tree/rk44"]
-    monkeypatch.setitem(known, "settings", {"step": 1.0, "stride": 2})
-    assert defaults_faults("exudyn_tree/rk44") == ["step is 0.00025, 1.0 on file", "stride is None, 2 on file"]
-    monkeypatch.delitem(expected_settings(), "exudyn_tree/rk44")
-    assert defaults_faults("exudyn_tree/rk44") == ["no settings on file"]
+def test_defaults_are_the_settings_that_the_bounds_were_found_with() -> None:
+    for name, known in expected_settings().items():
+        assert same_settings(find_method(name).defaults, known["settings"]), name

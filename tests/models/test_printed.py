@@ -7,10 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.closed_form import LoadValues
+from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import AS_PRINTED, CORRECTED, Errata
+from rotor_mbs.scenario.scene import Blade, Scene
 
 THIRDS = tuple(2.0 * math.pi * i / 3.0 for i in range(3))
 M, C, D, G = 15000.0, math.hypot(0.08, 0.03), 15.42, 9.8  # Table 1
@@ -37,7 +41,7 @@ def mass_matrix(rotor, angles):
 
 
 @pytest.mark.parametrize("blades", [1, 3])
-def test_literal_text_is_the_derivation_with_nothing_mended(blades):
+def test_literal_text_is_the_derivation_with_all_errata(blades):
     rng = np.random.default_rng(1)
     text = {1: literal.one_blade_accelerations, 3: literal.three_blade_accelerations}[blades]
     for _ in range(50):
@@ -93,7 +97,7 @@ class Lagrangian:
 
 
 @pytest.mark.parametrize("blades", [1, 2, 3, 5])
-def test_all_mended_are_lagranges_equations(blades):
+def test_all_corrected_are_lagranges_equations(blades):
     rng = np.random.default_rng(2)
     for _ in range(10):
         angles, rates = random_motion(rng, blades)
@@ -170,3 +174,34 @@ def test_figure_5_starts_in_an_equilibrium_that_only_rounding_leaves():
     sines = math.sin(angle), math.cos(angle)
     assert literal.gravity_three(M, C, G, *sines, *[0.0, 1.0] * 3) == (0.0, 0.0, 0.0, 0.0)
     assert 0.0 < abs(literal.rotor_gravity(M, C, G, *sines, 1.0, 1.0, 1.0)) < 1e-12
+
+
+def closed_form_accelerations(m, c, d, g, torques, angles, rates, blades):
+    blade = Blade(m, (c, 0.0, d), (0.0,) * 6, (c, 0.0, d))
+    zero = (0.0,) * (1 + blades)
+    form = rotor_form(Scene("random", "", (), g, 1.0, 2, ("angles",), (blade,) * blades, 0.0, zero, zero))
+    return closed_form.accelerations(angles, rates, form, LoadValues(torques[0], torques[1:]), math.sin, math.cos)
+
+
+@pytest.mark.parametrize("blades", [1, 3])
+@pytest.mark.parametrize("errata", [CORRECTED, Errata(e1=False, e2=False, e3=True)])
+def test_the_corrected_derivation_is_the_closed_form(blades, errata):
+    """E3 changes nothing where E2 is corrected."""
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        angles, rates = random_motion(rng, blades)
+        chosen, torques = constants(rng), rng.uniform(-1.0, 1.0, 1 + blades).tolist()
+        derived = DerivedRotor(*chosen, phases(blades), errata).accelerations(torques, angles, rates)
+        exact = np.array(closed_form_accelerations(*chosen, torques, angles, rates, blades))
+        np.testing.assert_allclose(derived, exact, rtol=0.0, atol=3e-13 * max(1.0, np.abs(exact).max()))
+
+
+@pytest.mark.parametrize("gravity", [0.0, 1.3])
+def test_a_pitch_without_inertia_leaves_a_pendulum(gravity):
+    rng = np.random.default_rng(7)
+    for _ in range(5):
+        (angle, _), (rate, _) = random_motion(rng, 1)
+        m, _, d, _ = constants(rng)
+        printed = literal.fixed_pitch_acceleration(m, d, gravity, 1.7, angle - 0.7, [0.7])
+        (exact, *_) = closed_form_accelerations(m, 0.0, d, gravity, [1.7], [angle], [rate], blades=1)
+        assert printed == pytest.approx(exact, rel=0.0, abs=3e-13 * max(1.0, abs(exact)))

@@ -50,7 +50,7 @@ def test_the_page_of_the_check_has_every_verdict_that_fails_and_is_made_where_it
     assert f"{len(failed)} of " in text
     section = text[text.index('<section id="failures">') : text.index('<section id="all"')]
     assert section.count('class="bad"') == len(failed)
-    assert {str(escape(one.look_at)) for one in failed} == set(re.findall(r"fail</span><small>(.*?)</small>", section))
+    assert {str(escape(one.hint)) for one in failed} == set(re.findall(r"fail</span><small>(.*?)</small>", section))
     assert 'href="check.html"' in (folder / "paper-fig11.html").read_text(encoding="utf-8")
 
 

@@ -55,9 +55,9 @@ def test_the_last_bit_of_every_array_is_found(copy: Path) -> None:
         with h5py.File(copy, "r+") as file:
             before = file[RUN][name][()]
             in_last_bit(file[RUN][name])
-        (found,) = [one for one in failed(judged(copy)) if one.check == "integrity"]
-        assert (found.scene, found.method) == ("check/held", METHOD)
-        assert found.look_at.startswith(f"{name} changed")
+        (found,) = [one for one in failed(judged(copy)) if one.name == "integrity"]
+        assert (found.where.scene, found.where.method) == ("check/held", METHOD)
+        assert found.hint.startswith(f"{name} changed")
         with open_results(copy) as results, pytest.raises(StoreError, match=f"{name} changed after it was written"):
             results.scenes["check/held"].runs[METHOD].array(name)
         with h5py.File(copy, "r+") as file:
@@ -82,7 +82,7 @@ CHANGES: dict[str, Callable[[h5py.File], object]] = {
 def test_a_change_is_found_by_check(change: str, copy: Path) -> None:
     with h5py.File(copy, "r+") as file:
         CHANGES[change](file)
-    assert any(one.check == "integrity" for one in failed(judged(copy)))
+    assert any(one.name == "integrity" for one in failed(judged(copy)))
 
 
 @pytest.mark.parametrize("change", ["a status", "a title", "a unit"])
@@ -110,7 +110,7 @@ def test_a_merge_does_not_bless_what_was_damaged(copy: Path) -> None:
     with h5py.File(copy, "r+") as file:
         in_last_bit(file[RUN]["angles"])
     results_file(copy, ["check/held"], ["lagrange/radau"])
-    assert [one.method for one in failed(judged(copy)) if one.check == "integrity"] == [METHOD]
+    assert [one.where.method for one in failed(judged(copy)) if one.name == "integrity"] == [METHOD]
 
 
 def sealed_anew(file: h5py.File, group: str) -> None:
@@ -124,7 +124,7 @@ def test_a_growth_that_hides_an_error_is_found_behind_new_digests(copy: Path) ->
     with h5py.File(copy, "r+") as file:
         file["check/held/reference/error_growth"][1] = 1e6
         sealed_anew(file, "check/held/reference")
-    checks = {one.check for one in failed(judged(copy))}
+    checks = {one.name for one in failed(judged(copy))}
     assert "growth" in checks
     assert "integrity" not in checks
 
@@ -136,7 +136,7 @@ def test_an_energy_error_that_is_not_the_balance_is_found_behind_new_digests(cop
         file[RUN]["energy_error"][...] = values
         sealed_anew(file, RUN)
     (found,) = failed(judged(copy))
-    assert (found.check, found.channel) == ("energies", "energy error")
+    assert (found.name, found.where.channel) == ("energies", "energy error")
 
 
 def test_settings_and_steps_that_are_not_the_methods_are_found_behind_new_digests(copy: Path) -> None:
@@ -144,11 +144,11 @@ def test_settings_and_steps_that_are_not_the_methods_are_found_behind_new_digest
         file[RUN].attrs["settings"] = '{"step": 0.001}'
         file[RUN].attrs["steps"] = 1
         sealed_anew(file, RUN)
-    assert {one.check for one in failed(judged(copy))} == {"settings"}
+    assert {one.name for one in failed(judged(copy))} == {"settings"}
     with h5py.File(copy, "r+") as file:
         file[RUN].attrs["settings"] = '{"absolute_tolerance": 1e-16, "relative_tolerance": 3e-14}'
         sealed_anew(file, RUN)
-    assert {one.check for one in failed(judged(copy))} == {"steps"}
+    assert {one.name for one in failed(judged(copy))} == {"steps"}
 
 
 def test_a_changed_record_is_found_in_a_file_without_runs(tmp_path: Path) -> None:
@@ -157,7 +157,11 @@ def test_a_changed_record_is_found_in_a_file_without_runs(tmp_path: Path) -> Non
     with h5py.File(copy, "r+") as file:
         in_last_bit(file["claims/shares/share"])
     (found,) = judged(copy)
-    assert (found.passed, found.scene, found.look_at) == (False, "claims/shares", "share changed after it was written")
+    assert (found.passed, found.where.scene, found.hint) == (
+        False,
+        "claims/shares",
+        "share changed after it was written",
+    )
 
 
 # What is refused: links, other files' arrays, claims

@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from support.cost_scaling import with_blades
 from support.references import reference
 from support.scenes import paper
 
@@ -27,7 +28,6 @@ from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.runs.timing import conduct, statistics
 from rotor_mbs.solution.metrics import angle_error
 from rotor_mbs.studies.bench_worker import Point, PointTimer, thinned, thinned_reference
-from rotor_mbs.studies.cost_scaling import with_blades
 
 
 def errors_of(method: str, settings: Mapping[str, object], name: str = "fig08", intervals: int = 100) -> float:

@@ -86,9 +86,9 @@ EQUIVALENT = {
         "decides how long a run takes, not what comes out"
     ),
     r"claims\._RELATIONS .*value \* other scaled": "its sign alone counts",
-    r"verdicts\._log_distance .*:92: 0 -> 1": "compared by its length: no shipped reference has a single sample",
+    r"checks\._log_distance .*:92: 0 -> 1": "compared by its length: no shipped reference has a single sample",
     r"run_integrity\._bent_columns .*0 -> 1": "one row is as much too short as none",
-    r"verdicts\._(start|energies)_off .*1 -> 2": "one zero or two: the largest is zero",
+    r"checks\._(start|energies)_off .*1 -> 2": "one zero or two: the largest is zero",
     r"adapter\.linear_solver .*scaled|adapter\._SPARSE_FROM ": "sizes near the bound take as long by either solver",
     r"kinematics\._frames .*:25: s -> c": "zeros of its shape",
     r"exact\._pendulum .*sign in ellipk": "sn is the same on both sides of its quarter period",
@@ -138,8 +138,9 @@ def _unexplained(rows: list[dict[str, str]]) -> list[str]:
     return [name for name in survivors if not any(re.search(pattern, name) for pattern in EXPLAINED)]
 
 
+@pytest.mark.full
 def test_a_sample_of_mutants_is_noticed() -> None:
-    """Of the groups whose verdicts take a second; the others take part in the whole run."""
+    """Of the groups whose checks take a second; the others take part in the whole run."""
     rows = _run("lagrange", "printed", "multibody", "chain", "mujoco", "rules", "ode45", "--every", "180")
     assert len(rows) >= 14
     assert _unexplained(rows) == []

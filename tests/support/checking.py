@@ -9,7 +9,7 @@ from pathlib import Path
 from unittest import mock
 
 from rotor_mbs.analysis import kinematics
-from rotor_mbs.analysis.verdicts import Verdict
+from rotor_mbs.analysis.checks import Check
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
 from rotor_mbs.runs.results_file import merge
@@ -30,27 +30,27 @@ def shipped(name: str) -> Scene:
 
 def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], timeout_s: float = 60.0) -> Path:
     """A batch as `run` makes it."""
-    found = find_scenes(scenes)
-    run_scenes(found, {scene.name: methods for scene in found}, path, workers=0, timeout_s=timeout_s)
+    chosen = find_scenes(scenes)
+    run_scenes(chosen, {scene.name: methods for scene in chosen}, path, workers=0, timeout_s=timeout_s)
     return path
 
 
 def add_run(path: Path, scene: Scene, run: Solution) -> None:
     """A run into a file that has its scene's reference, judged as a batch judges it."""
-    verdict = judge(scene, run, load_reference(path, scene))
-    facts = {"status": verdict.status, "message": verdict.message, "false_success": verdict.false_success}
+    judgement = judge(scene, run, load_reference(path, scene))
+    facts = {"status": judgement.status, "message": judgement.message, "false_success": judgement.false_success}
     piece = path.with_name("piece.h5")
-    write_run(piece, scene_hash(scene), replace(run, scene=scene), {**facts, **verdict.metrics})
+    write_run(piece, scene_hash(scene), replace(run, scene=scene), {**facts, **judgement.metrics})
     merge(path, [path, piece], {})
     piece.unlink()
 
 
-def judged(path: Path, bounds: Bounds | None = None) -> list[Verdict]:
+def judged(path: Path, bounds: Bounds | None = None) -> list[Check]:
     return check.judge_file(path, bounds or load_bounds())
 
 
-def failed(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    return [verdict for verdict in verdicts if not verdict.passed]
+def failed(checks: Sequence[Check]) -> list[Check]:
+    return [check for check in checks if not check.passed]
 
 
 # Known faults: what a method makes of a scene a little wrong, handed in as its answer to the right one.

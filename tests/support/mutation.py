@@ -4,7 +4,7 @@
 
 Each mutant lives in a process of its own, forked from one that has loaded the engines, the package and the tests: there
 one function gets its changed code, a small set of scenes is computed and judged as `check` does it, and the first
-verdict that fails is told. Where a constant is changed, or a function that was called while all that was loaded, the
+check that fails is printed. Where a constant is changed, or a function that was called while all that was loaded, the
 package is imported anew. A mutant that raises, or does not end in time, leaves a run that failed: `check` fails for
 that, too. What no run that is judged here can show (a turn missed between rows, the place of a quadrature's window) is
 put to a unit test of its own; the answer then begins with "test:".
@@ -47,7 +47,7 @@ _CPU_LIMIT_S, _RUN_LIMIT_S = 20, 120.0  # of a mutant, whatever else the machine
 _KEPT_ELSE = ("rotor_mbs.errors", "rotor_mbs.scenario", "rotor_mbs.solution")
 _KEPT = {
     "rules": _KEPT_ELSE[:2],
-    "analysis": (*_KEPT_ELSE, "rotor_mbs.methods", "rotor_mbs.models", "rotor_mbs.runs", "rotor_mbs.runs"),
+    "analysis": (*_KEPT_ELSE, "rotor_mbs.methods", "rotor_mbs.models", "rotor_mbs.runs"),
 }
 # Here whole numbers count, arguments of calls, and conditions; elsewhere the terms of equations.
 _PROGRAMS = ("ode45", "schemes", "adapter", "integration", "reference", "analysis")
@@ -219,9 +219,8 @@ _TARGETS = (
     Target("reference", f"{_L}.reference", ("*",), 0.5),
     Target("analysis", f"{_A}.exact", ("exact_rotor_angle", "_stays_at_zero_pitch", "_about_shaft", "_pendulum")),
     Target("analysis", f"{_A}.kinematics", ("*",)),
-    Target("analysis", f"{_A}.verdicts", ("*",), 0.5),
+    Target("analysis", f"{_A}.checks", ("*",), 0.5),
     Target("analysis", f"{_A}.run_integrity", ("*",), 0.5),
-    Target("analysis", f"{_A}.trajectory_numbers", ("*",), 0.5),
     Target("analysis", f"{_A}.claims", ("*",), 0.5),
 )
 
@@ -234,13 +233,21 @@ _PARTS = "models/test_exudyn_parts.py::test_"
 _MUJOCO = "models/test_mujoco.py::test_"
 _PITCH = "models/test_pitch_loads.py::test_"
 _RULES = (
+    "analysis/test_status_rules.py",
     "solution/test_unchecked.py::test_a_wrong_motion_without_energy_and_reference_is_unchecked",
     "solution/test_judgement.py::test_an_open_joint_is_caught",
     "solution/test_unchecked.py::test_a_start_turns_away_leaves_ten_units_in_its_last_place_open",
 )
 _CHECK = "studies/test_check.py::test_"
 _REFERENCE = "models/test_reference.py::test_"
+_PRINTED = ("models/test_printed.py",)
+_DEFAULTS = "analysis/test_run_integrity.py::test_defaults_are_the_settings_that_the_bounds_were_found_with"
 _TESTS = {
+    f"{_L}.closed_form": _PRINTED,
+    f"{_L}.parameters": _PRINTED,
+    f"{_P}.literal": _PRINTED,
+    f"{_P}.matrices": _PRINTED,
+    f"{_P}.derivation": _PRINTED,
     f"{_M}.geometry": (f"{_PARTS}mountings_balance_exactly",),
     f"{_M}.chain": (f"{_PARTS}a_spring_over_time_resists_from_its_offset",),
     f"{_M}.sensor_samples": (f"{_PARTS}unwrapping_follows_rates_over_turns_between_rows",),
@@ -264,13 +271,15 @@ _TESTS = {
         "models/test_exudyn_work.py",
         f"{_PITCH}work_of_a_constant_torque_and_of_a_constant_rest_angle[exudyn_tree/rk44]",
     ),
-    "rotor_mbs.models.ode45": ("models/test_ode45.py",),
+    "rotor_mbs.models.ode45": (_DEFAULTS, "models/test_ode45.py"),
     f"{_M}.schemes": (
+        _DEFAULTS,
         f"{_PARTS}counts_of_steps_and_evaluations",
         f"{_PARTS}an_implicit_scheme_has_accelerations_anyway",
         f"{_PARTS}a_wrong_setting_is_told_with_what_is_allowed",
     ),
     f"{_M}.methods": (
+        _DEFAULTS,
         f"{_PARTS}samples_the_engine_cannot_tell_apart_are_refused",
         f"{_PARTS}a_wrong_setting_is_told_with_what_is_allowed",
         f"{_PARTS}an_implicit_scheme_has_accelerations_anyway",
@@ -295,7 +304,7 @@ _TESTS = {
         "models/test_exudyn_models.py::test_large_chains_alone_are_solved_by_a_sparse_factorization",
     ),
     f"{_L}.ode_solvers": ("models/test_segments.py",),
-    f"{_L}.methods": ("methods/test_settings.py",),
+    f"{_L}.methods": (_DEFAULTS, "methods/test_settings.py"),
     f"{_L}.taylor": (
         "models/test_sweep_ensemble.py::test_runs_side_by_side_are_the_runs_one_by_one[fixed pitch]",
         "models/test_segments.py",
@@ -307,6 +316,7 @@ _TESTS = {
         "models/test_segments.py",
     ),
     f"{_L}.reference": (
+        f"{_CHECK}a_reference_computed_now_is_the_frozen_one[check/general]",
         f"{_REFERENCE}the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls",
         f"{_REFERENCE}a_reference_that_fails_says_why_and_how_far_the_better_run_came",
         f"{_REFERENCE}a_reference_has_loads_where_they_are_asked_for",
@@ -322,14 +332,13 @@ _TESTS = {
         "studies/test_compare_data.py::test_the_reference_at_the_times_of_the_data_is_the_frozen_one",
     ),
     f"{_A}.exact": ("analysis/test_exact.py",),
-    f"{_A}.kinematics": ("analysis/test_verdicts.py",),
-    f"{_A}.verdicts": (
-        "analysis/test_verdicts.py",
+    f"{_A}.kinematics": ("analysis/test_checks.py",),
+    f"{_A}.checks": (
+        "analysis/test_checks.py",
         f"{_CHECK}a_tampered_run_fails",
         f"{_CHECK}a_touched_reference_in_the_file_fails",
     ),
     f"{_A}.run_integrity": ("analysis/test_run_integrity.py",),
-    f"{_A}.trajectory_numbers": ("analysis/test_analysis.py",),
     f"{_A}.claims": ("analysis/test_analysis.py",),
 }
 
@@ -544,18 +553,8 @@ STATUS_WORDS = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "ti
 # Judging mutants
 
 
-def _verdicts_of(group: str) -> Iterator[list[Any]]:
+def _checks_of(group: str) -> Iterator[list[Any]]:
     """What `check` says, the cheap parts first. Imported here: after the mutant's text was put in place."""
-    from rotor_mbs.scenario.accuracy_bounds import load_bounds
-    from rotor_mbs.studies import check, check_probes
-
-    if group in ("schemes", "ode45"):
-        yield check.judge_defaults(load_bounds())
-    kinds = {"rules": ("rules",), "reference": ("reference",), "lagrange": ("printed",), "printed": ("printed",)}
-    for probe in check_probes.probes() if group in kinds else ():
-        if probe.study in kinds[group] and probe.scene.name != "paper/fig11":
-            for one in check_probes.measure(probe):
-                yield [check.judge_measured(one, load_bounds())]
     batches = {
         "lagrange": [(("check/held",), "lagrange/dop853"), (("check/general",), "lagrange/dop853"),
                      (("check/pitch-loads",), "lagrange/dop853")],
@@ -677,17 +676,17 @@ def _outcome(mutant: Mutant) -> str:
     _put_in_place(mutant)
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            judges = (lambda: _verdict_that_fails(mutant.group)), (lambda: _test_that_fails(mutant.module))
+            judges = (lambda: _check_that_fails(mutant.group)), (lambda: _test_that_fails(mutant.module))
             return next(filter(None, (judge() for judge in judges[:: -1 if mutant.group == "analysis" else 1])), "")
     except BaseException as exc:
         return f"raised {type(exc).__name__}: {str(exc)[:60]}"
 
 
-def _verdict_that_fails(group: str) -> str:
-    for verdicts in _verdicts_of(group):
-        for verdict in verdicts:
-            if not verdict.passed:
-                return f"{verdict.check}: {verdict.scene} {verdict.method} {verdict.channel}"
+def _check_that_fails(group: str) -> str:
+    for checks in _checks_of(group):
+        for check in checks:
+            if not check.passed:
+                return f"{check.name}: {' '.join(check.where)}"
     return ""
 
 
@@ -738,7 +737,7 @@ def prove_control(group: str, mutants: Sequence[Mutant]) -> None:
     module = mutants[0].module
     unchanged = Mutant(group, module, "*", "unchanged", lambda: _source(module))
     for is_anew in {_loaded_function(mutant) is None for mutant in mutants}:
-        if not _in_order(lambda is_anew=is_anew: (is_anew and _put_in_place(unchanged), _verdict_that_fails(group))[1]):
+        if not _in_order(lambda is_anew=is_anew: (is_anew and _put_in_place(unchanged), _check_that_fails(group))[1]):
             raise SystemExit(f"{group}, unchanged, does not pass")
 
 

@@ -1,4 +1,4 @@
-"""Verdicts by hand: an array that is off by a known number gives the value that follows from it, and no other one."""
+"""Checks of known arrays: one that is off by a known number gives the value that follows from it, and no other."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from support.references import reference
 from support.scenes import general, paper
 from support.stored import Arrays, Made, rotor, store
 
-from rotor_mbs.analysis import verdicts
+from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.rehydrate import Rehydrated
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
@@ -38,11 +38,11 @@ def run_of(**changes: Any) -> Solution:
 
 
 def values(found: Any) -> dict[tuple[str, str], float]:
-    return {(one.check, one.channel): one.value for one in found}
+    return {(check.name, check.where.channel): check.value for check in found}
 
 
 def of_samples(run: Solution) -> dict[tuple[str, str], float]:
-    return values(verdicts._of_samples(stored(), BOUNDS, run.scene, run))
+    return values(checks._of_samples(stored(), BOUNDS, run.scene, run))
 
 
 def test_right_samples_are_off_by_rounding_alone() -> None:
@@ -74,11 +74,11 @@ def test_a_sample_off_is_seen_in_its_channel(array: str, place: Any, off: float,
         replace(blade, tip=(0.0, 0.0, length)) for blade, length in zip(general().blades, (9.0, 11.5, 3.0), strict=True)
     ]
     run = run_of(initial_angles=(5.0, 0.2, -0.4, 0.6), rotor_torque=((0.0, 30.0),), blades=tuple(tips))
-    run.trajectory.energy_error = verdicts.energy_error(run.trajectory)
+    run.trajectory.energy_error = checks.energy_error(run.trajectory)
     before = of_samples(run)
     getattr(run.trajectory, array)[place] += off
     if array not in ("energy_error", "tip", "time"):
-        run.trajectory.energy_error = verdicts.energy_error(run.trajectory)
+        run.trajectory.energy_error = checks.energy_error(run.trajectory)
     after = of_samples(run)
     size = size or max(energy_scale(run.scene, run.trajectory), float(run.trajectory.kinetic_energy.max()))
     assert after[channel] == pytest.approx(off / size, rel=1e-6)
@@ -117,8 +117,8 @@ def test_settings_are_judged_always_and_steps_where_they_are_known() -> None:
     scene, rk44 = paper("fig11", duration=1.0, samples=11), "exudyn_tree/rk44"
     for steps, expected in ((None, set()), (50, {("steps", "steps")})):
         one = stored(rk44, attributes={"steps": steps}, settings={"step": 0.03}, time=np.zeros(11))
-        given = list(verdicts._of_settings(one, BOUNDS, scene))
-        assert given[0].look_at == "the method's, each within its range"
+        given = list(checks._of_settings(one, BOUNDS, scene))
+        assert given[0].hint == "the method's, each within its range"
         found = values(given)
         assert found.keys() - {("settings", "settings")} == expected
         assert found.get(("steps", "steps"), 0.25) == pytest.approx(0.25)
@@ -137,7 +137,7 @@ def test_energies_of_rest_are_absolute() -> None:
 
 def of_model(run: Solution, scene: Scene, bounds: Any = BOUNDS, method: str = METHOD) -> dict[tuple[str, str], float]:
     found = Rehydrated(scene, run, reference("paper/fig11"), [])
-    return values(verdicts._of_corrected_model(stored(method), bounds, found, run.trajectory))
+    return values(checks._of_corrected_model(stored(method), bounds, found, run.trajectory))
 
 
 def test_numbers_of_a_model_are_its_metrics_less_what_its_start_leaves_open() -> None:
@@ -181,10 +181,10 @@ def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
     run = solve(METHOD, scene, {})
     run.trajectory.angles[7, 0] += 1e-3
     found = Rehydrated(scene, run, None, [])
-    judged = values(verdicts._of_corrected_model(stored(), BOUNDS, found, run.trajectory))
+    judged = values(checks._of_corrected_model(stored(), BOUNDS, found, run.trajectory))
     assert judged["exact", "rotor angle"] == pytest.approx(1e-3, rel=1e-6)
     blind = replace(found, scene=replace(scene, outputs=("rates", "energy")))
-    judged = values(verdicts._of_corrected_model(stored(), BOUNDS, blind, run.trajectory))
+    judged = values(checks._of_corrected_model(stored(), BOUNDS, blind, run.trajectory))
     assert ("exact", "rotor angle") not in judged
 
 
@@ -204,10 +204,10 @@ def test_an_early_end_is_excused_where_the_motion_ends(
     run = replace(run_of(), method=method)
     one, faults = stored(method, status=status, attributes={"message": "over π/2"}), ["angles has 4 rows, not 5"]
     found = Rehydrated(run.scene, run if has_run else None, None, faults)
-    given = list(verdicts._of_run(one, BOUNDS, found, motion_ends))
+    given = list(checks._of_run(one, BOUNDS, found, motion_ends))
     assert values(given)["complete", "all"] == complete
-    assert (f"stored as {status}: over π/2" in given[0].look_at) == (complete == 1.0 and status != "ok")
-    assert ("stored as" in given[0].look_at) == (complete == 1.0 and status != "ok")
+    assert (f"stored as {status}: over π/2" in given[0].hint) == (complete == 1.0 and status != "ok")
+    assert ("stored as" in given[0].hint) == (complete == 1.0 and status != "ok")
     assert (len(given) > 1) == has_run
     assert (("energy", "balance") in values(given)) == (has_run and method == METHOD)
 
@@ -215,7 +215,7 @@ def test_an_early_end_is_excused_where_the_motion_ends(
 def test_a_run_without_samples_has_none_judged() -> None:
     run = run_of()
     run.trajectory.time = run.trajectory.time[:0]
-    given = values(verdicts._of_run(stored(status="diverged"), BOUNDS, Rehydrated(run.scene, run, None, []), False))
+    given = values(checks._of_run(stored(status="diverged"), BOUNDS, Rehydrated(run.scene, run, None, []), False))
     assert set(given) == {("complete", "all"), ("status", "status"), ("settings", "settings")}
 
 
@@ -225,9 +225,9 @@ def test_a_run_without_samples_has_none_judged() -> None:
 def test_a_status_and_a_claim_are_a_fault_each(status: str, claimed: int, faults: int) -> None:
     run = run_of(outputs=("angles",))  # nothing to compare it with
     one, found = stored(status=status, attributes={"false_success": claimed}), Rehydrated(run.scene, run, None, [])
-    judged = verdicts._status(one, BOUNDS, found, run)
+    judged = checks._status(one, BOUNDS, found, run)
     assert judged.value == faults
-    assert ("the engine's claim of success is not false" in judged.look_at) == bool(claimed)
+    assert ("the engine's claim of success is not false" in judged.hint) == bool(claimed)
 
 
 def test_a_run_that_says_nothing_of_its_engines_claim_has_made_none_that_is_false(
@@ -235,12 +235,12 @@ def test_a_run_that_says_nothing_of_its_engines_claim_has_made_none_that_is_fals
 ) -> None:
     run = run_of(outputs=("angles",))
     found = Rehydrated(run.scene, run, None, [])
-    assert verdicts._status(stored(status="unchecked"), BOUNDS, found, run).passed
+    assert checks._status(stored(status="unchecked"), BOUNDS, found, run).passed
     false = SimpleNamespace(status="unchecked", message="", false_success=True)
-    monkeypatch.setattr(verdicts, "judge", lambda *_: false)
-    given = verdicts._status(stored(status="unchecked"), BOUNDS, found, run)
+    monkeypatch.setattr(checks, "judge", lambda *_: false)
+    given = checks._status(stored(status="unchecked"), BOUNDS, found, run)
     assert given.value == 1.0
-    assert given.look_at.endswith("the engine's claim of success is false")
+    assert given.hint.endswith("the engine's claim of success is false")
 
 
 def test_a_balance_without_its_energies_fails() -> None:
@@ -251,7 +251,7 @@ def test_a_balance_without_its_energies_fails() -> None:
 
 def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
     scene: Any = SimpleNamespace(name="scene", reference=own)
-    return values(verdicts._of_reference(scene, shipped, BOUNDS))
+    return values(checks._of_reference(scene, shipped, BOUNDS))
 
 
 def test_a_reference_is_compared_with_the_shipped_one() -> None:
@@ -290,8 +290,8 @@ def test_a_reference_is_compared_with_the_shipped_one() -> None:
     ("status", "arrays", "ends"), [("singular", {"time": 1}, True), ("ok", {"time": 1}, False), ("singular", {}, False)]
 )
 def test_the_motion_ends_where_the_reference_does(status: str, arrays: Any, ends: bool) -> None:
-    assert verdicts._motion_ends(SimpleNamespace(reference=stored(REFERENCE, status=status, **arrays))) is ends
-    assert not verdicts._motion_ends(SimpleNamespace(reference=None))
+    assert checks._motion_ends(SimpleNamespace(reference=stored(REFERENCE, status=status, **arrays))) is ends
+    assert not checks._motion_ends(SimpleNamespace(reference=None))
 
 
 BENT = np.sin(np.linspace(0.0, 3.0, 100))[:, None] * [1.0, 2.0]
@@ -306,22 +306,22 @@ BENT = np.sin(np.linspace(0.0, 3.0, 100))[:, None] * [1.0, 2.0]
         ({"a": BENT, "b": None}, {}),  # one that cannot be read fails elsewhere
     ],
 )
-def test_copies_are_a_verdict_each(runs: dict[str, Any], found: dict[tuple[str, str], float]) -> None:
+def test_copies_are_a_check_each(runs: dict[str, Any], found: dict[tuple[str, str], float]) -> None:
     scene: Any = SimpleNamespace(
         name="scene", runs={name: stored(name, angles=angles) for name, angles in runs.items()}
     )
-    assert values(verdicts._copies(scene, BOUNDS)) == found
+    assert values(checks._copies(scene, BOUNDS)) == found
 
 
 def test_damage_is_told_by_its_parts() -> None:
-    assert [verdicts._integrity("s", METHOD, parts, BOUNDS).value for parts in ((), ("angles",), ("angles", "x"))] == [
+    assert [checks._integrity("s", METHOD, parts, BOUNDS).value for parts in ((), ("angles",), ("angles", "x"))] == [
         0,
         1,
         2,
     ]
-    assert verdicts._integrity("s", METHOD, (), BOUNDS).look_at == "as written"
-    assert "angles, x changed" in verdicts._integrity("s", METHOD, ("angles", "x"), BOUNDS).look_at
-    assert "no digests" in verdicts._integrity("s", METHOD, (verdicts.DIGESTS,), BOUNDS).look_at
+    assert checks._integrity("s", METHOD, (), BOUNDS).hint == "as written"
+    assert "angles, x changed" in checks._integrity("s", METHOD, ("angles", "x"), BOUNDS).hint
+    assert "no digests" in checks._integrity("s", METHOD, (checks.DIGESTS,), BOUNDS).hint
 
 
 @pytest.mark.parametrize(
@@ -329,7 +329,7 @@ def test_damage_is_told_by_its_parts() -> None:
     [(0.5, True, 4.0), (2.0, True, 1.0), (2.1, False, 2.0 / 2.1), (0.0, True, np.inf), (np.nan, False, 0.0)],
 )
 def test_the_margin_is_bound_over_value(value: float, passed: bool, margin: float) -> None:
-    one = verdicts.Verdict("energy", "s", "m", "c", value, 2.0, "J", "")
+    one = checks.Check("energy", checks.Where("s", "m", "c"), value, 2.0, "", "J")
     assert (one.passed, one.margin) == (passed, pytest.approx(margin))
 
 
@@ -342,35 +342,31 @@ def test_the_papers_numbers_are_judged_of_the_printed_equations_alone(tmp_path: 
     ]
     for count, expected in ((1, []), (2, [2.0])):
         with open_results(store(tmp_path / f"{count}.h5", runs[:count])) as results:
-            assert [one.value for one in verdicts._of_paper(results, BOUNDS)] == pytest.approx(expected)
+            assert [one.value for one in checks._of_paper(results, BOUNDS)] == pytest.approx(expected)
 
 
-def test_damage_outside_the_runs_is_told_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(verdicts, "_damages", lambda _: {"file": ["attributes"], "paper/fig11/reference": ["angles"]})
-    made = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), REFERENCE, rotor(np.zeros_like))])
-    with open_results(made) as results:
-        found = [one for one in verdicts.verdicts(results, [], BOUNDS) if one.check == "integrity"]
-    assert [(one.scene, one.method, one.value) for one in found] == [("paper/fig11", REFERENCE, 1), ("file", "*", 1)]
-
-
-def test_damage_is_told_of_the_group_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(verdicts, "all_damages", lambda _: [("", "a"), ("paper/fig11/reference", "b"), ("", "c")])
-    found = verdicts._damages(SimpleNamespace(path="r.h5", root=None))  # type: ignore[arg-type]
-    assert found == {"file": ["a", "c"], "paper/fig11/reference": ["b"]}
-
-
-def test_what_cannot_be_read_is_a_verdict_where_damage_is_known_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_damage_is_told_of_the_group_that_has_it_and_what_cannot_be_read_is_incomplete(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of an array that is as written, the same error is a fault of the program."""
 
     def fail(*_: object) -> None:
         raise KeyError("angles")
 
-    monkeypatch.setattr(verdicts, "rehydrate", fail)
-    scene: Any = SimpleNamespace(name="scene")
-    found = verdicts._of_stored_run(scene, stored(), None, BOUNDS, ["angles"])
-    assert [one.check for one in found if not one.passed] == ["integrity", "complete"]
-    with pytest.raises(KeyError):
-        verdicts._of_stored_run(scene, stored(), None, BOUNDS, [])
+    damages = [("", "a"), (f"paper/fig11/{METHOD}", "b"), ("", "c")]
+    monkeypatch.setattr(checks, "all_damages", lambda _: damages)
+    monkeypatch.setattr(checks, "rehydrate", fail)
+    made = [Made(paper("fig11", samples=501), METHOD, rotor(np.zeros_like))]
+    with open_results(store(tmp_path / "r.h5", made)) as results:
+        failures = [check for check in checks.checks_of(results, [], BOUNDS) if not check.passed]
+        assert [(check.name, check.where.scene, check.where.method, check.value) for check in failures[:2]] == [
+            ("integrity", "paper/fig11", METHOD, 1.0),
+            ("complete", "paper/fig11", METHOD, pytest.approx(np.nan, nan_ok=True)),
+        ]
+        assert (failures[-1].where.scene, failures[-1].where.method, failures[-1].value) == ("file", "*", 2.0)
+        damages.clear()
+        with pytest.raises(KeyError):
+            checks.checks_of(results, [], BOUNDS)
 
 
 def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: Path) -> None:
@@ -381,7 +377,7 @@ def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: 
         *(Made(fig11, name, curve) for name in ("printed/ode45", METHOD)),
     ]
     with open_results(store(tmp_path / "r.h5", made)) as results:
-        found = values(verdicts.verdicts(results, [], BOUNDS))
+        found = values(checks.checks_of(results, [], BOUNDS))
     assert [value for (check, _), value in found.items() if check == "copied"] == [1.0]
     assert [value for (check, _), value in found.items() if check == "published"] == pytest.approx([2.0])
 
@@ -389,7 +385,7 @@ def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: 
 def test_a_scene_that_is_not_shipped_is_not_compared_with_the_shipped_one_of_its_name(tmp_path: Path) -> None:
     made = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), REFERENCE, rotor(np.zeros_like))])
     with open_results(made) as results, open_results(reference_folder() / "paper.h5") as shipped:
-        found = {one.check for one in verdicts.verdicts(results, [shipped], BOUNDS)}
+        found = {check.name for check in checks.checks_of(results, [shipped], BOUNDS)}
     assert "complete" in found
     assert not found & {"reference", "growth", "uncertainty"}
 
@@ -399,9 +395,9 @@ def test_a_quantity_is_told_by_its_rule_or_by_its_own_words(monkeypatch: pytest.
     bare = QuantityMetric("lift_error", bound=2.0)
     full = QuantityMetric("lift_error", bound=2.0, check="gap", channel="up", unit="kN", look_at="the wing")
     none = QuantityMetric("lift_error", check="nothing", bound=None)
-    monkeypatch.setattr(verdicts, "quantity_errors", lambda *_: [(quantity, rule, 0.5) for rule in (bare, full, none)])
-    found = list(verdicts._of_quantities(stored(), BOUNDS, general(), {}))
-    assert [(one.check, one.channel, one.unit, one.look_at) for one in found] == [
+    monkeypatch.setattr(checks, "quantity_errors", lambda *_: [(quantity, rule, 0.5) for rule in (bare, full, none)])
+    found = list(checks._of_quantities(stored(), BOUNDS, general(), {}))
+    assert [(check.name, check.where.channel, check.unit, check.hint) for check in found] == [
         ("lift", "lift", "N", "force upwards"),
         ("gap", "up", "kN", "the wing"),
     ]

@@ -1,0 +1,339 @@
+"""What `rotor-mbs check` finds in a results file: numbers against bounds, each with what to look at where it fails.
+
+Every number is computed again from the stored samples; a stored metric or status is checked, never used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rotor_mbs.analysis import kinematics
+from rotor_mbs.analysis.claims import claims
+from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.analysis.rehydrate import Rehydrated, reference_of, rehydrate
+from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
+from rotor_mbs.analysis.run_selection import PRINTED
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
+from rotor_mbs.runs.digests import DIGESTS
+from rotor_mbs.runs.files import reading
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene, all_damages
+from rotor_mbs.scenario.accuracy_bounds import Bounds
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.solution.judgement import energy_slack, judge, quantity_bound, quantity_errors, start_slack
+from rotor_mbs.solution.metrics import Metrics, energy_scale, metrics_of
+from rotor_mbs.solution.quantities import energy_error
+from rotor_mbs.solution.solution import Solution
+from rotor_mbs.solution.status import COMPLETE
+from rotor_mbs.solution.trajectory import Array, Trajectory
+
+
+class Where(NamedTuple):
+    """What a check is of; the method is "*" where it is of a whole scene."""
+
+    scene: str
+    method: str
+    channel: str
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A number against its bound, both in `unit`; `hint` says where a failure would come from.
+
+    >>> check = Check("energy", Where("paper/fig08", "exudyn_tree/rk67", "balance"), 1e-12, 1e-9, "", "of scale")
+    >>> check.passed, check.margin
+    (True, 1000.0)
+    """
+
+    name: str
+    where: Where
+    value: float
+    bound: float
+    hint: str
+    unit: str = ""
+
+    @property
+    def passed(self) -> bool:
+        return self.value <= self.bound  # False for NaN
+
+    @property
+    def margin(self) -> float:
+        """How many times the value would fit into the bound; infinite for a value of zero."""
+        if math.isnan(self.value):
+            return 0.0
+        return self.bound / self.value if self.value else math.inf
+
+
+def make_check(bounds: Bounds, name: str, where: Where, value: float, unit: str, hint: str) -> Check:
+    """A value against the bound of `name` for the method."""
+    return Check(name, where, float(value), bounds.of(name, where.method).value, hint, unit)
+
+
+def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Check]:
+    """Every check that an open file allows, in the order of its scenes.
+
+    Parameters
+    ----------
+    results : the file.
+    frozen : the shipped references.
+    bounds : the bounds; those that methods declare go before them.
+
+    Raises
+    ------
+    InputError
+        Where a stored scene is none.
+    """
+    bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
+    shipped = {name: scene for file in frozen for name, scene in file.scenes.items()}
+    checks: list[Check] = []
+    damages: dict[str, list[str]] = {}  # by the path of the group; the root's is "file"
+    with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
+        with reading(results.path):
+            for place, part in all_damages(results.root):
+                damages.setdefault(place or "file", []).append(part)
+        for scene in results.scenes.values():
+            own = bounds.for_scene(scene.name if _is_shipped(scene) else "")
+            known = shipped.get(scene.name) if own.scene else None
+            try:
+                reference = reference_of(scene)  # once for all runs of the scene
+            except StoreError:
+                reference = None  # fails with each of them
+            for run in scene.runs.values():
+                damaged = damages.pop(f"{scene.name}/{run.method}", [])
+                checks.append(_integrity(scene.name, run.method, damaged, bounds))
+                try:
+                    # Whatever HDF5 says of a run that is known to be damaged is that damage.
+                    with reading(str(scene.name), run.method) if damaged else nullcontext():
+                        checks += _of_run(run, own, rehydrate(scene, run, reference), _motion_ends(scene))
+                except StoreError as exc:
+                    checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
+            checks += _copies(scene, own)
+            checks += _of_reference(scene, known.reference if known is not None else None, own)
+        checks += [_integrity(place, "*", parts, bounds) for place, parts in damages.items()]
+        checks += _of_paper(results, bounds)
+    return checks
+
+
+def _is_shipped(scene: StoredScene) -> bool:
+    """Whether it is a scene of this package, number by number: the bounds of its name are for no other."""
+    try:
+        return any(scene_hash(known) == scene.attributes["scene_hash"] for known in find_scenes([scene.name]))
+    except InputError:
+        return False
+
+
+def _of(run: StoredRun, name: str, channel: str, value: float, bounds: Bounds, unit: str, hint: str) -> Check:
+    return make_check(bounds, name, Where(run.scene, run.method, channel), value, unit, hint)
+
+
+def _integrity(scene: str, method: str, parts: Sequence[str], bounds: Bounds) -> Check:
+    hint = f"{', '.join(parts)} changed after it was written" if parts else "as written"
+    if list(parts) == [DIGESTS]:
+        hint = "it has no digests: they were removed, or an earlier version wrote it"
+    return make_check(bounds, "integrity", Where(scene, method, "digests"), len(parts), "parts", hint)
+
+
+def _copies(scene: StoredScene, bounds: Bounds) -> list[Check]:
+    """One check for a scene with several runs; where there are copies, one for each pair."""
+    if len(scene.runs) < 2:
+        return []
+    try:
+        pairs = {(run, other): place for run, other, place in copies(scene)}
+    except StoreError:
+        return []  # the run that cannot be read has failed already
+    if not pairs:
+        where = Where(scene.name, "*", "all")
+        return [make_check(bounds, "copied", where, 0.0, "columns", "no two runs have the same bits")]
+    hint = "{} is that of {} bit for bit: data stored, or read, under another method's name"
+    return [
+        _of(run, "copied", place, 1.0, bounds, "columns", hint.format(place, other))
+        for (run, other), place in pairs.items()
+    ]
+
+
+def _motion_ends(scene: StoredScene) -> bool:
+    """Whether the reference itself stops early: the motion does not exist beyond."""
+    reference = scene.reference
+    return reference is not None and "time" in reference and reference.status == "singular"
+
+
+def _of_run(run: StoredRun, bounds: Bounds, stored: Rehydrated, motion_ends: bool) -> Iterator[Check]:
+    """A run that stops early and reports it is complete where the motion ends there."""
+    reports_it = stored.run is not None and run.status not in COMPLETE
+    excused = reports_it and (motion_ends or not is_corrected(run.method))
+    faults = [] if excused else stored.faults
+    hint = "; ".join(faults) or "every channel, row and number is there"
+    if faults and run.status != "ok":
+        hint += f"; stored as {run.status}: {run.attributes.get('message', '')}"
+    yield _of(run, "complete", "all", float(len(faults)), bounds, "faults", hint)
+    if stored.run is None:
+        return
+    yield _status(run, bounds, stored, stored.run)
+    yield from _of_settings(run, bounds, stored.scene)
+    if len(stored.run.trajectory.time):
+        yield from _of_samples(run, bounds, stored.scene, stored.run)
+        if is_corrected(run.method) and run.method != REFERENCE:
+            yield from _of_corrected_model(run, bounds, stored, stored.run.trajectory)
+
+
+def _status(run: StoredRun, bounds: Bounds, stored: Rehydrated, solution: Solution) -> Check:
+    judgement = judge(stored.scene, solution, stored.reference)
+    claimed = bool(run.attributes.get("false_success", 0))
+    faults = (judgement.status != run.status) + (judgement.false_success != claimed)
+    hint = f"stored {run.status}, its samples say {judgement.status} {judgement.message}".rstrip()
+    if judgement.false_success != claimed:
+        hint += "; the engine's claim of success is " + ("false" if judgement.false_success else "not false")
+    return _of(run, "status", "status", float(faults), bounds, "faults", hint)
+
+
+def _of_settings(run: StoredRun, bounds: Bounds, scene: Scene) -> Iterator[Check]:
+    faults = settings_faults(run)
+    hint = "; ".join(faults) or "the method's, each within its range"
+    yield _of(run, "settings", "settings", float(len(faults)), bounds, "faults", hint)
+    steps = steps_off(scene, run, bounds.scene)
+    if steps is not None:
+        yield _of(run, "steps", "steps", steps[0], bounds, "relative", steps[1])
+
+
+def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution) -> Iterator[Check]:
+    """What the samples say of each other, whatever equations moved them."""
+    trajectory = recorded.trajectory
+    times = np.linspace(0.0, scene.duration, scene.samples)[: len(trajectory.time)]
+    off = float(np.abs(trajectory.time - times).max()) / scene.duration
+    yield _of(run, "times", "time", off, bounds, "of duration", "samples are equally spaced, both ends included")
+    if not scene.wants("angles"):
+        return
+    yield _of(run, "start", "angles, rates", _start_off(scene, trajectory), bounds, "rad, rad/s", "the initial state")
+    if trajectory.tip is not None:
+        away = np.linalg.norm(trajectory.tip - kinematics.tip_paths(scene, trajectory.angles), axis=2).max()
+        length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
+        hint = "the tip point, a phase, or the rotation of a blade"
+        yield _of(run, "tip", "tip", float(away) / length, bounds, "of length", hint)
+    if trajectory.energy_error is not None:
+        own = energy_error(trajectory)
+        off = math.nan if own is None else float(np.abs(trajectory.energy_error - own).max())
+        hint = "the balance is not that of the stored energies"
+        scale = energy_scale(scene, trajectory) or 1.0
+        yield _of(run, "energies", "energy error", off / scale, bounds, "of scale", hint)
+    if scene.wants("rates") and trajectory.kinetic_energy is not None:
+        for name, off in _energies_off(scene, trajectory).items():
+            hint = "its own angles and rates give another energy: a mass, an inertia, a spring"
+            yield _of(run, "energies", name, off, bounds, "of scale", hint)
+
+
+def _start_off(scene: Scene, trajectory: Trajectory) -> float:
+    angles = np.abs(trajectory.angles[0] - scene.initial_angles)
+    # A pitch without inertia is fixed: its rate is zero, whatever the scene says.
+    given = [scene.initial_rates[0]] + [
+        rate if blade.has_pitch_inertia else 0.0
+        for rate, blade in zip(scene.initial_rates[1:], scene.blades, strict=True)
+    ]
+    rates = np.abs(trajectory.rates[0] - given) if scene.wants("rates") else np.zeros(1)
+    size = max(1.0, *map(abs, scene.initial_angles), *map(abs, given))
+    return max(float(angles.max()), float(rates.max())) / size
+
+
+def _energies_off(scene: Scene, trajectory: Trajectory) -> dict[str, float]:
+    angles, rates = trajectory.angles, trajectory.rates
+    kinetic = kinematics.kinetic_energy(scene, angles, rates)
+    formulas: dict[str, tuple[Array | None, Array | None]] = {
+        "kinetic energy": (trajectory.kinetic_energy, kinetic),
+        "potential energy": (trajectory.potential_energy, kinematics.potential_energy(scene, trajectory.time, angles)),
+        "work": (trajectory.work, kinematics.work_of_constant_loads(scene, angles)),
+        "work at the start": (None if trajectory.work is None else trajectory.work[:1], np.zeros(1)),
+    }
+    scale = max(energy_scale(scene, trajectory), float(np.abs(kinetic).max())) or 1.0
+    return {
+        name: float(np.abs(stored - own).max()) / scale
+        for name, (stored, own) in formulas.items()
+        if stored is not None and own is not None
+    }
+
+
+def _of_corrected_model(run: StoredRun, bounds: Bounds, stored: Rehydrated, trajectory: Trajectory) -> Iterator[Check]:
+    """What is asked only of a model that claims the corrected equations: reference, energy balance, exact solutions."""
+    scene = stored.scene
+    metrics = metrics_of(scene, trajectory, stored.reference)
+    if scene.wants("angles") and "angle_error_per_growth" in metrics:
+        hint = f"{metrics['angle_error_max']:.1e} rad up to {metrics['horizon_s']:.2f} s: a term, a parameter, the step"
+        error = max(metrics["angle_error_per_growth"] - start_slack(scene), 0.0)
+        yield _of(run, "agreement", "angles", error, bounds, "per growth", hint)
+        if bounds.find("horizon", run.method):
+            hint = "1e-9 rad, the promise of docs/findings.md, up to the horizon"
+            yield _of(run, "horizon", "angles", metrics["angle_error_max"], bounds, "rad", hint)
+    if "energy_drift_max" in metrics:
+        drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
+        hint = "a force without its potential, a wrong mass matrix, or too long a step"
+        yield _of(run, "energy", "balance", drift, bounds, "of scale", hint)
+    for channel in ("angular", "linear"):
+        if (name := f"{channel}_impulse_error_max") in metrics:
+            hint = "momentum less the impulses of torque, weights and bearing: a force, an inertia, or too long a step"
+            yield _of(run, "impulse", channel, metrics[name], bounds, "of scale", hint)
+    yield from _of_quantities(run, bounds, scene, metrics)
+    exact = exact_rotor_angle(scene, trajectory.time) if scene.wants("angles") else None
+    if exact is not None:
+        name, angle = exact
+        off = float(np.abs(trajectory.angles[:, 0] - angle).max())
+        yield _of(run, "exact", "rotor angle", off, bounds, "rad", f"{name}, solved analytically")
+
+
+def _of_quantities(run: StoredRun, bounds: Bounds, scene: Scene, metrics: Metrics) -> Iterator[Check]:
+    """Every quantity that is judged by a rule of its declaration."""
+    for quantity, rule, error in quantity_errors(scene, metrics):
+        bound = quantity_bound(rule, bounds, run.method)
+        if bound is not None:
+            where = Where(run.scene, run.method, rule.channel or quantity.name)
+            hint, unit = rule.look_at or quantity.long_name, rule.unit or quantity.units
+            yield Check(rule.check or quantity.name, where, error, bound, hint, unit)
+
+
+def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Check]:
+    """The reference in the file against the shipped one of the same scene; a file without one cannot be judged."""
+    stored = scene.reference
+    hint = "an altered reference, or a changed scene or closed form"
+    if stored is None:
+        hint = "the file has no reference to compare the runs with"
+        yield make_check(bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint)
+    elif shipped is not None:
+        for name in ("angles", "rates"):
+            if name in stored:
+                off = _distance(shipped.array(name), stored.array(name))
+                yield _of(stored, "reference", name, off, bounds, "rad, rad/s", hint)
+        for name, check_name in (("error_growth", "growth"), ("angle_uncertainty", "uncertainty")):
+            if name in shipped:
+                off = _log_distance(shipped, stored, name)
+                yield _of(stored, check_name, name.replace("_", " "), off, bounds, "log", hint)
+
+
+def _distance(first: Array, second: Array) -> float:
+    if first.shape != second.shape or second.dtype.kind != "f":
+        return math.nan
+    return float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max()) if first.size else 0.0
+
+
+def _log_distance(shipped: StoredRun, stored: StoredRun, name: str) -> float:
+    """Largest |ln| of the ratio, as far as both are positive and finite; NaN where one is missing."""
+    first, second = shipped.array(name), stored.array(name) if name in stored else np.empty(0)
+    if first.shape != second.shape or second.dtype.kind != "f":
+        return math.nan
+    used = np.isfinite(first) & (first > 0.0)
+    return float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
+
+
+def _of_paper(results: OpenResults, bounds: Bounds) -> Iterator[Check]:
+    """The paper's numbers, in units of their last printed digit."""
+    for claim in claims(results.scenes):
+        item, value = claim.published, claim.printed.value
+        if item.of is None or value is None:
+            continue
+        off = abs(round(value, item.decimals) - item.value) * 10**item.decimals
+        hint = f"the paper prints {item.value}, the run gives {value:.6f}: the printed entries, g, ode45"
+        where = Where(item.of.scene, PRINTED, item.id)
+        yield make_check(bounds, "published", where, off, "last digits", hint)
