@@ -90,7 +90,7 @@ def load(path: str | os.PathLike[str]) -> Scene:
 
 
 @overload
-def run(
+def run(  # type: ignore[overload-overlap]
     scene: Scene | str, method: str = ..., *, timeout: float = ..., reference: bool = ..., workers: int = ...,
     **settings: object,
 ) -> Run: ...  # fmt: skip
@@ -163,9 +163,7 @@ def run(
     """
     scene = scene_of(scene)
     if isinstance(method, str):
-        solution, exact = solve_judged(
-            scene, method, settings, compute_reference=reference, time_limit_s=timeout
-        )
+        solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
     named = check_names(tuple(method))
     chosen, reasons = (asked_methods([scene], named), []) if named else selected_methods([scene])
@@ -358,7 +356,7 @@ class Runs(Mapping[Any, Any]):
     def table(self) -> TextTable:
         """A row for each run: status, error (rad), energy drift (of the energy scale), run time (s)."""
         if self._is_sweep:
-            counts = [(status, str(count)) for status, count in self.statuses.items()]
+            counts: list[tuple[str, ...]] = [(status, str(count)) for status, count in self.statuses.items()]
             return TextTable(("status", "runs"), counts)
         rows = []
         for scene, method, status, facts in self._rows():

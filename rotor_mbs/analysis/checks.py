@@ -21,9 +21,9 @@ from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
-from rotor_mbs.runs.digests import DIGESTS
+from rotor_mbs.runs.files import DIGESTS
 from rotor_mbs.runs.files import reading
-from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene, all_damages
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -93,11 +93,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
     bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
     shipped = {name: scene for file in frozen for name, scene in file.scenes.items()}
     checks: list[Check] = []
-    damages: dict[str, list[str]] = {}  # by the path of the group; the root's is "file"
     with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
-        with reading(results.path):
-            for place, part in all_damages(results.root):
-                damages.setdefault(place or "file", []).append(part)
         for scene in results.scenes.values():
             own = bounds.for_scene(scene.name if _is_shipped(scene) else "")
             known = shipped.get(scene.name) if own.scene else None
@@ -106,17 +102,16 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
             except StoreError:
                 reference = None  # fails with each of them
             for run in scene.runs.values():
-                damaged = damages.pop(f"{scene.name}/{run.method}", [])
+                damaged = ["row"] if run.is_damaged else []
                 checks.append(_integrity(scene.name, run.method, damaged, bounds))
                 try:
-                    # Whatever HDF5 says of a run that is known to be damaged is that damage.
+                    # Whatever goes wrong with a run that is known to be damaged is that damage.
                     with reading(str(scene.name), run.method) if damaged else nullcontext():
                         checks += _of_run(run, own, rehydrate(scene, run, reference), _motion_ends(scene))
                 except StoreError as exc:
                     checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
             checks += _copies(scene, own)
             checks += _of_reference(scene, known.reference if known is not None else None, own)
-        checks += [_integrity(place, "*", parts, bounds) for place, parts in damages.items()]
         checks += _of_paper(results, bounds)
     return checks
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.sweeps import parameter_name
-from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.solution.trajectory import Array
 
 # A pitch that has grown tenfold is leaving: what stays bounded in a stable rotor only swings, by its amplitude.

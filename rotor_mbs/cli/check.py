@@ -40,7 +40,6 @@ def check(arguments: argparse.Namespace) -> int:
     elif arguments.json is not None:
         replace_file(arguments.json, formats.as_json(verdicts).encode())
 
-
     failures = [verdict for verdict in verdicts if not verdict.passed]
     for verdict in verdicts if arguments.verbose else failures:
         print(formats.line(verdict), file=stream)

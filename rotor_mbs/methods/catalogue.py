@@ -26,8 +26,6 @@ _BUILT_IN: Mapping[str, tuple[str, ...]] = {
     "rotor_mbs.models.mujoco.methods:METHODS": ("mujoco",),
 }
 
-_log = logging.getLogger("rotor_mbs")
-
 
 def methods() -> tuple[Method, ...]:
     """Every method, in the order of tables and legends; plug-ins last; the reference is not one of them."""

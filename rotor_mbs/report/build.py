@@ -27,7 +27,7 @@ from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
-from rotor_mbs.runs.read import OpenResults, in_memory, is_sweep, open_results
+from rotor_mbs.runs.read import OpenResults, is_sweep, open_results
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 
@@ -68,7 +68,7 @@ def write_report(
 
         return files.write_page(output, "sweep", sweep_page(StoredSweep(results)))
     with open_results(results) as opened:
-        pages = _pages(in_memory(opened), jobs, on_page, checked)
+        pages = _pages(opened, jobs, on_page, checked)
     files.write_pages(output, pages)
     return output / files.INDEX
 
@@ -176,7 +176,7 @@ def _run_pages(
 def make_parts(context: Context, tasks: dict[int, Task]) -> dict[int, Any]:
     """The work of a process: what each task makes, by its number. Raises StoreError."""
     with open_results(context.results) as file:
-        opened = in_memory(file)
+        opened = file
         return {number: task(opened, context) for number, task in tasks.items()}
 
 

@@ -48,7 +48,6 @@ class Column(NamedTuple):
     kind: str = "<f8"
 
 
-
 @contextmanager
 def new_file(path: Path) -> Iterator[Any]:
     """A new HDF5 file, put in the place of `path` when all of it is written and on the disk.

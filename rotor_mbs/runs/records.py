@@ -1,10 +1,10 @@
 """What studies store beside runs: tables of points, and groups of arrays with dimensions of their own.
 
-    /bench                          a row per point of a curve: a method at one setting on a scene
-    /stability                      a row per step of a ladder: a fixed-step method on a scene
-    /stability_limits, /symmetry    a row per method and scene: numbers of many runs
-    /modes/<scene>/<model>/<kind>   modes over speed, in a file of modes
-    /comparison/<scene>/data/trajectory   data of another program and the reference at their times
+/bench                          a row per point of a curve: a method at one setting on a scene
+/stability                      a row per step of a ladder: a fixed-step method on a scene
+/stability_limits, /symmetry    a row per method and scene: numbers of many runs
+/modes/<scene>/<model>/<kind>   modes over speed, in a file of modes
+/comparison/<scene>/data/trajectory   data of another program and the reference at their times
 """
 
 from __future__ import annotations
@@ -262,5 +262,3 @@ def _group_records(file: Any, kind: str) -> Iterator[Record]:
         parts = path.removeprefix(f"{kind}/").split("/")
         arrays = {name: files.values_of(item) for name, item in group.items() if not files.is_group(item)}
         yield Record(kind, "/".join(parts[:-2]), "/".join(parts[-2:]), files.attributes_of(group), arrays)
-
-

@@ -1,9 +1,9 @@
 """Results files as they are written: a row per run in the table /runs, its arrays in a table of its scene.
 
-    /runs           run (text), scene, method_name, settings, versions; status, message, metrics, times
-    /paper/fig11    run (text), time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
-                    error_growth, angle_uncertainty (time): of the reference
-    /bench, /stability ...   tables of other studies, each row with a status of its own
+/runs           run (text), scene, method_name, settings, versions; status, message, metrics, times
+/paper/fig11    run (text), time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
+                error_growth, angle_uncertainty (time): of the reference
+/bench, /stability ...   tables of other studies, each row with a status of its own
 """
 
 from __future__ import annotations
@@ -169,10 +169,7 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
     """The table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
     scene = runs[0].scene
     filled = {
-        name: column
-        for run in runs
-        for name, column in arrays_of(run).items()
-        if arrays is None or name in arrays
+        name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
     }
     used = {"time"}.union(*(column.dimensions for column in filled.values()))
     values = scale_values(scene)
@@ -442,7 +439,3 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
         if column in row:
             row[column][0, : len(array)] = array
     return row
-
-
-
-

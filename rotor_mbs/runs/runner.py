@@ -95,5 +95,3 @@ def perform_and_store(perform: Callable[[T], Rows], task: T) -> Rows:
     rows = perform(task)
     task.place.write(task.first, rows)
     return {name: np.asarray(rows[name]) for name in _REPORTED if name in rows}
-
-

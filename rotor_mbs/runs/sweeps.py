@@ -1,10 +1,10 @@
 """The file of a sweep: one table at its root.
 
-    run, variant, method_code, split   (run) which run this is
-    bearing_stiffness ...              (run) a variable for each varied parameter, in its own unit
-    status, steps, message ...         (run) metrics
-    code                               (run) which versions computed it
-    angles ...                         (run, time, coordinate) trajectories, as asked for; NaN after a run broke off
+run, variant, method_code, split   (run) which run this is
+bearing_stiffness ...              (run) a variable for each varied parameter, in its own unit
+status, steps, message ...         (run) metrics
+code                               (run) which versions computed it
+angles ...                         (run, time, coordinate) trajectories, as asked for; NaN after a run broke off
 """
 
 from __future__ import annotations
@@ -224,5 +224,3 @@ class StoredSweep:
         if name in table.known or name in table.scales:
             return {**table.scales, **table.known}[name][1]
         raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")
-
-

@@ -529,7 +529,7 @@ def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
     for depth, part in enumerate(path):
         has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
         if not has_such_entries:
-            kinds = {dict: "a table", list: "a list"}
+            kinds: dict[type, str] = {dict: "a table", list: "a list"}
             what = f"is {kinds.get(type(here), 'a single value')}"
             raise TableError([KeyProblem(path[:depth], what, KEY_FORM, is_of_key=True)])
         if isinstance(part, int) and part >= len(here):

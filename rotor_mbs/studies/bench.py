@@ -222,9 +222,7 @@ def store_curve(
     return Outcome(curve.label, curve.ladder.method, "ok", counts_of(points))
 
 
-def rows_of_curve(
-    place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]
-) -> Rows:
+def rows_of_curve(place: Place, curve: Curve, points: Sequence[Mapping[str, Any]], facts: Mapping[str, object]) -> Rows:
     """The rows of a curve, with its fitted order. facts: columns that all its points have in common."""
     facts = {**facts, "order": curve_order(curve.ladder, points)}
     rows = []
@@ -321,9 +319,7 @@ class Measured:
         return rows
 
 
-def measure_points(
-    scenes: PointScenes, points: Sequence[Sequence[Point]], repeats: int, budget_s: float
-) -> Measured:
+def measure_points(scenes: PointScenes, points: Sequence[Sequence[Point]], repeats: int, budget_s: float) -> Measured:
     """Times all points in rounds, and judges the last run of each; in one worker process on one core.
 
     Parameters

@@ -15,13 +15,12 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method, method_names
 from rotor_mbs.runs.freeze import changed_arrays
 from rotor_mbs.runs.read import is_sweep, open_results
-from rotor_mbs.studies.run import OnProgress, ignore_progress
-from rotor_mbs.runs.table import MISSING
 from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.table import MISSING
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.studies.run import run_scenes
+from rotor_mbs.studies.run import OnProgress, ignore_progress, run_scenes
 from rotor_mbs.studies.stored_references import shipped_files
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
@@ -73,7 +72,7 @@ def check_default_set(bounds: Bounds, workers: int, on_progress: OnProgress = ig
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
         report = run_scenes(*default_set(), path, workers=workers, timeout_s=_TIMEOUT_S, on_progress=on_progress)
-        checks += [_required(run.case.scene.name, run.case.method, run.result.message) for run in report.not_computed]
+        checks += [_required(run.label.partition(" ")[0], run.method, run.message) for run in report.not_computed]
         checks += judge_file(path, bounds)
     return checks
 

@@ -29,7 +29,7 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.solution.metrics import HORIZON_GROWTH, horizon
 from rotor_mbs.solution.quantities import Array
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.studies.stored_references import frozen_file, frozen_solution
+from rotor_mbs.studies.stored_references import frozen_solution, shipped_reference
 
 _ACCEPTED = 1e-6  # rad per unit of error amplification: the largest error that a benchmark problem accepts
 
@@ -75,9 +75,8 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
 
 def reference_of(scene: Scene) -> Trajectory:
     """The scene's reference: the shipped one, else computed. Raises StoreError where it does not reach the end."""
-    scene_key = scene_hash(scene)
-    shipped = frozen_file(scene_key) is not None
-    solution = frozen_solution(scene, scene_key)[0] if shipped else solve(REFERENCE, scene, {})
+    is_shipped = shipped_reference(scene_hash(scene)) is not None
+    solution = frozen_solution(scene) if is_shipped else solve(REFERENCE, scene, {})
     if not len(solution.trajectory.time):
         raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'no motion from its start'}")
     return solution.trajectory

@@ -163,5 +163,3 @@ def perform_curve(task: CurveTask) -> Rows:
     rows = measured.rows(points)
     facts = facts_of(short, reference) | {"load_before": os.getloadavg()[0], "pinned_core": -1}
     return rows_of_curve(task.place, curve, rows, facts)
-
-

@@ -429,5 +429,3 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
         methods[scene.name], left_out = able_methods(scene, chosen)
         reasons += [f"{scene.name}: {reason}: {', '.join(methods[scene.name])}", *left_out]
     return methods, reasons
-
-

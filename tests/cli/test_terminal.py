@@ -9,11 +9,11 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import pytest
+from rotor_mbs.runs.case import Case
 from support.commands import rotor_mbs
 
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.runner import Outcome, Result
 from rotor_mbs.scenario.catalogue import find_scenes
 

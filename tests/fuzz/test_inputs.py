@@ -10,16 +10,16 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from rotor_mbs.runs.case import Case
 from support.fuzzing import answers, damaged, scene_text, sweep_text, tried, write
 from support.scenes import paper
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.runs.runner import Job
-from rotor_mbs.runs.table import MISSING
 from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.table import MISSING
 from rotor_mbs.scenario.scene_file import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.status import STATUSES

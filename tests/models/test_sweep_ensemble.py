@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rotor_mbs.runs.sweep_columns import row_type
 from support.scenes import general, paper
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
-from rotor_mbs.runs.sweep_columns import row_type
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import sweep_of
 from rotor_mbs.scenario.variants import Variants

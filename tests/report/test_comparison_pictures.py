@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rotor_mbs.report.pages.comparison_pictures import Mark, parting
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
@@ -15,7 +16,6 @@ from rotor_mbs.methods.catalogue import look_of
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.looks import COLOURS, COORDINATES, GREY, coordinate_look
 from rotor_mbs.report.pages import comparison_pictures as comparisons
-from rotor_mbs.report.pages.comparison_pictures import Mark, parting
 from rotor_mbs.report.pages.index import heat_map, short_sentences
 from rotor_mbs.report.plots.time_histories import Series, errors
 from rotor_mbs.runs.read import open_results

@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from rotor_mbs.runs.results_file import ResultsStore
 from support.checking import failed, judged, results_file
 from support.sweeps import run_local
 
@@ -19,7 +20,6 @@ from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.digests import seal
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results_file import ResultsStore
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep import load_sweep
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from rotor_mbs.runs.case import Case
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.runner import Job, Outcome, Result, execute, in_pool
 
 SCENE = paper("fig08")

@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from rotor_mbs.runs.results_file import ResultsStore, merge
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
@@ -15,7 +16,6 @@ from rotor_mbs.analysis.errata import entries, errata_record
 from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.records import Record, read_records, write_records
-from rotor_mbs.runs.results_file import ResultsStore, merge
 from rotor_mbs.solution.status import code_of
 
 CHECKS = [

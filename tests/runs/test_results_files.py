@@ -10,16 +10,16 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from rotor_mbs.runs.case import Case
+from rotor_mbs.runs.results_file import merge
+from rotor_mbs.runs.write import write_run
 from support.scenes import paper
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.files import attributes_of
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results_file import merge
 from rotor_mbs.runs.runner import Job
-from rotor_mbs.runs.write import write_run
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.studies.run import store_failure

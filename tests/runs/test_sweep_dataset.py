@@ -14,10 +14,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from rotor_mbs.runs.sweep_columns import MISSING, Rows, RunColumns, parameter_name, row_type
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.sweep_columns import MISSING, Rows, RunColumns, parameter_name, row_type
 from rotor_mbs.runs.sweeps import StoredSweep, open_sweep
 from rotor_mbs.scenario.sweep import Sweep, sweep_of
 from rotor_mbs.solution.status import STATUSES, code_of

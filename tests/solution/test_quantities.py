@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rotor_mbs.runs.write import write_run
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
@@ -17,7 +18,6 @@ from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.write import write_run
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.judgement import judge

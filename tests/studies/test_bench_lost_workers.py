@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rotor_mbs.runs.case import Case
 from support.scenes import paper
 
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.records import Record
 from rotor_mbs.runs.runner import Job
 from rotor_mbs.studies import bench

@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from rotor_mbs.runs.timing import conduct, statistics
 from support.cost_scaling import with_blades
 from support.references import reference
 from support.scenes import paper
@@ -25,7 +26,6 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.runs.records import Record, read_records
-from rotor_mbs.runs.timing import conduct, statistics
 from rotor_mbs.solution.metrics import angle_error
 from rotor_mbs.studies.bench_worker import Point, PointTimer, thinned, thinned_reference
 

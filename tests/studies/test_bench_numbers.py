@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rotor_mbs.runs.results_file import merge
 
 from rotor_mbs.analysis.work_precision import (
     cost_exponent,
@@ -32,7 +33,6 @@ from rotor_mbs.report.pages.bench import (
     reach_table,
 )
 from rotor_mbs.runs.records import Record, read_records, write_records
-from rotor_mbs.runs.results_file import merge
 from rotor_mbs.solution.status import STATUSES
 
 

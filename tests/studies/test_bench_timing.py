@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from rotor_mbs.runs.timing import Timings, allot, conduct, statistics
 from support.scenes import paper
 
 from rotor_mbs.methods.base import BuiltItem, Settings
-from rotor_mbs.runs.timing import Timings, allot, conduct, statistics
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory

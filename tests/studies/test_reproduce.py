@@ -9,11 +9,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from rotor_mbs.runs.case import Case
 from support.scenes import PAPER
 
 from rotor_mbs.analysis.errata import entries
 from rotor_mbs.methods.catalogue import is_corrected
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import Job
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rotor_mbs.runs.case import Case
 from support.quadrature import Passage
 from support.references import TAYLOR, reference, run, scene
 
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs.case import Case
 from rotor_mbs.runs.runner import Job
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
 from rotor_mbs.solution.judgement import judge

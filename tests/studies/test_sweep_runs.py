@@ -16,11 +16,11 @@ import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from rotor_mbs.runs.sweep_columns import MISSING, Rows
 from support.sweeps import command, run_local, stored_runs, wait_for_runs, workers_of
 
 from rotor_mbs.cli import main
 from rotor_mbs.runs import files
-from rotor_mbs.runs.sweep_columns import MISSING, Rows
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep, sweep_of

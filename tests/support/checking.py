@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
+from rotor_mbs.runs.results_file import merge
+from rotor_mbs.runs.write import write_run
+
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.checks import Check
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
-from rotor_mbs.runs.results_file import merge
-from rotor_mbs.runs.write import write_run
 from rotor_mbs.scenario.accuracy_bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_hash

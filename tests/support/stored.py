@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.results_file import merge
 from rotor_mbs.runs.write import write_run
+
+from rotor_mbs.errors import StoreError
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.solution import Solution

@@ -120,7 +120,7 @@ def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettin
         # Its angles are unwrapped from row to row, so rows are kept between samples.
         return MultibodySolver(scene, parts, loads, finer, sensor_samples.chain_trajectory, rows_between=True)
 
-    if settings.extrapolation == RICHARDSON:
+    if settings.extrapolation == "richardson":
         return ExtrapolatedSolver(build, settings.newton_relative_tolerance)
     return build()
 
@@ -137,7 +137,7 @@ def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
 
 def _chain_arrays(settings: ChainAlphaSettings | ChainNewmarkSettings) -> tuple[str, ...]:
     """The error that joints make, and where the run is extrapolated a bound on its own error."""
-    return ("constraint_error", "angle_uncertainty") if settings.extrapolation == RICHARDSON else ("constraint_error",)
+    return ("constraint_error", "angle_uncertainty") if settings.extrapolation == "richardson" else ("constraint_error",)
 
 
 def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
