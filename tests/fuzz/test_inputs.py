@@ -1,6 +1,6 @@
 """Random scene files, sweep files and damaged stored files: whatever they hold, a command answers in order.
 
-The long forms (10,000 scenes, 2,000 sweeps, 1,000 damaged files): `pytest -m full tests/fuzz`.
+The long forms (10,000 scenes, 2,000 sweeps, 1,000 damaged files): `pytest -m nightly tests/fuzz`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.run import able_methods, perform_run, selected_methods
 from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
+pytestmark = pytest.mark.full
 METHODS = ("lagrange/dop853", "lagrange/radau", "exudyn_tree/rk44", "exudyn_tree/dopri5", "printed/ode45", "mujoco/rk4")
 METHODS += ("exudyn_chain/generalized_alpha", "lagrange/ode45")
 _LIMIT_S = 0.2
@@ -33,7 +34,7 @@ _LIMIT_S = 0.2
 
 @pytest.mark.parametrize(
     ("first", "count"),
-    [(0, 40), (9119, 1), pytest.param(0, 10_000, marks=pytest.mark.full)],
+    [(0, 40), (9119, 1), pytest.param(0, 10_000, marks=pytest.mark.nightly)],
     ids=["short", "a speed beyond double precision", "long"],
 )
 def test_scenes(tmp_path: Path, first: int, count: int) -> None:
@@ -70,7 +71,7 @@ def _run_fault(scene: object, method: str, folder: Path, statuses: Counter[objec
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 30), pytest.param(0, 2_000, marks=pytest.mark.full)], ids=["short", "long"]
+    ("first", "count"), [(0, 30), pytest.param(0, 2_000, marks=pytest.mark.nightly)], ids=["short", "long"]
 )
 def test_sweeps(tmp_path: Path, first: int, count: int) -> None:
     """Made by a worker process, which is ended where a run never ends; then read, and verified."""
@@ -98,7 +99,7 @@ def test_sweeps(tmp_path: Path, first: int, count: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("first", "count"), [(0, 40), pytest.param(0, 1_000, marks=pytest.mark.full)], ids=["short", "long"]
+    ("first", "count"), [(0, 40), pytest.param(0, 1_000, marks=pytest.mark.nightly)], ids=["short", "long"]
 )
 def test_damaged_files(tmp_path: Path, first: int, count: int) -> None:
     """Checked and reported: a verdict, or one line with the reason; never an exception."""

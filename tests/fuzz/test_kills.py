@@ -1,6 +1,6 @@
 """Commands ended by a signal at random moments: nothing lost, no process and no temporary file left behind.
 
-The long form (300 signals over all commands below): `pytest -m full tests/fuzz/test_kills.py`.
+The long form (300 signals over all commands below): `pytest -m nightly tests/fuzz/test_kills.py`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ from support.scenes import paper
 
 from rotor_mbs.scenario.scene_file import scene_toml
 
-pytestmark = pytest.mark.skipif(not Path("/proc/self/environ").is_file(), reason="needs /proc")
+pytestmark = [
+    pytest.mark.full,
+    pytest.mark.skipif(not Path("/proc/self/environ").is_file(), reason="needs /proc"),
+]
 
 _SWEEP = (
     'title = "s"\nscene = "a.toml"\n[[axis]]\nkey = "initial.angles[1]"\nlinear = {start = 0, end = 0.1, count = 300}\n'
@@ -133,7 +136,7 @@ def _same_arrays(one: Path, other: Path) -> bool:
 
 @pytest.mark.parametrize(
     ("names", "kills"),
-    [(("run",), 2), pytest.param(tuple(COMMANDS), 300, marks=pytest.mark.full)],
+    [(("run",), 2), pytest.param(tuple(COMMANDS), 300, marks=pytest.mark.nightly)],
     ids=["short", "long"],
 )
 def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, ...], kills: int) -> None:
