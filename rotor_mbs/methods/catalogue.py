@@ -1,6 +1,6 @@
 """All methods by the names used everywhere: built-in ones, and those of installed packages (entry points).
 
-A model's code is imported when one of its methods is first asked for; its engine, when a solver is built.
+A model's code is imported when one of its methods is first used; its engine, when a solver is built.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def ladders(names: Sequence[str] = ()) -> tuple[Ladder, ...]:
 
 def label_of(curve: str) -> str:
     """How a method, or a variant of one by the name of its curve, is called; its name where it is not known here."""
-    method = look_up(curve) or _variant(curve)
+    method = _method_or_variant(curve)
     return method.label if method else curve
 
 
@@ -132,8 +132,8 @@ def model_label(model: str) -> str:
     return next((method.model_label for method in methods() if method.model == model), model)
 
 
-def _variant(curve: str) -> Ladder | None:
-    return next((ladder for ladder in ladders() if ladder.curve == curve), None)
+def _method_or_variant(curve: str) -> Method | Ladder | None:
+    return look_up(curve) or next((ladder for ladder in ladders() if ladder.curve == curve), None)
 
 
 def _load(place: str) -> tuple[Method, ...]:

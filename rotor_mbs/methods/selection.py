@@ -40,7 +40,9 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], st
     if decay * scene.duration > _MAX_EXPLICIT_DECAY and decay > 10.0 * swing:
         reason = f"overdamped, fastest decay {decay:.2g} /s: an implicit method beside it"
         return (closed_form, "lagrange/radau"), reason
-    if _is_nearly_singular(scene):
+    # One point-mass blade that may come to a quarter turn of its pitch, on a hub that is light beside it.
+    is_alone = len(scene.blades) == 1 and scene.blades[0].is_point_mass and _leaves_zero_pitch(scene)
+    if is_alone and scene.hub_inertia < _NEARLY_SINGULAR * _rotor_inertia(scene):
         return (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
     if swing > _MAX_EXPLICIT_SWING:
         reason = f"stiff or fast, fastest swing {swing:.2g} rad/s: methods that choose their own step"
@@ -89,13 +91,6 @@ def singular_reason(scene: Scene) -> str:
             "ends; give the hub some inertia"
         )
     return ""
-
-
-def _is_nearly_singular(scene: Scene) -> bool:
-    """One point-mass blade that may come to a quarter turn of its pitch, on a hub that is light beside it."""
-    if len(scene.blades) > 1 or not scene.blades[0].is_point_mass or not _leaves_zero_pitch(scene):
-        return False
-    return scene.hub_inertia < _NEARLY_SINGULAR * _rotor_inertia(scene)
 
 
 def _leaves_zero_pitch(scene: Scene) -> bool:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from support.scenes import paper
 
+from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import find_method, methods
+from rotor_mbs.methods.solve import solve
 
 MADE_UP = """
 from dataclasses import dataclass
@@ -51,12 +53,14 @@ def install(folder: Path, name: str, entry_points: dict[str, str], source: str =
     (about / "entry_points.txt").write_text(f"[rotor_mbs.methods]\n{lines}\n")
 
 
-def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    path = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH", "")]))
-    return subprocess.run(
-        [sys.executable, "-W", "error", *arguments],
-        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path},
-    )  # fmt: skip
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder on sys.path for packages that a test installs."""
+    monkeypatch.syspath_prepend(tmp_path)
+    catalogue._plug_ins.cache_clear()
+    yield tmp_path
+    catalogue._plug_ins.cache_clear()
+    sys.modules.pop("made_up", None)
 
 
 @pytest.mark.parametrize(
@@ -99,49 +103,31 @@ def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
     ]  # fmt: skip
 
 
-def test_a_method_of_another_package_is_found_listed_and_run(tmp_path: Path) -> None:
-    install(tmp_path, "made_up", {"own": "made_up:METHOD"}, MADE_UP)
-    shown = run(tmp_path, "-m", "rotor_mbs", "show", "paper/fig03")
-    assert shown.returncode == 0, shown.stderr
-    assert "made_up/turning" in shown.stdout
-    assert not shown.stderr
-    results = tmp_path / "r.h5"
-    done = run(tmp_path, "-m", "rotor_mbs", "run", "paper/fig03", "-m", "made_up/turning", "-o", str(results))
-    assert "Traceback" not in done.stderr
-    assert "energy drift" in done.stderr or done.returncode == 0
-    code = (
-        "import pathlib, sys\n"
-        "from rotor_mbs.runs.read import open_results\n"
-        "with open_results(pathlib.Path(sys.argv[1])) as results:\n"
-        "    stored = results.scenes['paper/fig03'].runs['made_up/turning']\n"
-        "    print(stored.settings, stored.array('rates')[-1, 0], results.attributes['made_up'])\n"
-    )
-    stored = run(tmp_path, "-c", code, str(results))
-    assert stored.stdout.strip() == "{'rate': 1.0} 1.0 1.0", stored.stderr
+def test_a_method_of_another_package_is_found_listed_and_run(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    install(site, "made_up", {"own": "made_up:METHOD"}, MADE_UP)
+    assert main(["show", "paper/fig03"]) == 0
+    assert "made_up/turning" in capsys.readouterr().out
+    run = solve("made_up/turning", paper("fig03"), {"rate": 2.0})
+    assert run.settings == {"rate": 2.0}
+    assert run.rates[-1, 0] == 2.0
+    assert find_method("made_up/turning").distributions == ("made_up",)
 
 
-def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(tmp_path: Path) -> None:
+def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
+    site: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     entry_points = {"a": "no_such_module:METHOD", "b": "made_up:MISSING", "c": "made_up:np", "d": "made_up:TAKEN"}
-    install(tmp_path, "made_up", {**entry_points, "e": "made_up:METHOD"}, MADE_UP)
-    shown = run(tmp_path, "-m", "rotor_mbs", "show", "paper/fig03")
-    assert shown.returncode == 0, shown.stderr
-    assert "made_up/turning" in shown.stdout
-    lines = shown.stderr.splitlines()
-    assert [line.partition(" left out")[0] for line in lines] == [
+    install(site, "made_up", {**entry_points, "e": "made_up:METHOD"}, MADE_UP)
+    assert "made_up/turning" in {method.name for method in methods()}
+    assert [record.getMessage().partition(" left out")[0] for record in caplog.records] == [
         "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:np",
         "plug-in d of made_up:TAKEN: method lagrange/taylor",
     ]  # fmt: skip
 
 
-def test_reading_a_built_in_method_imports_no_plug_in_and_no_engine(tmp_path: Path) -> None:
-    install(tmp_path, "made_up", {"own": "made_up:METHOD"}, "raise SystemExit('imported')")
-    code = (
-        "import sys\n"
-        "from rotor_mbs.methods.catalogue import find_method\n"
-        "assert find_method('exudyn_tree/rk67').label\n"
-        "print(sorted({'exudyn', 'heyoka', 'scipy', 'h5py', 'made_up'} & set(sys.modules)))\n"
-    )
-    assert run(tmp_path, "-c", code).stdout.strip() == "[]"
+def test_reading_a_built_in_method_imports_no_plug_in(site: Path) -> None:
+    install(site, "made_up", {"own": "made_up:METHOD"}, "raise SystemExit('imported')")
+    assert find_method("exudyn_tree/rk67").label
 
 
 def test_the_next_finer_rung_is_not_the_one_that_was_told_in_three_digits() -> None:

@@ -11,6 +11,7 @@ from support import references
 from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.judgement import judge
@@ -18,8 +19,10 @@ from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of,
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Trajectory
 
-BEST = ("lagrange/taylor", "exudyn_tree/rk67")
-BOUND = {"lagrange/taylor": 1e-10, "exudyn_tree/rk67": 1e-9}  # rad, up to the horizon, on every scene
+BEST = ("lagrange/taylor", "exudyn_tree/rk67", "mujoco/rk4")
+# Per unit of error growth up to the horizon, and of the energy scale; MuJoCo's at four times its default step.
+BOUND = {"lagrange/taylor": (1e-12, 1e-12), "exudyn_tree/rk67": (1e-12, 1e-12), "mujoco/rk4": (1e-10, 1e-8)}
+SETTINGS: dict[str, dict[str, float]] = {"mujoco/rk4": {"step": 1e-3}}
 CHAIN = "exudyn_chain/generalized_alpha"
 
 
@@ -29,9 +32,9 @@ def reference(name: str) -> Trajectory:
 
 @functools.cache
 def run(scene: Scene, method: str) -> Solution:
-    if method == "lagrange/taylor":
-        pytest.importorskip("heyoka")
-    return solve(method, scene, {})
+    if not find_method(method).is_installed:
+        pytest.skip(f"{method} is not installed")
+    return solve(method, scene, SETTINGS.get(method, {}))
 
 
 def cut(name: str, growth: float) -> tuple[Scene, Trajectory]:
@@ -45,24 +48,19 @@ def cut(name: str, growth: float) -> tuple[Scene, Trajectory]:
 @pytest.mark.parametrize("method", BEST)
 @pytest.mark.parametrize("name", PAPER)
 def test_up_to_the_horizon(name: str, method: str) -> None:
-    found = run(paper(name), method)
-    error = angle_error(found.trajectory, reference(name))
-    assert len(error) == paper(name).samples
-    assert error[: horizon_samples(reference(name))].max() <= BOUND[method]
+    """Energy, too, by the fine steps over the whole run; 5e-14 is the worst that was seen."""
+    solution, (angle, energy) = run(paper(name), method), BOUND[method]
+    assert len(solution.time) == paper(name).samples
+    metrics = metrics_of(paper(name), solution.trajectory, reference(name))
+    assert metrics["angle_error_per_growth"] <= angle
+    rows = horizon_samples(reference(name)) if method in SETTINGS else None
+    assert np.abs(solution.energy_error[:rows]).max() <= energy * metrics["energy_scale_J"]
 
 
-@pytest.mark.parametrize("method", BEST)
+@pytest.mark.parametrize("method", BEST[:2])
 def test_the_whole_of_fig08(method: str) -> None:
     """Smooth as long as two blades stay at exactly zero pitch: nothing grows but round-off itself."""
     assert angle_error(run(paper("fig08"), method).trajectory, reference("fig08")).max() <= 1e-12
-
-
-@pytest.mark.parametrize("method", BEST)
-@pytest.mark.parametrize("name", PAPER)
-def test_energy_less_work_is_kept(name: str, method: str) -> None:
-    """Of the energy scale; 5e-14 is the worst that was seen, the rest is for another machine's rounding."""
-    scene = paper(name)
-    assert metrics_of(scene, run(scene, method).trajectory, None)["energy_drift_max"] <= 1e-12
 
 
 def test_the_chain_on_fig08_up_to_its_horizon() -> None:
@@ -79,7 +77,7 @@ def test_the_chain_while_the_growth_is_below_1000(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["fig03", "fig05", "fig06", "fig08", "fig15-100kNm"])
-@pytest.mark.parametrize("method", BEST)
+@pytest.mark.parametrize("method", BEST[:2])
 def test_blades_that_start_at_zero_pitch_stay_there(name: str, method: str) -> None:
     """An invariant set, unstable: one rounding error off it would be 1e30 away by the end."""
     scene = paper(name)

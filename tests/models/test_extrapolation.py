@@ -94,16 +94,6 @@ def test_chaotic_scenes_to_1e_6_before_the_horizon(name: str, step: float, toler
     assert (error <= uncertainty).all()
 
 
-@pytest.mark.full
-def test_fig08_to_1e_9_over_ten_seconds() -> None:
-    """Seven seconds past the time at which the neighbours of its invariant set have left."""
-    found = run(scene("paper/fig08"), ALPHA, **RICHARDSON, newton_relative_tolerance=1e-12)
-    error = errors(found, "paper/fig08")
-    assert len(error) == scene("paper/fig08").samples
-    assert error.max() <= 1e-9
-    assert (error <= found.trajectory.angle_uncertainty).all()
-
-
 def test_every_quantity_is_extrapolated() -> None:
     name = "check/general"
     one = beginning(name, 21)

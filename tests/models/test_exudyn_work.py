@@ -34,14 +34,9 @@ def exact_work(time: Array) -> Array:
     return np.where(time <= 4.0, 0.5 * time**2, 8.0 + 10.0 * (time - 4.0))
 
 
-def test_work_across_a_jump() -> None:
-    time = np.linspace(0.0, 8.0, 81)
-    assert np.abs(work_at_unit_rate(time) - exact_work(time)).max() < 1e-12
-
-
-@pytest.mark.parametrize("rows", [30, 41])
-def test_work_of_a_run_that_stopped_before_a_stretch_of_torque(rows: int) -> None:
-    """Short of the jump, and with its last row on it."""
+@pytest.mark.parametrize("rows", [30, 41, 81])
+def test_work_up_to_a_jump_of_the_torque_and_across_it(rows: int) -> None:
+    """Of a run that stopped short of the jump, with its last row on it, and of a whole one."""
     time = np.linspace(0.0, 8.0, 81)[:rows]
     assert np.abs(work_at_unit_rate(time) - exact_work(time)).max() < 1e-12
 

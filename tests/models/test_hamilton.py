@@ -6,9 +6,8 @@ import random
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
 import pytest
-from support.references import reference, scene
+from support.references import scene
 from support.scenes import general, paper
 
 from rotor_mbs.models.lagrange import hamilton
@@ -86,20 +85,3 @@ def test_both_forms_are_the_same_equations_exactly(one: Scene) -> None:
         expected = derivatives_of_momenta(angles, rates, accelerations(angles, rates, form, loads, sin, cos), form)
         assert [one.value for one in rates_again] == [one.value for one in rates]
         assert [one.value for one in forces] == [one.value for one in expected]
-
-
-def test_a_run_in_momenta_follows_the_reference() -> None:
-    """fig11 to its horizon, by Taylor's method at machine precision."""
-    heyoka = pytest.importorskip("heyoka")
-    one, exact = scene("paper/fig11"), reference("paper/fig11")
-    q, p = heyoka.make_vars(*(f"q{i}" for i in range(4))), heyoka.make_vars(*(f"p{i}" for i in range(4)))
-    form, loads = rotor_form(one), LoadValues(0.0)
-    rates = hamilton.rates(q, p, form, heyoka.sin, heyoka.cos)
-    forces = hamilton.forces(q, rates, form, loads, heyoka.sin, heyoka.cos)
-    angles, start = list(one.initial_angles), list(one.initial_rates)
-    state = [*angles, *hamilton.momenta(angles, start, form, np.sin, np.cos)]
-    integrator = heyoka.taylor_adaptive(
-        [*zip(q, rates, strict=True), *zip(p, forces, strict=True)], state, high_accuracy=True
-    )
-    states = integrator.propagate_grid(exact.time[:617])[-1]
-    assert np.abs(states[:, :4] - exact.angles[:617]).max() <= 1e-9

@@ -1,84 +1,107 @@
-"""Each model runs without the others' engines, the report without any, and importing the package costs little."""
+"""Each model runs without the others' engines, says how to get its own, and importing the package costs little."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
-PREAMBLE = """
-import sys
-for name in {blocked!r}:
-    sys.modules[name] = None
-sys.path.insert(0, {tests!r})
+TESTS = str(Path(__file__).parents[1])
+PACKAGES = {"exudyn_tree": "exudyn", "exudyn_chain": "exudyn", "reference": "lagrange"}
+RUN = """
 from support.scenes import paper
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.methods.catalogue import find_method
 scene = paper("fig08", duration=0.5, samples=11)
 run = solve({method!r}, scene, {{}})
 assert run.integration.success and len(run.trajectory.time) == 11
-assert not any(name.split(".")[0] in {blocked!r} and sys.modules[name] for name in sys.modules)
-{more}
+assert not [name for name in {others!r} if f"rotor_mbs.models.{{name}}" in sys.modules]
 """
 
 
-def python(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+def python(code: str, blocked: tuple[str, ...] = ()) -> subprocess.CompletedProcess[str]:
+    """Runs `code` in a process in which these modules cannot be imported."""
+    start = f"import sys\nsys.modules.update(dict.fromkeys({blocked!r}))\nsys.path.insert(0, {TESTS!r})\n"
+    return subprocess.run([sys.executable, "-W", "error", "-c", start + code], capture_output=True, text=True)
 
 
 @pytest.mark.parametrize(
     ("method", "blocked"),
     [
-        ("lagrange/dop853", ["exudyn", "heyoka", "mujoco"]),
-        ("lagrange/taylor", ["exudyn", "scipy", "mujoco"]),
-        ("reference", ["exudyn", "heyoka", "mujoco"]),
-        ("exudyn_tree/rk67", ["heyoka", "scipy", "mujoco"]),
-        ("exudyn_chain/generalized_alpha", ["heyoka", "scipy", "mujoco"]),
-        ("printed/ode45", ["heyoka", "scipy", "exudyn", "mujoco"]),
-        ("mujoco/rk4", ["heyoka", "scipy", "exudyn"]),
+        ("lagrange/dop853", ("exudyn", "heyoka", "mujoco")),
+        ("lagrange/taylor", ("exudyn", "scipy", "mujoco", "h5py")),
+        ("reference", ("exudyn", "heyoka", "mujoco")),
+        ("exudyn_tree/rk67", ("heyoka", "scipy", "mujoco", "h5py")),
+        ("exudyn_chain/generalized_alpha", ("heyoka", "scipy", "mujoco")),
+        ("printed/ode45", ("heyoka", "scipy", "exudyn", "mujoco")),
+        ("mujoco/rk4", ("heyoka", "scipy", "exudyn")),
     ],
 )
-def test_a_model_runs_without_the_other_engines(
-    method: str, blocked: list[str], request: pytest.FixtureRequest
-) -> None:
+def test_a_model_runs_without_the_other_engines(method: str, blocked: tuple[str, ...]) -> None:
     if method == "lagrange/taylor":
         pytest.importorskip("heyoka")
     if method.startswith("mujoco"):
         pytest.importorskip("mujoco")
-    others = [m for m in ("printed", "lagrange", "exudyn", "mujoco") if m != _package(method)]
-    more = "\n".join(f"assert 'rotor_mbs.models.{other}' not in sys.modules" for other in others)
-    tests = str(request.path.parents[1])
-    done = python(PREAMBLE.format(blocked=blocked, tests=tests, method=method, more=more))
-    assert done.returncode == 0, done.stderr
-
-
-def _package(method: str) -> str:
     model = method.split("/")[0]
-    return {"exudyn_tree": "exudyn", "exudyn_chain": "exudyn", "reference": "lagrange"}.get(model, model)
+    others = [name for name in ("printed", "lagrange", "exudyn", "mujoco") if name != PACKAGES.get(model, model)]
+    done = python(RUN.format(method=method, others=others), blocked)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
 
 
-def test_taylor_without_heyoka_says_how_to_get_it(tmp_path: Path) -> None:
-    code = (
-        "import sys; sys.modules['heyoka'] = None\n"
-        "from rotor_mbs.cli import main\n"
-        "sys.exit(main(['run', 'paper/fig08', '-m', 'lagrange/taylor', '-o', {out!r}]))"
-    )
-    done = python(code.format(out=str(tmp_path / "x.h5")))
+@pytest.mark.parametrize(
+    ("engine", "method", "hint"),
+    [
+        ("heyoka", "lagrange/taylor", "conda-forge"),
+        ("mujoco", "mujoco/rk4", "MuJoCo is not installed: pip install 'rotor_mbs[mujoco]'"),
+    ],
+)
+def test_without_its_engine_a_method_says_how_to_get_it(engine: str, method: str, hint: str, tmp_path: Path) -> None:
+    """And belongs to no default set."""
+    output = str(tmp_path / "x.h5")
+    code = f"""
+from rotor_mbs.cli import main
+from rotor_mbs.methods.catalogue import default_methods, find_method
+assert {method!r} not in default_methods() and not find_method({method!r}).is_installed
+sys.exit(main(["run", "paper/fig08", "-m", {method!r}, "-o", {output!r}]))
+"""
+    done = python(code, (engine,))
     assert done.returncode == 2
-    assert "conda-forge" in done.stderr
+    assert hint in done.stderr
     assert "Traceback" not in done.stderr
+    assert not Path(output).exists()
 
 
-def test_importing_the_package_loads_nothing_heavy() -> None:
-    code = "import sys, rotor_mbs; print(sorted(set(sys.modules) & {'numpy', 'scipy', 'h5py', 'pydantic', 'exudyn'}))"
-    assert python(code).stdout.strip() == "[]"
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("import rotor_mbs", {"numpy", "scipy", "h5py", "pydantic", "exudyn"}),
+        ("from rotor_mbs.cli import main; main(['list'])", {"scipy", "h5py", "pydantic", "exudyn", "matplotlib"}),
+        (
+            "from support.scenes import paper\n"
+            "from rotor_mbs.methods.catalogue import methods\n"
+            "assert all(method.items(paper('fig08')) for method in methods() if method.is_installed)",
+            {"scipy"},
+        ),
+    ],
+    ids=["import", "list", "items of every method"],
+)
+def test_what_needs_no_engine_loads_none(code: str, heavy: set[str]) -> None:
+    heavy = heavy | {"exudyn", "heyoka", "mujoco"}
+    done = python(f"{code}\nprint(sorted(set(sys.modules) & {heavy!r}))")
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
 
 
-def test_listing_loads_no_engine_no_files_and_no_schemas() -> None:
+@pytest.mark.parametrize("is_imported", [True, False])
+@pytest.mark.skipif(find_spec("exudyn") is None, reason="needs Exudyn")
+def test_exudyn_leaves_the_backend_of_matplotlib_alone(is_imported: bool) -> None:
+    """A script, or a notebook, goes on drawing where it drew before a run."""
+    before = "import matplotlib; matplotlib.use('svg')\n" if is_imported else ""
     code = (
-        "import sys; from rotor_mbs.cli import main; main(['list'])\n"
-        "print(sorted(set(sys.modules) & {'scipy', 'h5py', 'pydantic', 'exudyn', 'heyoka', 'mujoco', 'matplotlib'}))"
+        "import rotor_mbs.models.exudyn.adapter\n"
+        "print('matplotlib' in sys.modules and sys.modules['matplotlib'].get_backend())"
     )
-    assert python(code).stdout.splitlines()[-1] == "[]"
+    done = python(before + code)
+    assert done.stdout.strip() == ("svg" if is_imported else "False"), done.stderr

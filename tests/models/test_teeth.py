@@ -66,15 +66,6 @@ def test_a_wrong_offset_is_caught(method: str, share: float) -> None:
     assert judged(replace(scene, blades=wrong), method=method).status == "inaccurate"
 
 
-@pytest.mark.parametrize("method", ["lagrange/dop853", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
-def test_two_blades_with_their_phases_swapped_are_caught(method: str) -> None:
-    """Handing blade 2's pitch to blade 3 and back is the same as mounting them in each other's place."""
-    scene = paper("fig09")
-    q, one, two, three = scene.initial_angles
-    verdict = judged(replace(scene, initial_angles=(q, one, three, two)), method=method)
-    assert verdict.status == "inaccurate"
-
-
 def test_a_missing_sample_and_a_claim_of_success_are_caught() -> None:
     scene = paper("fig09", duration=1.5, samples=151)
     run = solve("lagrange/dop853", scene, {})

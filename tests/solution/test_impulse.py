@@ -36,13 +36,6 @@ def test_tree_and_taylor_balance_to_a_billionth(name: str, method: str) -> None:
     assert metrics.get("linear_impulse_error_max", 0.0) < 1e-9
 
 
-def test_every_run_with_angles_and_rates_has_the_balance_about_the_shaft() -> None:
-    scene = paper("fig08", duration=1.0, samples=101)
-    metrics = metrics_of(scene, solve("lagrange/dop853", scene, {}).trajectory, None)
-    assert metrics["angular_impulse_error_max"] < 1e-12
-    assert "linear_impulse_error_max" not in metrics
-
-
 def _turning(scene: Scene, angle) -> Trajectory:
     """The rotor at `angle` (n,) rad of the samples' times; pitches stay at zero."""
     time = np.linspace(0.0, scene.duration, scene.samples)

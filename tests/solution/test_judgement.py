@@ -5,7 +5,6 @@ The bounds are written down here a second time: one that is widened tenfold in t
 
 from __future__ import annotations
 
-import threading
 import time
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,9 +21,7 @@ from rotor_mbs.models.exudyn import adapter, chain, sensor_samples
 from rotor_mbs.models.exudyn.methods import MultibodySolver
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution import judgement
 from rotor_mbs.solution.judgement import Judgement, energy_conditioning, judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
@@ -120,12 +117,26 @@ def caught(one: Scene, found: Solution, exact: Trajectory | None = None) -> Judg
     return verdict
 
 
-def test_rk44_on_a_bearing_of_1e12() -> None:
-    wrong(scene("stiff/bearing-1e12"), "exudyn_tree/rk44")
+RK44, ALPHA = "exudyn_tree/rk44", "exudyn_tree/generalized_alpha"
+CLAIMS = {
+    "a bearing of 1e12": (scene("stiff/bearing-1e12"), RK44, None),
+    "a rate of 1e200": (scene("extreme/rate-1e200"), RK44, None),
+    "a stiffness that is no number": (
+        replace(scene("stiff/bearing-1e6"), bearing_stiffness=(np.nan, 0.0, 0.0)), RK44, None
+    ),
+    "an angle that is no number": (replace(paper("fig05"), initial_angles=(np.nan, 0.0, 0.0, 0.0)), RK44, None),
+    "the singular pitch": (scene("extreme/singular-one-blade"), RK44, None),
+    "ten steps a second": (paper("fig14c", samples=101), RK44, 0.1),
+    "a step of ten seconds": (paper("fig11", samples=2), RK44, 10.0),
+    "an implicit step of ten seconds": (paper("fig11", samples=2), ALPHA, 10.0),
+}  # fmt: skip
 
 
-def test_rk44_with_a_rate_of_1e200() -> None:
-    wrong(scene("extreme/rate-1e200"), "exudyn_tree/rk44")
+@pytest.mark.parametrize("name", CLAIMS)
+def test_an_engines_claim_of_success_that_is_false(name: str) -> None:
+    given, method, step = CLAIMS[name]
+    exact = reference(given.name) if name == "the singular pitch" else None
+    wrong(given, method, exact, **({} if step is None else {"step": step}))
 
 
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-10])
@@ -141,14 +152,6 @@ def test_dopri5_with_equal_tolerances_at_rates_of_minus_one(tolerance: float, in
     verdict = wrong(one, "exudyn_tree/dopri5", exact, **equal)
     assert verdict.metrics["angle_error_max"] > 2.0 * np.pi
     assert judge(one, run(one, "exudyn_tree/dopri5"), exact).status == "ok"  # with a relative tolerance of 0
-
-
-def test_a_stiffness_that_is_no_number() -> None:
-    wrong(replace(scene("stiff/bearing-1e6"), bearing_stiffness=(np.nan, 0.0, 0.0)), "exudyn_tree/rk44")
-
-
-def test_an_initial_angle_that_is_no_number() -> None:
-    wrong(replace(paper("fig05"), initial_angles=(np.nan, 0.0, 0.0, 0.0)), "exudyn_tree/rk44")
 
 
 @pytest.mark.parametrize("method", ["exudyn_tree/rk44", "exudyn_tree/generalized_alpha"])
@@ -181,10 +184,6 @@ def test_a_body_that_falls_free_of_its_joints() -> None:
     assert verdict.metrics["constraint_error_max"] == pytest.approx(0.5 * one.gravity, rel=1e-9)
 
 
-def test_rk44_through_the_singular_pitch() -> None:
-    wrong(scene("extreme/singular-one-blade"), "exudyn_tree/rk44", reference("extreme/singular-one-blade"))
-
-
 def test_nobody_gets_through_a_singularity() -> None:
     """One blade without hub inertia: whatever a method makes of it, it is not ok; the implicit ones step over it."""
     one = scene("extreme/singular-one-blade")
@@ -205,26 +204,11 @@ def test_a_start_without_inertia_is_singular_for_all() -> None:
         assert judge(one, run(one, method), reference(one.name)).status == "singular"
 
 
-def test_ten_steps_a_second_end_without_a_number() -> None:
-    """RK44 on Fig. 14c, a motion with fast pitches: True with NaN."""
-    one = paper("fig14c", samples=101)
-    assert wrong(one, "exudyn_tree/rk44", step=0.1).status == "diverged"
-
-
 def test_ten_steps_a_second_are_told_apart_from_nonsense() -> None:
     """On Fig. 11 they cost RK44 digits (energy off by less than a percent): inaccurate, but a motion like it."""
     one = paper("fig11", samples=101)
     verdict = judge(one, solve("exudyn_tree/rk44", one, {"step": 0.1}), None)
     assert (verdict.status, verdict.false_success) == ("inaccurate", False)
-
-
-@pytest.mark.parametrize("method", ["exudyn_tree/rk44", "exudyn_tree/generalized_alpha"])
-def test_one_step_of_ten_seconds(method: str) -> None:
-    """True with angles of thousands or millions of radians."""
-    one = paper("fig11", samples=2)
-    found = solve(method, one, {"step": 10.0})
-    assert np.abs(found.trajectory.angles).max() > 1e3
-    caught(one, found)
 
 
 def test_a_run_that_hangs_is_ended_with_what_it_reached() -> None:
@@ -264,21 +248,6 @@ def test_a_limit_costs_no_look_at_the_clock_after_every_step(monkeypatch: pytest
     assert np.array_equal(solver.observe().angles, free.angles)
 
 
-def test_where_there_is_no_signal_the_clock_is_read() -> None:
-    """Signals reach the main thread alone."""
-    one = replace(scene("extreme/pendulum-million"), duration=5e5, samples=200_001)
-    solver, found = find_method("lagrange/taylor").build(one, find_method("lagrange/taylor").settings()), []
-
-    def work() -> None:
-        with time_limit(0.3):
-            found.append(solver.integrate())
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert found[0].out_of_time
-
-
 def test_the_limit_reaches_plain_python() -> None:
     with pytest.raises(OutOfTimeError), time_limit(0.05):
         time.sleep(5.0)
@@ -302,30 +271,3 @@ def test_who_knows_that_time_is_up_is_not_interrupted_and_the_next_run_starts_af
                 pass
         time.sleep(0.1)  # here the signal arrives, outside `polled`
     assert not is_over()
-
-
-_CLASSIFYING = [
-    bound for bound in load_bounds().entries if bound.scenes == "*" and bound.check in ("agreement", "energy", "gap")
-]
-
-
-@pytest.mark.parametrize("bound", _CLASSIFYING, ids=lambda bound: f"{bound.check}-{bound.method}")
-def test_a_bound_of_the_classification_widened_tenfold_is_found(bound: Bound, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What this file requires of the shipped numbers does not hold with one of them widened."""
-    wide = [replace(one, value=10.0 * one.value) if one == bound else one for one in load_bounds().entries]
-    requirement = (
-        test_an_open_joint_is_caught if bound.check == "gap" else test_the_bounds_are_where_they_are_said_to_be
-    )
-    methods = [name for name in method_names(is_corrected=True) if load_bounds().find(bound.check, name) == bound]
-    assert methods
-    judgement.allowed_of.cache_clear()
-    for method in methods:
-        requirement(method)
-    monkeypatch.setattr(judgement, "shipped_bounds", lambda: Bounds(wide))
-    judgement.allowed_of.cache_clear()
-    try:
-        for method in methods:
-            with pytest.raises(AssertionError):
-                requirement(method)
-    finally:
-        judgement.allowed_of.cache_clear()

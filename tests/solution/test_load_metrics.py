@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
-from support.checking import results_file
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError
@@ -54,29 +51,6 @@ def test_a_load_that_is_off_is_inaccurate(run: Solution, load: str) -> None:
         assert load.replace("_", " ") in found.message
         assert found.metrics[metric] == pytest.approx(share, rel=0.1)
         assert found.false_success is is_false
-
-
-def test_loads_as_xarray_have_units_and_labels(run: Solution) -> None:
-    pytest.importorskip("xarray")
-    data = run.to_xarray()
-    along = data.blade_root_force.sel(blade=2, axis="z")
-    assert along.attrs["units"] == "N"
-    assert np.array_equal(along.values, run.blade_root_force[:, 1, 2])
-    assert data.shaft_moment.dims == ("time", "axis")
-    assert data.pitch_actuator_moment.attrs["units"] == "N m"
-
-
-def test_loads_are_stored_with_units_dimensions_and_metrics(tmp_path: Path) -> None:
-    path = results_file(tmp_path / "r.h5", ["check/loads"], ["lagrange/dop853"])
-    with h5py.File(path) as file:
-        group = file["check/loads/lagrange/dop853"]
-        for load in LOADS:
-            dataset = group[load.name]
-            assert dataset.attrs["units"] == load.units
-            assert [scale.keys()[0] for scale in dataset.dims] == list(load.dimensions)
-            assert group.attrs[f"{load.name}_error"] < 1e-11
-            assert 0.0 <= group.attrs[f"{load.name}_max_time_s"] <= 1.0
-        assert group.attrs["linear_impulse_error_max"] < 1e-9
 
 
 def test_loads_are_drawn_from_python() -> None:

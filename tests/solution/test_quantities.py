@@ -10,15 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rotor_mbs.runs.write import write_run
 from support.scenes import paper
-from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.quantities import BUILT_IN, Quantity
@@ -64,15 +60,9 @@ def moved(scene: Scene, pitch: float) -> Trajectory:
 
 @pytest.mark.usefixtures("plug_in")
 @pytest.mark.parametrize("method", ["lagrange/dop853", "exudyn_tree/rk44", "printed/ode45"])
-def test_a_quantity_of_another_package_is_computed_for_every_method_and_stored(method: str, tmp_path: Path) -> None:
+def test_a_quantity_of_another_package_is_computed_for_every_method(method: str) -> None:
     run = solve(method, ASKED, {})
     np.testing.assert_array_equal(run["pitch_squares"], run.angles[:, 1:] ** 2)
-    write_run(tmp_path / "a.h5", scene_hash(ASKED), run, {"status": "ok", "message": ""})
-    with open_results(tmp_path / "a.h5") as results:
-        stored = results.scenes[ASKED.name].runs[method]
-        np.testing.assert_array_equal(stored.array("pitch_squares"), run.pitch_squares)
-        dataset = results.root[f"{ASKED.name}/{method}/pitch_squares"]
-        assert (dataset.attrs["units"], dataset.dims[1].keys()) == ("rad2", ["blade"])
 
 
 @pytest.mark.usefixtures("plug_in")
@@ -146,18 +136,6 @@ def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(InputError, match=r'pip install "rotor_mbs\[xarray\]"'):
         solve("lagrange/dop853", SCENE, {}).to_xarray()
-
-
-def test_a_stored_run_comes_back_as_it_was(tmp_path: Path) -> None:
-    scene = paper("fig08")
-    made = [Made(scene, name, rotor(np.sin)) for name in ("reference", "lagrange/taylor")]
-    with open_results(store(tmp_path / "r.h5", made)) as results:
-        stored = results.scenes[scene.name]
-        found = rehydrate(stored, stored.runs["lagrange/taylor"])
-    assert found.faults == []
-    assert found.run is not None
-    for name, values in made[1].run().quantities.items():
-        np.testing.assert_array_equal(found.run[name], values)
 
 
 def test_codes_of_statuses_are_read_by_their_meanings() -> None:

@@ -42,6 +42,7 @@ def test_a_wrong_motion_without_energy_and_reference_is_unchecked() -> None:
     assert "the horizon is before the second sample" in verdict.message
 
 
+@pytest.mark.full
 def test_two_samples_a_minute_apart_without_energy_are_unchecked() -> None:
     """The reference is past its horizon at the second sample; with energies the balance decides."""
     scene = paper("fig11", duration=60.0, samples=2, outputs=("angles", "rates"))

@@ -67,43 +67,42 @@ def lanes() -> int:
 
 
 def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
-    """Runs of all `scenes`, which have the same number of blades and samples and the same outputs, loads not among
-    them.
+    """Run all scenes; a run that breaks off is in the result, cut and with its reason.
 
-    Raises MethodRefusal where heyoka is not installed. A run that breaks off is in the result, cut and with its reason.
+    Parameters
+    ----------
+    scenes : with the same number of blades and samples and the same outputs, loads not among them
+    tolerance : of the local error, absolute and relative
+
+    Raises
+    ------
+    MethodRefusal
+        Where heyoka is not installed.
     """
     block = empty_block(scenes)
     rotors: dict[tuple[object, ...], _RotorNumbers] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
     for i, scene in enumerate(scenes):
         if not scene.has_constant_loads:
-            _solve_alone(block, i, scene, tolerance)
+            # It is integrated from one kink of its loads to the next, which are at other times in each run.
+            run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
+            n = len(run.trajectory.time)
+            for name, values in block.quantities.items():
+                values[i, :n] = getattr(run.trajectory, name)
+            block.end(i, run.integration, n)
             continue
         key = scene.rotor_key
         if key not in rotors:
-            rotors[key] = _rotor_numbers(scene)
+            parameters = Parameters()
+            equation_numbers(scene, parameters)
+            _tip_numbers(scene, parameters)
+            structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
+            rotors[key] = array_of(parameters.values, quad=False), structure
         groups.setdefault(rotors[key][1], []).append(i)
     for places in groups.values():
         of_group = [scenes[i] for i in places]
         _propagate(block, _Group(places, of_group, [rotors[scene.rotor_key] for scene in of_group], tolerance))
     return block
-
-
-def _solve_alone(block: RunBlock, i: int, scene: Scene, tolerance: float) -> None:
-    """A load that changes is integrated segment by segment, which runs side by side would do at different times."""
-    run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
-    n = len(run.trajectory.time)
-    for name, values in block.quantities.items():
-        values[i, :n] = getattr(run.trajectory, name)
-    block.end(i, run.integration, n)
-
-
-def _rotor_numbers(scene: Scene) -> _RotorNumbers:
-    parameters = Parameters()
-    equation_numbers(scene, parameters)
-    _tip_numbers(scene, parameters)
-    structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
-    return array_of(parameters.values, quad=False), structure
 
 
 def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:

@@ -93,8 +93,8 @@ class OdeSolver:
 def work_unit(scene: Scene) -> float:
     """J of the work variable: the power of two below the scene's energies and torques, at least 1.
 
-    In J it would be held to an absolute tolerance far below its own rounding: where the drive balances megawatts of
-    damping, no step is short enough for that.
+    In J its absolute tolerance would be far below its own rounding: where the drive balances megawatts of damping, no
+    step is short enough for that.
     """
     form, columns = rotor_form(scene), scene.moving_coordinates
     angles, rates = ([values[i] for i in columns] for values in (scene.initial_angles, scene.initial_rates))
@@ -106,7 +106,7 @@ def work_unit(scene: Scene) -> float:
 
 
 def scipy_integrator(name: str, relative_tolerance: float, absolute_tolerance: float) -> Integrator:
-    """SciPy's solver `name`, step by step, samples by its own interpolant; asks for the time limit between steps."""
+    """SciPy's solver `name`, step by step, samples by its own interpolant; it ends at the time limit."""
     import scipy.integrate
 
     solver_type = getattr(scipy.integrate, name)

@@ -191,7 +191,15 @@ def mjcf_file(scene: Scene) -> str:
     steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
     root, has_loads = model(scene, "rk4", spacing / steps), bool(loads_of(scene))
     root.insert(0, ET.Comment(_header(scene, steps, has_loads)))
-    _add_shapes(root, scene)
+    # A capsule from the hub to each tip, without mass or contact.
+    reach = max(math.hypot(*blade.tip) for blade in scene.blades)
+    bodies = {body.get("name"): body for body in root.iter("body")}
+    for number, blade in enumerate(scene.blades, start=1):
+        if any(blade.tip):
+            ET.SubElement(
+                bodies[f"blade {number}"], "geom", type="capsule", fromto=numbers(0.0, 0.0, 0.0, *blade.tip),
+                size=numbers(0.01 * reach), mass="0", contype="0", conaffinity="0",
+            )  # fmt: skip
     pieces, moving = load_segments(scene), scene.moving_coordinates
     if has_loads:
         custom = ET.SubElement(root, "custom")
@@ -223,15 +231,3 @@ def _header(scene: Scene, steps: int, has_loads: bool) -> str:
     lines.append("Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about the centre of mass.")
     # Two hyphens end a comment.
     return "\n  " + "\n  ".join(line.replace("--", "- -") for line in lines) + "\n"
-
-
-def _add_shapes(root: ET.Element, scene: Scene) -> None:
-    """A capsule from the hub to each tip, without mass or contact."""
-    reach = max(math.hypot(*blade.tip) for blade in scene.blades)
-    bodies = {body.get("name"): body for body in root.iter("body")}
-    for number, blade in enumerate(scene.blades, start=1):
-        if any(blade.tip):
-            ET.SubElement(
-                bodies[f"blade {number}"], "geom", type="capsule", fromto=numbers(0.0, 0.0, 0.0, *blade.tip),
-                size=numbers(0.01 * reach), mass="0", contype="0", conaffinity="0",
-            )  # fmt: skip
