@@ -21,8 +21,7 @@ from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
-from rotor_mbs.runs.files import DIGESTS
-from rotor_mbs.runs.files import reading
+from rotor_mbs.runs.files import DIGESTS, reading
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes

@@ -125,44 +125,43 @@ def test_captions_are_not_cut_off_and_first_columns_stay_on_a_telephone(page: Pa
         assert all(abs(way) < 2 for way in moved), path.name
 
 
-def _scene(pages: list[Path]) -> Path:
-    return next(path for path in pages if path.name == "paper-fig11.html")
+def open_viewer(page: Page, pages: list[Path], width: int = 1440) -> bytes:
+    """A scene's page, with the viewer in sight and its keyboard; what is seen."""
+    page.open(next(path for path in pages if path.name == "paper-fig11.html"), width)
+    page.run("document.querySelector('.viewer').scrollIntoView(); document.querySelector('.viewer canvas').focus()")
+    return settled(page)
+
+
+def settled(page: Page) -> bytes:
+    """What is seen a moment later."""
+    time.sleep(0.3)
+    return page.picture()
 
 
 @pytest.mark.parametrize("width", SIZES)
 def test_the_viewer_moves_and_stops(page: Page, pages: list[Path], width: int) -> None:
-    page.open(_scene(pages), width)
-    page.run("document.querySelector('.viewer').scrollIntoView()")
-    time.sleep(0.3)
-    still = page.picture()
-    time.sleep(0.3)
-    assert page.picture() == still  # nothing moves before one asks
+    still = open_viewer(page, pages, width)
+    assert settled(page) == still  # nothing moves before one asks
     page.run("document.querySelector('[data-part=play]').click()")
-    time.sleep(0.6)
-    moving = page.picture()
+    moving = settled(page)
     assert moving != still
     page.run("document.querySelector('[data-part=play]').click()")
-    time.sleep(0.3)
-    stopped = page.picture()
-    time.sleep(0.3)
-    assert page.picture() == stopped != moving
+    stopped = settled(page)
+    assert settled(page) == stopped != moving
     assert page.faults == []
 
 
 def test_the_viewer_obeys_the_keyboard(page: Page, pages: list[Path]) -> None:
-    page.open(_scene(pages), 1440)
-    page.run("document.querySelector('.viewer').scrollIntoView(); document.querySelector('.viewer canvas').focus()")
     clock = "document.querySelector('[data-part=clock]').textContent"
-    seen = [page.picture()]
+    seen = [open_viewer(page, pages)]
     for key, number in (("ArrowLeft", 37), ("ArrowUp", 38), ("End", 35)):
         page.key(key, number=number)
-        time.sleep(0.2)
-        seen.append(page.picture())
+        seen.append(settled(page))
     assert len(set(seen)) == len(seen)
     assert page.run(clock) == "10.00 s"
     page.key("Home", number=36)
     page.key(".", "Period", 190)
-    time.sleep(0.2)
+    settled(page)
     step = page.run("JSON.parse(document.querySelector('.viewer script').textContent).step")
     assert page.run(clock) == f"{step:.2f} s"  # one frame
 
@@ -175,10 +174,10 @@ _LINES = """[...document.querySelectorAll('figure>svg:has(>.now)')].map(svg => {
 
 
 def test_a_line_in_the_time_plots_follows_the_viewer(page: Page, pages: list[Path]) -> None:
-    page.open(_scene(pages), 1440)
+    open_viewer(page, pages)
     height = page.run("document.documentElement.scrollHeight")
     assert {seen for seen, _ in page.run(_LINES)} == {"hidden"}
-    page.run("document.querySelector('.viewer canvas').focus(); document.querySelector('[data-part=time]').value = 600;"
+    page.run("document.querySelector('[data-part=time]').value = 600;"
              "document.querySelector('[data-part=time]').dispatchEvent(new Event('input'))")  # fmt: skip
     time.sleep(0.3)
     found = page.run(_LINES)  # at 6 s, where the tick of 6 s is
@@ -257,10 +256,7 @@ def test_drawn_angles_are_those_of_the_data_and_fast_paths_are_round(
 
 @pytest.mark.parametrize("how", ["mouse", "touch"])
 def test_the_view_turns_by_dragging(page: Page, pages: list[Path], how: str) -> None:
-    page.open(_scene(pages), 390)
-    page.run("document.querySelector('.viewer').scrollIntoView()")
-    time.sleep(0.3)
-    still = page.picture()
+    still = open_viewer(page, pages, 390)
     x, y = page.run("(() => { const b = document.querySelector('.viewer canvas').getBoundingClientRect();"
                     "return [b.left + 150, b.top + 120]; })()")  # fmt: skip
     if how == "mouse":
@@ -276,28 +272,23 @@ def test_the_view_turns_by_dragging(page: Page, pages: list[Path], how: str) -> 
         for kind, points in (("touchStart", [x]), ("touchMove", [x + 40]), ("touchMove", [x + 90]), ("touchEnd", [])):
             page.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": at, "y": y} for at in points])
         page.call("Emulation.setTouchEmulationEnabled", enabled=False)
-    time.sleep(0.3)
-    assert page.picture() != still
+    assert settled(page) != still
 
 
 def test_overlaid_and_magnified_pictures_differ(page: Page, pages: list[Path]) -> None:
-    page.open(_scene(pages), 1440)
-    page.run("document.querySelector('.viewer').scrollIntoView()")
-    time.sleep(0.3)
-    seen = [page.picture()]
+    seen = [open_viewer(page, pages)]
     for part, value in (("mode", "over"), ("offset", "5"), ("time", "500")):
         page.run(
             f"(() => {{ const e = document.querySelector('[data-part={part}]'); e.value = '{value}';"
             "e.dispatchEvent(new Event('input')); })()"
         )
-        time.sleep(0.3)
-        seen.append(page.picture())
+        seen.append(settled(page))
     assert len(set(seen)) == len(seen)
     assert page.run("document.querySelector('[data-part=times]').textContent") == "×5"
 
 
 def test_every_control_is_reached_by_the_tab_key(page: Page, pages: list[Path]) -> None:
-    page.open(_scene(pages), 1440)
+    open_viewer(page, pages)
     reached = set()
     for _ in range(60):
         page.key("Tab", number=9)
@@ -307,11 +298,12 @@ def test_every_control_is_reached_by_the_tab_key(page: Page, pages: list[Path]) 
 
 def test_without_scripts_and_in_print_the_still_picture_stands(page: Page, pages: list[Path]) -> None:
     page.call("Emulation.setScriptExecutionDisabled", value=True)
-    page.open(_scene(pages), 390)
+    scene = next(path for path in pages if path.name == "paper-fig11.html")
+    page.open(scene, 390)
     page.call("Emulation.setScriptExecutionDisabled", value=False)
     assert page.run("document.querySelector('.viewer').offsetHeight") == 0
     assert page.run("document.querySelector('#paths figure svg').getBoundingClientRect().height") > 100
-    page.open(_scene(pages), 1440)
+    page.open(scene, 1440)
     assert page.run("document.querySelector('.viewer').offsetHeight") > 100
     page.call("Emulation.setEmulatedMedia", media="print")
     assert page.run("document.querySelector('.viewer').offsetHeight") == 0

@@ -39,7 +39,7 @@ def test_an_animation_moves_for_as_long_as_the_scene(results: Path, tmp_path: Pa
             seen.append(np.asarray(image.convert("RGB"), dtype=int))
             if frame:
                 assert image.info["duration"] == 50
-    halves = [np.hsplit(one, 2) for one in seen]
+    halves = [np.hsplit(picture, 2) for picture in seen]
     assert (halves[0][1] != halves[1][1]).any()
     assert (halves[1][1] != halves[2][1]).any()
     # The printed run ends at half time: its rotor stands still from then on, only the text above changes.

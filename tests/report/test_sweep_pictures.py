@@ -15,7 +15,15 @@ from support.sweeps import made_sweep
 from rotor_mbs.analysis.sweep_numbers import Spread, StabilityMap, lyapunov_exponent, spread_of, stability_map
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core.elements import Section
-from rotor_mbs.report.pages.sweep import map_panels, response, save_picture, spread_panels, sweep_page
+from rotor_mbs.report.pages.sweep import (
+    distribution,
+    field_name,
+    map_panels,
+    response,
+    save_picture,
+    spread_panels,
+    sweep_page,
+)
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 
@@ -54,6 +62,7 @@ def test_what_does_not_grow_is_told() -> None:
         lyapunov_exponent(np.linspace(0.0, 1.0, 100), np.ones(100))
 
 
+@pytest.mark.full
 def test_nearby_starts_of_fig11_part_as_the_variational_equations_say(tmp_path: Path) -> None:
     heyoka_reference = pytest.importorskip("rotor_mbs.models.lagrange.reference")
     pytest.importorskip("heyoka")
@@ -128,6 +137,21 @@ def test_the_figures_show_what_was_found() -> None:
         assert (panels.axes[0].get_xlabel(), panels.axes[0].get_ylabel(), has_line) == ("kx (rad)", "ky (N)", crosses)
 
 
+def test_a_distribution_rises_from_none_to_all_runs() -> None:
+    (axes,) = distribution(np.array([3.0, 1e-3, 10.0, np.nan, 0.1]), "error (rad)", logarithmic=True).axes
+    x, y = axes.get_lines()[0].get_xydata().T
+    assert x.tolist() == [1e-3, 0.1, 3.0, 10.0]
+    assert (y[0], y[-1]) == (0.0, 100.0)
+    assert axes.get_xscale() == "log"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("error (rad)", "share of runs (%)")
+
+
+def test_keys_are_named_as_in_the_field() -> None:
+    keys = ("initial.angles[0]", "initial.rates[2]", "bearing.stiffness")
+    names = ["initial rotor angle", "initial pitch rate of blade 2", "bearing stiffness"]
+    assert [field_name(key) for key in keys] == names
+
+
 def test_a_map_needs_two_axes_and_a_pitch_that_can_grow(tmp_path: Path) -> None:
     _, output = _run(
         tmp_path,
@@ -145,7 +169,7 @@ def test_a_sweep_without_a_picture_of_its_own_shows_the_pitch_over_what_was_vari
     )
     sweep = StoredSweep(output)
     page = sweep_page(sweep)
-    section = page["picture"]
+    section = page["plots"]
     assert isinstance(section, Section)
     (shown,) = section.pictures
     assert "bearing stiffness" in shown.caption

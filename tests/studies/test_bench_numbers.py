@@ -28,7 +28,6 @@ from rotor_mbs.report.pages.bench import (
     csv_text,
     diagram,
     failure_table,
-    omissions,
     overview_table,
     reach_table,
 )
@@ -174,8 +173,6 @@ def test_what_a_method_cannot_reach_is_not_what_it_was_not_asked_to() -> None:
     for row, text, note in ((1, "–", "1.0×10⁻⁴ rad at best"), (2, "not measured", "2 finer settings left out")):
         for cell in table.rows[row][2:]:
             assert (cell.text, cell.note.replace("\N{NO-BREAK SPACE}", " ")) == (text, note)
-    assert omissions([FAST, whole]) == []
-    assert omissions([FAST, whole, cut])[0].startswith("The budget left out 2 of 9 settings")
 
 
 def test_the_overview_names_the_fastest_and_the_next() -> None:

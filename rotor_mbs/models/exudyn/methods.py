@@ -104,7 +104,7 @@ def _build_tree(scene: Scene, settings: schemes.SchemeSettings) -> Solver:
 
 def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettings) -> Solver:
     from rotor_mbs.models.exudyn import chain, sensor_samples
-    from rotor_mbs.models.exudyn.extrapolation import RICHARDSON, ExtrapolatedSolver
+    from rotor_mbs.models.exudyn.extrapolation import ExtrapolatedSolver
     from rotor_mbs.models.exudyn.moments import Loads
 
     scheme = _scheme(scene, settings)

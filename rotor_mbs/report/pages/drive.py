@@ -61,7 +61,7 @@ def drive_section(stored: StoredScene, run: StoredRun | None) -> Section:
         legend += [LegendEntry(f"pitch {i + 1}", coordinate_look(1 + i)) for i in range(len(scene.blades))]
         if any(scene.bearing_rest):
             legend.append(LegendEntry("command", _COMMAND))
-    table = PageTable("", ("", "Largest", "At the end", "Work"), rows, numeric=(1, 2, 3))
+    table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows, numeric=(1, 2, 3))
     return Section(pictures, legend, [table] if rows else [])
 
 

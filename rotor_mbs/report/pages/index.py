@@ -107,7 +107,7 @@ def _paper_table(facts: Finding, shares: ClaimShares | None) -> PageTable:
         rises = f"Scenes in which energy rises by more than {ENERGY_RISE:g} of its scale without work"
         rows.append([rises, _of(facts.energy.rises), ""])
         rows.append(["Largest spurious energy gain of a complete run", prefixed(gain, "J"), ""])
-    return PageTable("", ("", "As printed", "Corrected model"), rows, numeric=(1, 2))
+    return PageTable("", ("Result", "As printed", "Corrected model"), rows, numeric=(1, 2))
 
 
 def _of(tally: Tally | None) -> str:

@@ -1,0 +1,277 @@
+"""What is drawn, from plain arrays: data, axes, labels, colours; pictures as SVG; numbers as text."""
+
+from __future__ import annotations
+
+import re
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.lines import Line2D
+from support.stored import rotor
+
+from rotor_mbs.analysis.campbell import FloquetTable
+from rotor_mbs.methods.catalogue import ladders, method_names
+from rotor_mbs.report.core import canvas, numbers, svg
+from rotor_mbs.report.core.canvas import panels
+from rotor_mbs.report.core.elements import MARKS
+from rotor_mbs.report.core.looks import COLOURS, GREY, PALETTE, Look, class_of, coordinate_look, look_of
+from rotor_mbs.report.pages import scene as scene_page
+from rotor_mbs.report.pages.index import energy_of_scenes
+from rotor_mbs.report.pages.modes import multipliers
+from rotor_mbs.report.pages.scene import Mark
+from rotor_mbs.report.plots import time_histories as figures
+from rotor_mbs.report.plots.paths import paths, projected
+from rotor_mbs.report.plots.time_histories import Series
+
+LOOK = Look("#0072b2", "-", "o")
+PRINTED, CORRECTED = look_of("printed/ode45"), look_of("lagrange/taylor")
+SWING = rotor(lambda t: 0.5 + 0.31 * t, np.sin, np.cos, np.sin)
+TIME = np.linspace(0.0, 10.0, 1001)
+
+
+def test_motion_gives_rotor_and_pitches_axes_of_their_own() -> None:
+    time = TIME[::4]
+    angles, rates = SWING(time), np.cos(SWING(time))
+    picture = figures.motion(time, angles, rates, horizon=6.0)
+    assert [axes.get_ylabel() for axes in picture.axes] == [
+        "rotor angle (rad)", "pitch angle (rad)", "rotor rate (rad/s)", "pitch rate (rad/s)",
+    ]  # fmt: skip
+    for place, (values, first) in enumerate([(angles, 0), (angles, 1), (rates, 0), (rates, 1)]):
+        *lines, mark = picture.axes[place].get_lines()
+        columns = values[:, :1] if first == 0 else values[:, 1:]
+        for i, (line, column) in enumerate(zip(lines, columns.T, strict=True)):
+            np.testing.assert_array_equal(line.get_xydata(), np.column_stack([time, column]))
+            assert line.get_color() == coordinate_look(first + i).colour
+        assert mark.get_xdata() == [6.0, 6.0]
+    assert len(figures.motion(TIME, SWING(TIME), None).axes) == 2
+    assert len(figures.motion(TIME, SWING(TIME)[:, :1], None).axes) == 1
+
+
+def test_thinning_loses_no_peak() -> None:
+    values = np.sin(np.arange(100_000.0))
+    values[54_321], values[77_777] = 9.0, -8.0
+    time, thin = figures.thin(np.arange(100_000.0), values)
+    assert len(time) <= 1001
+    assert (thin.max(), thin.min()) == (9.0, -8.0)
+    assert time[thin.argmax()] == 54_321.0
+    assert (np.diff(time) > 0).all()
+
+
+def test_differences_are_drawn_at_their_largest_and_zero_is_a_gap() -> None:
+    error = np.where(TIME < 5.0, 0.0, 1e-9 * TIME)
+    error[700] = 1e-3
+    picture = figures.errors([Series(TIME, error, LOOK)], "error (rad)")
+    drawn = picture.axes[0].get_lines()[0].get_xydata()
+    assert picture.axes[0].get_yscale() == "log"
+    assert np.nanmax(drawn[:, 1]) == 1e-3
+    assert np.isnan(drawn[drawn[:, 0] < 4.9, 1]).all()
+
+
+def test_a_runaway_is_cut_a_jolt_is_not_and_rounding_is_not_magnified() -> None:
+    runaway, jolt = np.sin(TIME)[:, None].copy(), 1e-3 * np.sin(TIME)[:, None]
+    runaway[-20:] = 1e6
+    jolt[100:130, 0] = 1.6  # a step of a pitch command
+    assert figures.is_cut(runaway)
+    assert figures.motion(TIME, None, runaway).axes[0].get_ylim()[1] < 5.0
+    assert not figures.is_cut(jolt)
+    assert figures.motion(TIME, None, jolt).axes[0].get_ylim()[1] >= 1.6
+    low, high = figures.motion(TIME, 1e-13 * np.sin(TIME)[:, None], None).axes[0].get_ylim()
+    assert high - low > 0.1
+
+
+@pytest.mark.parametrize("value", [0.0, 1e17])
+def test_a_constant_has_a_range_that_holds_it(value: float) -> None:
+    axes = panels((1.0,), "").axes[0]
+    figures.set_range(axes, np.full((3, 1), value))
+    low, high = axes.get_ylim()
+    assert low < value < high
+
+
+def test_energies_of_very_different_size_are_all_readable() -> None:
+    """1 MJ made by the printed model, 40 J lost by the chain, a rounding error: magnitudes; gains have filled marks."""
+    values = (1e6 * TIME / 10.0, -40.0 * TIME / 10.0, 1e-4 * np.sin(TIME))
+    (axes,) = figures.errors([Series(TIME, x, PRINTED) for x in values], "energy (J)", signed=True).axes
+    low, high = axes.get_ylim()
+    assert (axes.get_yscale(), low <= 1e-5, high >= 1e6) == ("log", True, True)
+    curves, marks = axes.get_lines()[::2], axes.get_lines()[1::2]
+    for curve, filled, wanted in zip(curves, marks, values, strict=True):
+        x, y = curve.get_xydata().T
+        shown = np.isfinite(y)
+        np.testing.assert_allclose(y[shown], np.interp(x[shown], TIME, np.abs(wanted)), atol=1e-9 * y[shown].max())
+        assert (np.interp(filled.get_xdata(), TIME, wanted) > 0.0).all()
+        assert bool(len(filled.get_xdata())) == bool((wanted > 0.0).any())
+
+
+def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
+    tip = np.stack([30.0 * np.cos(TIME), 0.05 * np.sin(9.0 * TIME), 30.0 * np.sin(TIME)], axis=1)[:, None, :]
+    (space,) = paths(tip).axes
+    assert space.get_aspect() == 1.0
+    assert "10 m" in [text.get_text() for text in space.texts]
+    axis = next(line.get_xydata() for line in space.get_lines() if len(line.get_xdata()) == 2 and _is_vertical(line))
+    np.testing.assert_allclose(np.ptp(axis[:, 1]), 10.0 * np.cos(np.radians(14.0)))
+
+
+def _is_vertical(line: Line2D) -> bool:
+    x, y = line.get_xydata().T
+    return bool(x[0] == x[1] and y[0] != y[1] and x[0] < 0.0)
+
+
+def test_the_view_keeps_what_lies_across_it_and_drops_what_lies_along_it() -> None:
+    azimuth, elevation = np.radians((-62.0, 14.0))
+    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    along = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    up = np.cross(along, across)
+    np.testing.assert_allclose(projected(np.stack([across, up, along])), [[1, 0], [0, 1], [0, 0]], atol=1e-15)
+
+
+def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
+    series = [Series(TIME, 2.7 * np.sin(0.2 * TIME), PRINTED), Series(TIME, 0.3 * TIME, CORRECTED)]
+    mark = Mark(0, 2.7315, "published 2.7315 rad")
+    (axes,) = scene_page.departure([("rotor angle (rad)", series)], [mark], 6.0, 1.5).axes
+    assert [line.get_ydata()[0] for line in axes.get_lines() if line.get_linestyle() == ":"] == [2.7315]
+    assert [text.get_text().strip() for text in axes.texts] == ["published 2.7315 rad", "0.05 rad apart at 1.5 s"]
+    assert axes.get_ylabel() == "rotor angle (rad)"
+    assert [line.get_xdata()[0] for line in axes.get_lines()[-2:]] == [6.0, 1.5]
+
+
+def test_offsets_over_azimuth_do_not_draw_the_way_back_over_the_top() -> None:
+    angles = np.stack([TIME, 0.0 * TIME], axis=1)  # 1.6 turns
+    tip = np.stack([np.sin(TIME), 0.05 * np.cos(3.0 * TIME), np.cos(TIME)], axis=1)[:, None, :]
+    (axes,) = scene_page.offsets_over_azimuth(angles, tip, [0.0]).axes
+    x, y = axes.get_lines()[0].get_xydata().T
+    assert np.nanmax(np.abs(np.diff(x))[np.isfinite(np.diff(y))]) < 10.0
+    np.testing.assert_allclose(np.nanmax(y), 50.0, rtol=1e-2)
+    assert (axes.get_ylabel(), "°" in axes.get_xlabel()) == ("tip out of plane (mm)", True)
+    assert axes.get_lines()[0].get_color() == coordinate_look(1).colour
+
+
+def test_every_scene_has_its_energy_at_its_place() -> None:
+    rows = {"fig03": [(1e-4, PRINTED), (1e-15, CORRECTED)], "fig11": [(0.15, PRINTED)]}
+    (axes,) = energy_of_scenes(rows).axes
+    drawn = [(*line.get_xydata()[0], line.get_color()) for line in axes.get_lines()]
+    assert drawn == [(1e-4, 0, PRINTED.colour), (1e-15, 0, CORRECTED.colour), (0.15, 1, PRINTED.colour)]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["fig03", "fig11"]
+    assert axes.get_xscale() == "log"
+
+
+# Looks
+
+
+def test_every_method_and_every_curve_of_a_bench_has_a_look_of_its_own() -> None:
+    names = {"reference", *method_names(), *(ladder.curve for ladder in ladders())}
+    looks = {name: look_of(name) for name in names}
+    assert len(set(looks.values())) == len(looks)
+    for first, second in combinations(method_names(), 2):  # methods differ by more than a colour
+        a, b = looks[first], looks[second]
+        assert (a.colour != b.colour) + (a.line != b.line) + (a.marker != b.marker) >= 2, (first, second)
+    for look in looks.values():
+        assert look.marker in MARKS  # the legend can draw it
+        assert look.colour in COLOURS
+
+
+def test_a_method_of_another_package_is_grey_and_looks_the_same_every_time() -> None:
+    looks = [look_of(f"package{i}/rk4") for i in range(20)]
+    assert looks == [look_of(f"package{i}/rk4") for i in range(20)]
+    assert {look.colour for look in looks} == {GREY}
+    assert {look.marker for look in looks} <= MARKS.keys()
+    assert len(set(looks)) > 10
+
+
+def test_colours_of_methods_and_of_coordinates_differ() -> None:
+    of_methods = {look_of(name).colour for name in ("reference", *method_names())}
+    of_coordinates = {coordinate_look(index).colour for index in range(12)}
+    assert not of_methods & of_coordinates
+    assert of_methods | of_coordinates <= set(PALETTE)
+
+
+# Pictures as SVG
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+def test_a_picture_has_every_point_label_and_colour_of_its_axes(scale: str) -> None:
+    picture = panels((2.0,), "time (s)")
+    axes = picture.axes[0]
+    axes.set_yscale(scale)
+    axes.plot([0.0, 0.5, 1.0, 1.0, 2.0], [0.1234567, 0.5, 0.25, 0.75, 0.123], color=COLOURS[2], marker="s")
+    canvas.ticks(axes.yaxis, {0.125: "0.125", 0.625: "0.625"})
+    axes.set_ylabel("angle (rad)")
+    text = str(svg.picture(picture, "n", "title <b>").svg)
+    for shown in (">0.125<", ">0.625<", ">time (s)<", ">angle (rad)<", "title &lt;b&gt;"):
+        assert shown in text
+    curve, marks = re.findall(rf'class="{class_of(COLOURS[2])}[^"]*"[^>]* d="([^"]*)"', text)
+    wanted = axes.transData.transform(axes.get_lines()[0].get_xydata()) * 72.0 / picture.figure.dpi
+    height = 72.0 * picture.figure.get_figheight()
+    begin, _, steps = curve.removeprefix("M").partition("l")
+    drawn = np.vstack(
+        [np.array(begin.split(), float), np.array(re.findall(r"-?(?:\d+\.?\d*|\.\d+)", steps), float).reshape(-1, 2)]
+    )
+    np.testing.assert_allclose(drawn.cumsum(axis=0), wanted * (1, -1) + np.array([0.0, height]), atol=0.11)
+    assert marks.count("M") == len(wanted)
+
+
+def test_a_gap_in_a_curve_is_a_gap_in_its_picture() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 1.0, np.nan, 1.0, 0.5], color=COLOURS[2])
+    text = str(svg.picture(picture, "n", "t").svg)
+    curve = re.search(rf'class="{class_of(COLOURS[2])}"[^>]* d="([^"]*)"', text)
+    assert curve is not None
+    assert curve[1].count("M") == 2
+    assert "nan" not in text
+
+
+def test_a_straight_curve_of_many_samples_is_short() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot(TIME, 0.3 * TIME, color=COLOURS[2])
+    assert len(str(svg.picture(picture, "n", "t").svg)) < 5000  # a thousand steps would be 8 characters each
+
+
+def test_a_factor_of_the_tick_labels_stands_with_the_unit() -> None:
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot([0.0, 1.0], [0.0, 3e-4])
+    picture.axes[0].set_ylabel("pitch angle (rad)")
+    text = str(svg.picture(picture, "a", "b").svg).replace(numbers.SPACE, " ")
+    assert ">pitch angle (10⁻⁴ rad)<" in text
+    assert ">3.0<" in text
+    assert "1e" not in text
+
+
+def test_powers_of_ten_are_labelled_within_the_axes_alone() -> None:
+    ones, small = np.ones(2), np.array([0.02, 0.5])
+    table = FloquetTable(np.array([0.1, 3.0]), np.stack([ones, small], 1), small, np.ones(2, int), ones, ones, ones)
+    picture = panels((2.0,), "time (s)")
+    picture.axes[0].plot([0.0, 1.0], [1e-16, 1e-13])
+    canvas.log_axis(picture.axes[0], 1e-16, 1e-13)
+    for shown, labels in (
+        (multipliers(table), ["10⁻²", "10⁻¹", "10⁰"]),
+        (picture, ["10⁻¹⁶", "10⁻¹⁵", "10⁻¹⁴", "10⁻¹³"]),
+    ):
+        text = str(svg.picture(shown, "n", "t").svg)
+        assert re.findall(r">(10[⁻\d⁰¹²³⁴-⁹]+)<", text) == labels
+        assert "$" not in text
+
+
+@pytest.mark.parametrize(
+    ("shown", "wanted"),
+    [
+        (numbers.number(1.2345e-10), "1.2×10⁻¹⁰"),
+        (numbers.number(0.9999), "1.0"),
+        (numbers.number(-12.34, 3), "−12.3"),
+        (numbers.number(0.0), "0"),
+        (numbers.number(float("nan")), "not finite"),
+        (numbers.number(None), "–"),
+        (numbers.fixed(-0.00001, 4), "0.0000"),
+        (numbers.prefixed(1.1234e6, "J"), "1.12 MJ"),
+        (numbers.prefixed(999.9, "J"), "1.00 kJ"),
+        (numbers.prefixed(150.0, "J", 2), "150 J"),
+        (numbers.prefixed(3e-12, "J"), "3.0×10⁻¹² J"),
+        (
+            numbers.typeset("off by 8.1e+00 rad, 1e-06 of it, in stiff/torque-1e9"),
+            "off by 8.1 rad, 10⁻⁶ of it, in stiff/torque-1e9",
+        ),
+        (" to ".join(numbers.apart(0.52359877, 0.52359879)), "0.52359877 to 0.52359879"),
+        (" to ".join(numbers.apart(0.5, 0.5)), "0.5000 to 0.5000"),
+    ],
+)
+def test_numbers_read_well(shown: str, wanted: str) -> None:
+    assert shown.replace(numbers.SPACE, " ") == wanted

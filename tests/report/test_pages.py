@@ -1,0 +1,533 @@
+"""Pages of synthetic files: what they show, what is left out, what is escaped, where they are written."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from markupsafe import escape
+from support.checking import add_run, results_file
+from support.scenes import paper
+from support.stored import Made, rotor, store
+from support.sweeps import made_sweep
+
+from rotor_mbs.analysis.claim_records import stored_claims
+from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares
+from rotor_mbs.analysis.claims import Claim, ClaimResult
+from rotor_mbs.analysis.published import errata, published
+from rotor_mbs.cli import main
+from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.printed.errata import CheckedEntry
+from rotor_mbs.report.build import write_report
+from rotor_mbs.report.core import numbers
+from rotor_mbs.report.core.elements import PageTable, Row, Section
+from rotor_mbs.report.core.files import page_names, render, write_pages
+from rotor_mbs.report.core.looks import COLOURS, COORDINATES
+from rotor_mbs.report.pages import claim_tables
+from rotor_mbs.report.pages.errata import matrices
+from rotor_mbs.report.pages.index import heat_map
+from rotor_mbs.report.pages.quantities import parting
+from rotor_mbs.report.pages.scene import range_table
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.scenario.accuracy_bounds import load_bounds
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.studies.check import judge_file
+
+FIG11 = paper("fig11", samples=101)
+PLAIN = replace(FIG11, outputs=("angles",))
+PRINTED, REFERENCE, TAYLOR, TREE = "printed/ode45", "reference", "lagrange/taylor", "exudyn_tree/rk67"
+SWING = rotor(lambda t: 0.5 + 0.2 * np.sin(t), lambda t: 0.1 * t, np.cos, np.sin)
+
+
+class Page(HTMLParser):
+    """Tags in order, section ids and text of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+        self.sections: list[str] = []
+        self.words = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(name, value or "") for name, value in attrs]
+        if tag == "section":
+            self.sections.append(dict(attrs)["id"] or "")
+
+    def handle_data(self, data: str) -> None:
+        if self.tags[-1:] != ["style"]:
+            self.words += data.replace(numbers.SPACE, " ")
+
+
+def text_of(folder: Path, name: str) -> str:
+    return (folder / name).read_text(encoding="utf-8").replace(numbers.SPACE, " ").replace("<wbr>", "")
+
+
+def rows_of(text: str) -> dict[str, list[str]]:
+    """The cells of each row of the tables in a text, by the row's heading, without markup."""
+    rows = {}
+    for heading, cells in re.findall(r'<tr><th scope="row">(.*?)</th>(.*?)</tr>', text, re.S):
+        rows[re.sub("<.*?>", "", heading.partition("<small>")[0])] = [
+            re.sub("<.*?>", "", cell) for cell in re.findall(r"<td.*?>(.*?)</td>", cells, re.S)
+        ]
+    return rows
+
+
+# What a page has
+
+
+def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> None:
+    page = Page(text_of(report, "paper-fig11.html"))
+    assert page.sections == ["failures", "paper", "motion", "paths", "energy", "difference", "cost", "metrics", "file"]
+    headings = [tag for tag in page.tags if re.fullmatch(r"h\d", tag)]
+    assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
+    assert page.tags.count("figcaption") == page.tags.count("figure") == 1 + 2 + 5 + 1 + 1 + 1
+    images = [value for name, value in page.attributes if name == "role" and value == "img"]
+    assert len(images) == page.tags.count("figure") + page.tags.count("canvas")
+    assert (report / "paper-fig11.html").stat().st_size < 250_000
+
+
+def test_the_index_opens_with_what_was_found_and_pictures_and_folds_its_other_tables(report: Path) -> None:
+    text = text_of(report, "index.html")
+    rows = rows_of(text)
+    assert rows["Published numbers reproduced"] == ["3 of 4", "0 of 4"]
+    assert rows["Scenes in which energy rises by more than 0.001 of its scale without work"] == ["2 of 4", ""]
+    assert rows["Largest spurious energy gain of a complete run"] == ["1.00 MJ", ""]  # not that of the broken run
+    assert rows["closed form, Taylor"][:2] == ["1 of 1", "1.0×10⁻¹¹"]  # 1e-12 per second over 10 s
+    heat = text.index('<table class="heat">')
+    for shown in ('class="viewer"', 'class="card still"', ">published 2.7315 rad<", "energy error / energy scale"):
+        assert 0 < text.index(shown) < heat, shown
+    rest = text[text.index('<section id="scenes"') :]
+    assert "<table" in rest
+    assert "<table" not in re.sub(r"<details>.*?</details>", "", rest, flags=re.S)
+    assert len(text.encode()) < 600_000
+
+
+def test_the_heat_map_has_the_errors_the_methods_and_the_marks(report: Path, tmp_path: Path) -> None:
+    heat = text_of(report, "index.html").partition('<table class="heat">')[2]
+    assert "lagrange/taylor" in heat
+    row = heat[heat.index("paper-fig11.html") :].partition("</tr>")[0]
+    shades = re.findall(r'<td class="h(\d)" title="[^"]*">[^<]*?(?: <b>(.)</b>)?</td>', row)
+    assert shades == [("7", ""), ("1", ""), ("2", "≠")]
+    assert "≠: inaccurate" in heat
+    with open_results(store(tmp_path / "r.h5", [Made(FIG11, TAYLOR, SWING)])) as opened:
+        assert heat_map(opened.scenes, {"paper/fig11": "x.html"}) is None  # nothing was compared
+
+
+def test_the_opening_of_a_scene_has_the_viewer_and_the_published_number(report: Path) -> None:
+    text = text_of(report, "paper-fig11.html")
+    opening = text[text.index('<div class="opening">') : text.index("What the paper says")]
+    assert 'class="viewer"' in opening
+    assert re.search(r"both models, which differ by up to [\d.]+ rad", opening)
+    assert re.search(r">0\.05 rad apart at 0\.\d+ s<", opening)
+    assert ">published 2.7315 rad<" in opening
+
+
+def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) -> None:
+    metrics = text_of(report, "paper-fig11.html").partition('<section id="metrics">')[2]
+    rows = rows_of(metrics)
+    assert rows["as printed, ode45"][0] == "runs to the end"
+    assert rows["closed form, Taylor"][0] == "ok"
+    assert "is not thereby correct" in metrics
+    assert "<small>lagrange/taylor</small>" in metrics  # the name that the command line and the file have
+
+
+def test_a_failed_run_shows_its_reason_and_its_partial_data(report: Path) -> None:
+    text = text_of(report, "paper-fig12.html")
+    page = Page(text)
+    failures = rows_of(text.partition('<section id="failures">')[2].partition("</section>")[0])
+    assert failures["as printed, ode45"] == ["solver failed", "the step became &lt;too&gt; small", "3.967 s"]
+    assert failures["Exudyn tree, RK67"] == ["timed out", "60 s", "0 s"]
+    assert {"motion", "difference", "energy", "paths"} <= set(page.sections)
+
+
+def test_numbers_that_are_rounding_error_are_marked_on_every_page(report: Path) -> None:
+    for name, times in (("index.html", 2), ("paper-fig05.html", 2), ("figures.html", 1)):
+        assert text_of(report, name).count("amplified rounding error") >= times, name
+
+
+def test_extremes_of_the_rotor_are_those_that_the_published_numbers_are_read_off(results: Path) -> None:
+    """A crest between two samples: the table and the claim beside it must not differ."""
+    with open_results(results) as opened:
+        run = opened.scenes["paper/fig11"].runs[PRINTED]
+        angles = run.array("angles")[:, 0]
+        assert str(range_table([run]).rows[0][1]).endswith(numbers.number(float(angles.max()), 4))
+        run.attributes.update(rotor_angle_min=-0.25, rotor_angle_max=3.25, rotor_rate_max=1.25)
+        rotor_row, pitch_row = range_table([run]).rows[:2]
+        assert rotor_row[1:] == ["−0.2500 to 3.250", "1.25"]
+        assert pitch_row[1] != rotor_row[1]
+
+
+def test_the_models_part_where_their_angles_first_differ_visibly(tmp_path: Path) -> None:
+    runs = [Made(FIG11, REFERENCE, rotor(lambda t: 0.0 * t)), Made(FIG11, PRINTED, rotor(lambda t: 0.02 * t))]
+    with open_results(store(tmp_path / "r.h5", runs)) as opened:
+        stored = opened.scenes["paper/fig11"].runs
+        when, largest = parting(stored[PRINTED], stored[REFERENCE])
+        assert parting(stored[REFERENCE], stored[REFERENCE]) == (None, 0.0)
+    assert when == pytest.approx(2.55, abs=0.06)
+    assert largest == pytest.approx(0.2)
+
+
+def test_no_caption_repeats_its_heading_and_every_region_has_a_name_of_its_own(report: Path) -> None:
+    for path in report.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        for section in re.findall(r"<section.*?</section>", text, re.S):
+            headings = set(re.findall(r"<h2>(.*?)</h2>", section))
+            assert not headings & set(re.findall(r"<caption><span>(.*?)</span>", section)), path.name
+        regions = re.findall(r'role="region" aria-label="([^"]*)"', text)
+        assert len(set(regions)) == len(regions), path.name  # a screen reader lists them by their names
+
+
+def test_colours_of_pictures_and_legends(report: Path) -> None:
+    """Light and dark in the style sheet; of methods or of coordinates, never both; in a legend only what is drawn."""
+    methods = {f"k{i}" for i in range(len(COLOURS))} - {"k0"}
+    coordinates = {f"k{len(COLOURS) + i}" for i in range(len(COORDINATES))}
+    seen = 0
+    for path in report.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        style = text[: text.index("</style>")]
+        for name in set(re.findall(r'class="(k\d+)', text)):
+            assert style.count(f"--{name}:") == 2, name
+            assert f".{name}{{color:var(--{name})}}" in style
+        assert not re.search(r'(stroke|fill)="#', text[len(style) :])  # no colour that a dark page could not change
+        for figure in re.findall(r"<figure>.*?</figure>", text, re.S):
+            used = set(re.findall(r'class="(k\d+)', figure))
+            assert not (used & methods and used & coordinates), (path.name, used)
+            seen += bool(used & methods)
+            picture, _, legend = figure.partition('<ul class="legend">')
+            assert set(re.findall(r'class="(k\d+)', legend)) <= set(re.findall(r'class="(k\d+)', picture)), path.name
+    assert seen > 4
+
+
+def test_one_scene_and_one_method_make_a_report_without_empty_sections(tmp_path: Path) -> None:
+    scene = replace(PLAIN, name="mine", title="Mine", figures=(), text="")
+    folder = write_report(store(tmp_path / "r.h5", [Made(scene, TAYLOR, SWING)]), tmp_path / "out").parent
+    assert sorted(path.name for path in folder.iterdir()) == ["index.html", "mine.html"]
+    page = Page(text_of(folder, "mine.html"))
+    assert page.sections == ["motion", "metrics"]
+    assert ("href", "index.html") in page.attributes
+    index = Page(text_of(folder, "index.html"))
+    assert index.sections == ["methods", "scenes", "machine"]
+    assert "nav" not in index.tags
+    for words in (page.words, index.words):
+        assert "paper" not in words.lower()
+        assert "corrected" not in words.lower()  # nothing was corrected there
+
+
+def test_every_page_has_the_same_navigation(report: Path) -> None:
+    wanted = ["index.html", "figures.html", "errata.html"]
+    for path in report.glob("*.html"):
+        nav = re.search(r'<nav class="site" aria-label="Report">(.*?)</nav>', path.read_text(encoding="utf-8"), re.S)
+        assert nav is not None, path.name
+        assert re.findall(r'href="([^"]*)"', nav[1]) == wanted
+        here = re.findall(r'href="([^"]*)" aria-current="page"', nav[1])
+        assert here == ([path.name] if path.name in wanted else [])
+
+
+def test_the_page_of_the_check_has_every_verdict_that_fails_and_is_made_where_it_is_asked_for(
+    report: Path, tmp_path: Path
+) -> None:
+    assert not (report / "check.html").exists()
+    results = store(tmp_path / "r.h5", [Made(FIG11, name, SWING) for name in (REFERENCE, TAYLOR)])
+    folder = write_report(results, tmp_path / "out", checked=True).parent
+    text = (folder / "check.html").read_text(encoding="utf-8")
+    failed = [verdict for verdict in judge_file(results, load_bounds()) if not verdict.passed]
+    assert failed  # the motion is no solution: it does not start where the scene does
+    section = text[text.index('<section id="failures">') : text.index('<section id="all"')]
+    assert section.count('class="bad"') == len(failed)
+    looked_at = {str(escape(verdict.look_at)) for verdict in failed}
+    assert looked_at == set(re.findall(r"fail</span><small>(.*?)</small>", section))
+    assert 'href="check.html"' in (folder / "paper-fig11.html").read_text(encoding="utf-8")
+
+
+def test_a_sweep_has_a_page_from_its_dataset_alone(tmp_path: Path) -> None:
+    pytest.importorskip("heyoka")
+    folder = write_report(made_sweep(tmp_path), tmp_path / "out").parent
+    text = text_of(folder, "index.html")
+    assert "<h1>Speed &amp; stiffness</h1>" in text
+    assert "12 runs of paper/fig06 by lagrange/taylor" in text
+    assert ">initial rotor speed (rad/s)<" in text  # the axes, named as in the field
+    assert ">bearing stiffness (N m/rad)<" in text
+    assert re.search(r"The pitches grow 10-fold in \d+ of 12 runs", text)
+    assert rows_of(text)["ok"] == ["12", "100.0 %"]
+    assert text.count("<figure>") >= 3  # the map, and distributions
+    assert "<script" not in text
+    assert len(text.encode()) < 250_000
+
+
+# The paper's claims and errata
+
+
+def cells_of(row: Row) -> list[str]:
+    return [(cell if isinstance(cell, str) else cell.text).replace(numbers.SPACE, " ") for cell in row]
+
+
+def test_verdicts_of_claims_are_those_of_the_shares() -> None:
+    items = [item for item in published() if not item.is_number][:3]
+    shares = []
+    for duration in (8.0, 10.0):
+        for item, marks in zip(items, (11 * "y", "n" + 6 * "y" + 2 * "n" + 2 * "-"), strict=False):
+            shares += [ClaimShare(item.id, PRINTED, duration, marks), ClaimShare(item.id, TAYLOR, duration, 11 * "n")]
+    claims = [Claim(item, ClaimResult(True), ClaimResult(None)) for item in items]
+    table = claim_tables.claim_table(claims, ClaimShares(tuple(shares), 1e-15, 10))
+    rows = [cells_of(row[2:]) for row in table.rows]
+    assert rows == [
+        ["holds", "100 %", "100 %", "fails", "0 %", "0 %"],
+        ["undecided", "75 %", "75 %", "fails", "0 %", "0 %"],
+        ["holds", "", "", "–", "", ""],  # of the stored run
+    ]
+    assert [cell.note for cell in table.rows[1][3:5] if not isinstance(cell, str)] == ["of 8", "of 8"]
+
+
+def test_the_numbers_stand_in_tables_by_duration_tolerances_and_way_of_writing() -> None:
+    study = stored_claims()
+    assert study is not None
+
+    def reproduced(table: PageTable) -> list[bool]:
+        return [all(not isinstance(cell, str) and cell.tone == "good" for cell in row[-4:]) for row in table.rows]
+
+    by_duration, by_tolerance, by_row = map(reproduced, claim_tables.trial_tables(study.numbers))
+    assert by_duration == [False, False, False, False, True, False]
+    assert (sum(by_tolerance), sum(by_row), len(by_row)) == (1, 8, 12)
+
+
+def test_formulas_are_typeset_and_the_faulty_entry_of_a_matrix_is_marked_and_corrected() -> None:
+    entries = [
+        CheckedEntry("(8)", "row 1 column 1", "c² m c3²", "", 0.0, True, ""),
+        CheckedEntry("(8)", "row 1 column 2", "what <is> this?", "", 0.0, True, ""),
+        CheckedEntry("(8)", "row 1 column 3", "c c3", "0", 1.0, False, "E1"),
+        CheckedEntry("(25)", "D(1,1)", "c", "d", 1.0, False, "E1"),
+    ]
+    shown = matrices(entries, ("(8)", "(25)"))
+    ((equation, (((formula, _), (text, _), _),)),) = shown
+    assert equation == "(8)"
+    assert formula == (
+        '<mrow><msup><mi>c</mi><mn>2</mn></msup><mspace width="0.2em"/><mi>m</mi><mspace width="0.2em"/>'
+        "<msup><msub><mi>c</mi><mn>3</mn></msub><mn>2</mn></msup></mrow>"
+    )
+    assert text == "<mtext>what &lt;is&gt; this?</mtext>"
+    others = {"differing": Section(), "effects": Section(), "agreeing": PageTable("", (), ())}
+    page = render("errata", {"errata": [(errata()[0], shown)], **others})
+    assert (page.count("<mtd"), page.count('<mtd class="fault">')) == (3, 1)
+    fault = page[page.index('class="fault"') :]
+    assert fault.index('class="printed"') < fault.index('class="right"')
+    assert "<mn>0</mn>" in fault
+
+
+# Stored quantities
+
+
+PACKAGE = """
+from rotor_mbs.solution.quantities import Plot, Quantity
+BROUGHT = (
+    Quantity("shaft_power", ("time",), "W", "power", output="report_test",
+             producer=lambda scene, samples: 1e3 * samples.rates[:, 0], plot=Plot("Power at the shaft", "power (W)")),
+    Quantity("pitch_speed", ("time", "blade"), "rad/s", "pitch speed", output="report_test",
+             producer=lambda scene, samples: samples.rates[:, 1:], plot=Plot("Pitch speeds", "speed (rad/s)")),
+    Quantity("spread", ("time", "blade"), "rad", "distance of the pitches", output="report_test",
+             producer=lambda scene, samples: abs(samples.angles[:, 1:]),
+             plot=Plot("Spread of the pitches", "spread (rad)", logarithmic=True)),
+)
+"""
+
+
+def sections_of(folder: Path, name: str) -> dict[str, str]:
+    """The sections of quantities of a page."""
+    return dict(re.findall(r'<section id="quantity-(\w+)">(.*?)</section>', text_of(folder, name), re.S))
+
+
+def test_a_stored_quantity_of_an_installed_package_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "report_test_quantities.py").write_text(PACKAGE)
+    information = tmp_path / "report_test_quantities-1.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: report-test-quantities\nVersion: 1\n")
+    (information / "entry_points.txt").write_text(
+        "[rotor_mbs.quantities]\nreport_test = report_test_quantities:BROUGHT\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    text = f'outputs = ["angles", "rates", "report_test"]\n{re.sub(r"outputs = .*", "", FIG11.text)}'
+    scene = replace(FIG11, outputs=("angles", "rates", "report_test"), text=text)
+    runs = [Made(scene, name, rotor(np.sin, np.cos)) for name in (TAYLOR, TREE)]
+    sections = sections_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent, "paper-fig11.html")
+    assert list(sections) == ["shaft_power", "pitch_speed", "spread"]
+    assert "<h2>Power at the shaft</h2>" in sections["shaft_power"]
+    assert [section.count("<figure>") for section in sections.values()] == [1, 2, 1]  # of pitches one for each run
+    assert "blade 3" in sections["pitch_speed"]
+    assert "closed form, Taylor" in sections["shaft_power"]
+
+
+def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(tmp_path: Path) -> None:
+    """Of the reference a picture per axis, one of the errors, and a table of the extremes with their times."""
+    path = results_file(tmp_path / "r.h5", ["check/loads"], ["lagrange/dop853", TREE])
+    sections = sections_of(write_report(path, tmp_path / "out").parent, "check-loads.html")
+    loads = ["blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment"]
+    assert [name for name in sections if name in loads] == loads
+    assert [sections[name].count("<figure>") for name in loads] == [4, 4, 2, 2, 2]
+    with open_results(path) as opened:
+        reference = opened.scenes["check/loads"].reference
+        assert reference is not None
+        largest = float(reference.array("blade_root_force")[:, 3, 0].max())
+    shown = numbers.prefixed(largest, "N").replace(numbers.SPACE, " ")
+    assert shown in rows_of(sections["blade_root_force"])["blade 4 x"]
+    assert "Exudyn tree, RK67" in sections["shaft_moment"]
+
+
+def test_the_uncertainty_of_an_extrapolated_run_is_drawn_and_stated(tmp_path: Path) -> None:
+    path, (scene,) = results_file(tmp_path / "r.h5", ["check/held"], []), find_scenes(["check/held"])
+    run = solve("exudyn_chain/newmark_index2", scene, {"extrapolation": "richardson", "step": 5e-3})
+    add_run(path, scene, run)
+    text = text_of(write_report(path, tmp_path / "out").parent, "check-held.html")
+    section = text.partition('<section id="difference">')[2].partition("</section>")[0]
+    assert "Exudyn chain, Newmark index 2: its uncertainty" in section
+    largest = numbers.number(float(run.trajectory.angle_uncertainty.max()))
+    assert rows_of(section)["Exudyn chain, Newmark index 2"] == [largest, largest]
+
+
+def test_the_page_of_a_driven_scene_shows_power_pitch_and_command_and_no_other_does(tmp_path: Path) -> None:
+    path = results_file(tmp_path / "r.h5", ["turbine/pitch-step", "paper/fig04b"], [])
+    folder = write_report(path, tmp_path / "out").parent
+    assert 'id="drive"' not in text_of(folder, "paper-fig04b.html")
+    section = text_of(folder, "turbine-pitch-step.html").partition('<section id="drive">')[2].partition("</section>")[0]
+    assert section.count("<figure>") == 2
+    for piece in ("taken by the shaft&#39;s damper", "command", "Pitches, their commands", "pitch 3"):
+        assert piece in section, piece
+    power = rows_of(section)["Its power"]
+    assert power[0].startswith("5.3")
+    assert power[2] == "31.8 MJ"  # 5.297 MW over 6 s
+
+
+# Safety
+
+
+def test_texts_from_the_file_are_escaped(tmp_path: Path) -> None:
+    evil = "<script>alert(1)</script>"
+    scene = replace(FIG11, name="a b/<i>", title=f"{evil}\x1b[2J", text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
+    failed = {"status": evil, "message": evil}
+    runs = [Made(scene, REFERENCE, SWING), Made(scene, f"lagrange/{evil[:8]}>x", SWING, attributes=failed)]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "o")
+    for path in folder.parent.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert evil not in text
+        assert f"{evil[:8]}>x" not in text
+        assert "<i>" not in text
+        assert "&lt;script&gt;" in text
+        assert "\x1b" not in text
+
+
+def test_what_utf_8_cannot_hold_does_not_stop_a_report(tmp_path: Path) -> None:
+    write_pages(tmp_path, {"index.html": "a\ud800b\x00c\r\n\td"})
+    assert (tmp_path / "index.html").read_bytes() == "a\ufffdb\ufffdc\r\n\td".encode()
+
+
+def test_pages_need_nothing_from_outside(report: Path) -> None:
+    for path in report.glob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        for outside in ("http://", "https://", "@import"):
+            assert outside not in text
+        assert not re.search(r"url\((?!#)", text)
+        page = Page(text)
+        assert not {"link", "img", "iframe", "object"} & set(page.tags)
+        assert "src" not in dict(page.attributes)
+        assert "default-src 'none'" in text
+        links = [value for name, value in page.attributes if name in ("href", "src")]
+        targets = {value.split("#")[0] for value in links} - {""}
+        assert all((report / target).is_file() for target in targets)
+        ids = [value for name, value in page.attributes if name == "id"]
+        assert len(set(ids)) == len(ids), path.name
+        assert {value[1:] for value in links if value.startswith("#")} <= set(ids)
+
+
+def test_file_names_stay_in_the_folder_and_differ() -> None:
+    names = page_names(["paper/fig05", "/etc/passwd", "index", "figures", "A", "a", "ü/ß", "x" * 300])
+    assert names["paper/fig05"] == "paper-fig05.html"
+    assert names["figures"] == "figures-2.html"
+    assert all(re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*\.html", name) for name in names.values())
+    assert len({name.lower() for name in names.values()} | {"index.html", "errata.html"}) == len(names) + 2
+    assert set(page_names(["data--2", "Bench-fig11"]).values()) == {"scene-data--2.html", "scene-Bench-fig11.html"}
+    for bad in ("../x", "a/../b", "..", "a\\..\\b"):
+        with pytest.raises(StoreError, match="file name"):
+            page_names([bad])
+
+
+def test_own_old_pages_go_and_foreign_files_stay(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    write_report(store(tmp_path / "a.h5", [Made(PLAIN, TAYLOR, SWING)]), out)
+    (out / "notes.html").write_text("mine")
+    (out / "data.csv").write_text("1")
+    write_report(store(tmp_path / "b.h5", [Made(replace(PLAIN, name="other"), TAYLOR, SWING)]), out)
+    assert sorted(path.name for path in out.iterdir()) == ["data.csv", "index.html", "notes.html", "other.html"]
+    (out / "index.html").write_text("mine")
+    with pytest.raises(StoreError, match=r"index\.html: not a page of rotor_mbs.*another folder"):
+        write_report(tmp_path / "a.h5", out)
+    assert (out / "index.html").read_text() == "mine"
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(results: Path, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"r\.h5.*cannot be written") as caught:
+        write_report(results, results)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(StoreError, match="no such file"):
+        write_report(tmp_path / "none.h5", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_same_file_gives_the_same_bytes_in_any_number_of_processes(tmp_path: Path) -> None:
+    path = store(tmp_path / "r.h5", [Made(replace(PLAIN, name=name), TAYLOR, SWING) for name in ("one", "two")])
+    folders = [write_report(path, tmp_path / str(jobs), jobs=jobs).parent for jobs in (1, 2)]
+    first, second = ({page.name: page.read_bytes() for page in folder.iterdir()} for folder in folders)
+    assert sorted(first) == ["index.html", "one.html", "two.html"]
+    assert first == second
+
+
+@pytest.mark.full
+def test_the_report_is_built_without_any_engine(results: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys\n"
+        "for name in ('exudyn', 'heyoka', 'scipy'): sys.modules[name] = None\n"
+        "from rotor_mbs.cli import main\n"
+        "sys.exit(main(['report', sys.argv[1], '-o', sys.argv[2]]))\n"
+    )
+    command = [sys.executable, "-W", "error", "-c", code, str(results), str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == str(tmp_path / "out" / "index.html")
+    assert (tmp_path / "out" / "paper-fig11.html").is_file()
+
+
+def _truncated(path: Path, results: Path) -> None:
+    path.write_bytes(results.read_bytes()[: results.stat().st_size // 2])
+
+
+def _foreign(path: Path, results: Path) -> None:  # noqa: ARG001
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        file["data"] = np.arange(3.0)
+
+
+def _no_hdf5(path: Path, results: Path) -> None:  # noqa: ARG001
+    path.write_text("<script>alert(1)</script>")
+
+
+@pytest.mark.parametrize("command", [["figures"], ["animate", "paper/fig11"], ["report"]])
+@pytest.mark.parametrize("make", [_truncated, _foreign, _no_hdf5])
+def test_a_damaged_or_foreign_file_is_refused_and_nothing_is_written(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str],
+    make: Callable[[Path, Path], None],
+) -> None:  # fmt: skip
+    path = tmp_path / "bad.h5"
+    make(path, results)
+    assert main([*command, str(path), "-o", str(tmp_path / "out.webp")]) == 2
+    error = capsys.readouterr().err
+    assert str(path) in error
+    assert error.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == [path]
