@@ -137,7 +137,8 @@ def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
 
 def _chain_arrays(settings: ChainAlphaSettings | ChainNewmarkSettings) -> tuple[str, ...]:
     """The error that joints make, and where the run is extrapolated a bound on its own error."""
-    return ("constraint_error", "angle_uncertainty") if settings.extrapolation == "richardson" else ("constraint_error",)
+    own = ("angle_uncertainty",) if settings.extrapolation == "richardson" else ()
+    return ("constraint_error", *own)
 
 
 def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
