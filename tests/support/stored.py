@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rotor_mbs.runs.results_file import merge
-from rotor_mbs.runs.write import write_run
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.scenario.scene import Scene, scene_hash
+from rotor_mbs.runs.results import Asked, fit, results_tables, row_of_run
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
@@ -33,17 +32,12 @@ class Made:
     angles: Curve
     until: float = 1.0
     gain: float = 0.0
-    refined: bool = False
     attributes: dict[str, object] = field(default_factory=dict)
 
     def run(self) -> Solution:
         scene = self.scene
         time = np.linspace(0.0, scene.duration, scene.samples)[: max(int(self.until * scene.samples), 0)]
         trajectory = self._trajectory(time)
-        if self.refined:
-            fine = np.linspace(0.0, scene.duration, 4 * scene.samples)
-            trajectory.refined_time, trajectory.refined_angles = fine, self._angles(fine)
-            trajectory.refined_rates = np.gradient(trajectory.refined_angles, fine, axis=0)
         if self.method == "reference":
             trajectory.angle_uncertainty = np.full(len(time), 1e-30)
             trajectory.error_growth = np.ones(len(time))
@@ -71,17 +65,14 @@ class Made:
 def store(path: Path, runs: Sequence[Made]) -> Path:
     """The runs in one file, each compared with its scene's reference where there is one."""
     references = {made.scene.name: made.run().trajectory for made in runs if made.method == "reference"}
-    pieces = []
-    for number, made in enumerate(runs):
+    file = fit(path, results_tables([Asked(made.scene, made.method) for made in runs]))
+    for made in runs:
         run = made.run()
         metrics = metrics_of(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
-        piece = path.with_name(f"{path.stem}-{number}.piece")
-        attributes = {"status": "ok", "message": "", **metrics, **made.attributes}
-        write_run(piece, scene_hash(made.scene), run, attributes)
-        pieces.append(piece)
-    merge(path, pieces, {"rotor_mbs": "0", "numpy": "0"})
-    for piece in pieces:
-        piece.unlink()
+        facts = {**metrics, **made.attributes}
+        run.status, run.message = str(facts.pop("status", "ok")), str(facts.pop("message", ""))
+        place = file.place(f"{made.scene.name}/{made.method}")
+        place.write(place.first, row_of_run(run, place, facts))
     return path
 
 

@@ -1,0 +1,328 @@
+"""Tables of runs: valid and readable at every moment, and nothing lost however a writer ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from support.scenes import paper
+
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.runs.files import CHARACTERS, Column
+from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.records import points_table, row_of_point
+from rotor_mbs.runs.results import Asked, TableFile, fit, results_tables
+from rotor_mbs.runs.table import (
+    CHARACTER,
+    MISSING,
+    Place,
+    Rows,
+    Table,
+    blank_rows,
+    characters,
+    lay_out,
+    stored_tables,
+    text_of,
+)
+from rotor_mbs.solution.status import STATUSES
+
+ROWS, SAMPLES = 23, 5
+ENGINES = ("h5netcdf", "netcdf4")
+
+
+def _table() -> Table:
+    time = Column(("time",), "s", "time"), np.linspace(0.0, 1.0, SAMPLES)
+    filled = {
+        "status": Column(("run",), "1", "status", "i1"),
+        "message": Column(("run", CHARACTERS), "1", "message", CHARACTER),
+        "steps": Column(("run",), "1", "steps", "<i8"),
+        "angles": Column(("run", "time"), "rad", "angles"),
+        "crc32": Column(("run",), "1", "checksum", "<u4"),
+    }
+    known = {"stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float))}
+    scales = {"time": time, CHARACTERS: (Column((CHARACTERS,), "1", ""), np.empty(40, np.int8))}
+    return Table("", np.arange(ROWS), known, filled, scales)
+
+
+def _rows(place: Place, first: int, count: int) -> Rows:
+    rows = blank_rows(count, place.row)
+    rows["status"][:], rows["steps"][:] = 0, 7
+    rows["angles"][:] = np.arange(first, first + count)[:, None]
+    rows["message"][:] = characters("αβγ", 40)
+    return rows
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    made = tmp_path / "t.h5"
+    lay_out(made, [_table()], {"title": "t"})
+    return made
+
+
+def _fill(path: Path, starts: range) -> None:
+    place = stored_tables(path)[""].place()
+    for first in starts:
+        count = min(4, ROWS - first)
+        place.write(first, _rows(place, first, count))
+
+
+def _missing(path: Path) -> list[int]:
+    table = stored_tables(path)[""]
+    return np.flatnonzero(table.place().stored(table.statuses()) == MISSING).tolist()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_xarray_opens_it_at_every_moment(path: Path, engine: str) -> None:
+    xr = pytest.importorskip("xarray")
+    for first in range(0, ROWS, 4):
+        with xr.open_dataset(path, engine=engine) as data:
+            assert (data.status.values != MISSING).sum() == first
+        _fill(path, range(first, first + 1))
+    with xr.open_dataset(path, engine=engine) as data:
+        assert data.angles.dims == ("run", "time")
+        assert data.angles.sel(run=17).values.tolist() == [17.0] * SAMPLES
+        assert data.message.values.tolist() == ["αβγ"] * ROWS
+        assert data.time.attrs["standard_name"] == "time"
+        assert data.stiffness.attrs["units"] == "N m/rad"
+        assert data.status.attrs["flag_meanings"].split() == ["missing", *STATUSES]
+        assert "method" not in {*data.dims, *data.variables}
+
+
+def test_every_dimension_has_its_scale_and_every_array_is_contiguous(path: Path) -> None:
+    with h5py.File(path) as file:
+        for dataset in file.values():
+            assert dataset.is_scale or all(len(dimension) == 1 for dimension in dataset.dims), dataset.name
+            assert dataset.chunks is None
+
+
+def test_the_order_of_writing_does_not_show(path: Path, tmp_path: Path) -> None:
+    other = tmp_path / "o.h5"
+    lay_out(other, [_table()], {"title": "t"})
+    _fill(path, range(0, ROWS, 4))
+    _fill(other, range(0, ROWS, 4)[::-1])
+    assert path.read_bytes() == other.read_bytes()
+
+
+def test_rows_without_their_status_are_missing(path: Path) -> None:
+    """As after a kill between the numbers and the status."""
+    _fill(path, range(0, 8, 4))
+    stored_tables(path)[""].place().mark_missing([5])
+    assert _missing(path) == [5, *range(8, ROWS)]
+    _fill(path, range(4, ROWS, 4))
+    assert _missing(path) == []
+
+
+@pytest.mark.parametrize("column", ["angles", "crc32", "status", "message", "steps"])
+def test_a_flipped_bit_of_any_computed_column_is_found(path: Path, column: str) -> None:
+    _fill(path, range(0, ROWS, 4))
+    place = stored_tables(path)[""].place(9)
+    with path.open("r+b") as file:
+        file.seek(place.offsets[column])
+        byte = file.read(1)[0]
+        file.seek(place.offsets[column])
+        file.write(bytes([byte ^ 4]))
+    assert _missing(path) == [9]
+
+
+@pytest.mark.parametrize("name", ["stiffness", "time", "run"])
+def test_a_change_of_what_was_laid_out_is_refused(path: Path, name: str) -> None:
+    with h5py.File(path, "r+") as file:
+        file[name][3] += 1
+    with pytest.raises(StoreError, match=f"{name} changed after the file was laid out"):
+        stored_tables(path)
+
+
+def test_rows_of_another_number_do_not_count(path: Path) -> None:
+    """Bytes that are copied to another row have the wrong checksum."""
+    place = stored_tables(path)[""].place()
+    place.write(0, _rows(place, 0, 1))
+    rows = place.read(1)
+    moved = stored_tables(path)[""].place(3)
+    with path.open("r+b") as file:
+        for name, values in rows.items():
+            file.seek(moved.offsets[name])
+            file.write(values.tobytes())
+    assert _missing(path) == list(range(1, ROWS))
+
+
+def test_a_worker_of_an_earlier_file_does_not_write_to_its_successor(path: Path) -> None:
+    place = stored_tables(path)[""].place()
+    path.rename(path.with_name("kept.h5"))  # keeps its inode from being used again
+    lay_out(path, [_table()], {"title": "t"})
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="is another file by now"):
+        place.write(0, _rows(place, 0, 1))
+    assert path.read_bytes() == before
+
+
+def test_texts_are_cut_at_whole_characters() -> None:
+    assert text_of(characters("aβ", 2)) == "a"
+    assert text_of(characters("aβ", 3)) == "aβ"
+
+
+def test_a_file_that_was_cut_off_is_refused_with_one_line(path: Path) -> None:
+    _fill(path, range(0, ROWS, 4))
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(StoreError) as caught:
+        stored_tables(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.full
+def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
+    """Twenty kills while two processes fill the table; then the bytes are those of an undisturbed one."""
+    program = (
+        "import sys, pathlib, test_table as t\n"
+        "path, first = pathlib.Path(sys.argv[1]), int(sys.argv[2])\n"
+        "place = t.stored_tables(path)[''].place()\n"
+        "for start in list(range(first, t.ROWS, 2)) * 1000:\n"
+        "    place.write(start, t._rows(place, start, 1))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    for round_ in range(20):
+        writers = [
+            subprocess.Popen([sys.executable, "-c", program, str(path), str(first)], env=environment)
+            for first in (0, 1)
+        ]
+        try:
+            writers[0].wait(timeout=0.5 + 0.03 * round_)
+        except subprocess.TimeoutExpired:
+            pass
+        for writer in writers:
+            writer.send_signal(signal.SIGKILL)
+            writer.wait()
+        stored = [row for row in range(ROWS) if row not in _missing(path)]
+        place = stored_tables(path)[""].place()
+        for row in stored:
+            assert (place.read(1, row)["angles"] == row).all()
+    _fill(path, range(0, ROWS, 4))
+    other = path.with_name("undisturbed.h5")
+    lay_out(other, [_table()], {"title": "t"})
+    _fill(other, range(0, ROWS, 4))
+    assert path.read_bytes() == other.read_bytes()
+
+
+# Making a file fit what is asked
+
+
+def _asked(*methods: str, **changes: object) -> list[Asked]:
+    scene = paper("fig08").replace(duration=1.0, samples=11, **changes)
+    return [Asked(scene, method) for method in methods]
+
+
+def _write(file: TableFile, run: str, value: float) -> None:
+    place = file.place(run)
+    row = blank_rows(1, place.row)
+    row["status"][0], row["samples"][0], row["angles"][:] = 0, 11, value
+    place.write(place.first, row)
+
+
+def _stored(path: Path) -> list[str]:
+    file = TableFile(path)
+    return [run for run in file.tables["runs"].runs.tolist() if file.is_stored(run)]
+
+
+def test_what_is_asked_again_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    _write(fit(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
+    before = path.read_bytes()
+    fit(path, results_tables(_asked("lagrange/taylor")))
+    assert path.read_bytes() == before
+
+
+def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
+    path, first = tmp_path / "r.h5", "paper/fig08/lagrange/taylor"
+    _write(fit(path, results_tables(_asked("reference", "lagrange/taylor"))), first, 1.0)
+    file = fit(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
+    assert _stored(path) == [first]
+    assert (file.place(first).read()["angles"] == 1.0).all()
+    assert file.tables["paper/fig08"].runs.tolist() == [
+        "reference", "lagrange/taylor", "exudyn_chain/generalized_alpha",
+    ]  # fmt: skip
+    assert np.isnan(file.place(first).read()["constraint_error"]).all()  # a column that it does not have
+
+
+def test_other_settings_and_versions_are_missing_and_others_stay(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    names = ("lagrange/taylor", "exudyn_tree/rk67")
+    file = fit(path, results_tables(_asked(*names)))
+    for name in names:
+        _write(file, f"paper/fig08/{name}", 1.0)
+    scene = _asked("exudyn_tree/rk67")[0].scene
+    fit(path, results_tables([Asked(scene, "exudyn_tree/rk67", {"step": 1e-3})]))
+    assert _stored(path) == ["paper/fig08/lagrange/taylor"]
+    fit(path, results_tables([Asked(scene, "lagrange/taylor", versions={"rotor_mbs": "0"})]))
+    assert _stored(path) == []
+
+
+def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    _write(fit(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
+    with pytest.raises(InputError, match="has lagrange/taylor of a scene of that name with other numbers"):
+        fit(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
+    assert _stored(path) == ["paper/fig08/lagrange/taylor"]
+    fit(path, results_tables(_asked("lagrange/taylor", gravity=9.81)))
+    assert _stored(path) == []
+
+
+def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    fit(path, results_tables(_asked("lagrange/taylor")))
+    point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5}
+    file = fit(path, [points_table("stability", [point])])
+    place = file.place("a", "stability")
+    place.write(place.first, row_of_point(place, "ok", "", {"angle_error_max": 0.25}))
+    file = fit(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
+    assert file.is_stored("a", "stability")
+    assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
+    file = fit(path, [], dropped=[("stability", "a")])
+    assert "stability" not in file.tables
+
+
+def test_a_sweeps_file_is_no_output_of_runs(path: Path) -> None:
+    with pytest.raises(StoreError, match="holds the dataset of a sweep"):
+        fit(path, results_tables(_asked("lagrange/taylor")))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(results: Path, engine: str) -> None:
+    xr = pytest.importorskip("xarray")
+    with xr.open_datatree(results, engine=engine) as tree:
+        data = tree["paper/fig11"].ds
+        off = abs(data.angles - data.angles.sel(run="reference"))
+        assert float(off.sel(run="reference").max()) == 0.0
+        assert 0.0 < float(off.sel(run="exudyn_tree/rk67").isel(time=slice(600)).max()) < 1e-9  # rad, to the horizon
+        overview = tree["runs"].ds.to_dataframe()
+        assert overview.loc["paper/fig11/lagrange/dop853", "method_name"] == "lagrange/dop853"
+        assert overview["steps"]["paper/fig11/exudyn_tree/rk67"] > 0
+
+
+# Locks
+
+
+def test_no_other_process_writes_a_locked_output(path: Path) -> None:
+    program = (
+        "import sys, pathlib\n"
+        "from rotor_mbs.runs.lock import writing\n"
+        "with writing(pathlib.Path(sys.argv[1])):\n"
+        "    print('locked', flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    other = subprocess.Popen(
+        [sys.executable, "-c", program, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert other.stdout is not None
+    assert other.stdout.readline() == "locked\n"
+    with pytest.raises(InputError, match=f"another process is writing it now .process {other.pid}"), writing(path):
+        pass
+    other.send_signal(signal.SIGKILL)
+    other.communicate()
+    with writing(path), writing(path):  # its lock ended with it; the same thread may enter it again
+        pass
+    assert {entry.name for entry in path.parent.iterdir()} == {path.name}
