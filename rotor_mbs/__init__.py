@@ -7,7 +7,6 @@ The Python API. Everything is loaded when it is first used: importing this packa
     compare                  one scene by several methods, against its reference: a `Comparison`
     compare_data             a trajectory of another program against a scene's reference: a `DataComparison`
     sweep                    one scene over the values of its parameters: a `SweepData`
-    claims                   the paper's claims in words as shares of many runs, its numbers under other conditions
     export                   a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark problem
     modes                    natural frequencies, damping and shapes over rotor speed: `Modes`
     open                     a results file: runs by their path; the dataset of a sweep
@@ -47,7 +46,6 @@ if TYPE_CHECKING:
     from rotor_mbs.report.mode_study import modes as modes
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
-    from rotor_mbs.studies.claims import claims as claims
     from rotor_mbs.studies.export import export as export
 
 _MODULES = {
@@ -57,7 +55,6 @@ _MODULES = {
     "rotor_mbs.report.data_comparison": "DataComparison compare_data",
     "rotor_mbs.report.mode_study": "modes",
     "rotor_mbs.scenario.scene": "Blade Scene",
-    "rotor_mbs.studies.claims": "claims",
     "rotor_mbs.studies.export": "export",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

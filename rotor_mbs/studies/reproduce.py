@@ -1,4 +1,4 @@
-"""The main job: every scene of the paper by the default methods and with each erratum alone; the errata checked.
+"""The main job: every scene of the paper by the default methods and with each erratum alone.
 
 And error against run time of all methods on one scene, at a few settings each, in seconds: a bench takes one process on
 one core and rounds over all points; here each curve is a case beside the runs, and a point is run once. Its errors are
@@ -9,23 +9,16 @@ from __future__ import annotations
 
 import hashlib
 import os
-from dataclasses import replace
 from pathlib import Path
 
-from rotor_mbs.analysis.claim_records import shipped_claims, stored_claims
-from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.errata import ERRATA, errata_record
-from rotor_mbs.analysis.finding import finding
-from rotor_mbs.analysis.run_selection import PRINTED
+from rotor_mbs.analysis.claim_study import claim_study
+from rotor_mbs.analysis.claims import claims, finding
 from rotor_mbs.analysis.run_tables import finding_lines, method_table
 from rotor_mbs.errors import RotorError
 from rotor_mbs.methods.catalogue import default_methods, errata_methods, ladders
 from rotor_mbs.runs.case import RUN, Case
-from rotor_mbs.runs.layout import KEY_ATTRIBUTE
 from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line
 from rotor_mbs.runs.read import in_memory, open_results
-from rotor_mbs.runs.records import write_records
-from rotor_mbs.runs.results_file import ResultsStore
 from rotor_mbs.runs.runner import Job, OnProgress, Result, ignore_progress
 from rotor_mbs.runs.versions import fingerprint, versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
@@ -46,18 +39,10 @@ def reproduce(
     scenes, benched = find_scenes(["paper"]), find_scenes([BENCHED])[0]
     names = (*default_methods(), *errata_methods().values())
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
-    _complete_claims(output)  # before the runs: the whole file is written anew with each merge, and now it is small
     return run_scenes(
         scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress,
-        beside=[errata_case(benched), *ladder_cases(benched)], perform=perform,
+        beside=ladder_cases(benched), perform=perform,
     )  # fmt: skip
-
-
-def _complete_claims(output: Path) -> None:
-    """The shipped study of claims and numbers, whose thousands of runs take too long to be repeated here."""
-    shipped, results = shipped_claims(), ResultsStore(output)
-    if shipped.exists() and not ResultsStore(shipped).stored_keys() <= results.stored_keys():
-        results.merge([shipped])
 
 
 def made_from(results: Path, timeout_s: float) -> str:
@@ -74,28 +59,14 @@ def summary_of(path: Path) -> str:
     with open_results(path) as file:
         results = in_memory(file)
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        study = stored_claims(results)
         facts = finding(results.scenes, claims(results.scenes))
-        lines = finding_lines(facts, None if study is None else study.shares)
+        lines = finding_lines(facts, claim_study().shares)
         return "\n".join([*lines, "", str(method_table(runs)), ""])
 
 
 def perform(job: Job) -> Result:
     """A run, or what is computed beside the runs, in a worker process. Raises StoreError."""
-    return {RUN: perform_run, BENCH: perform_ladder, ERRATA: perform_errata}[job.case.study](job)
-
-
-def errata_case(scene: Scene) -> Case:
-    """The check of every printed entry, at random states: of `scene` nothing counts."""
-    return Case(replace(scene, name="random states"), PRINTED, study=ERRATA, sources=("analysis/errata.py",))
-
-
-def perform_errata(job: Job) -> Result:
-    """Checks every printed entry and stores the outcome, in a worker process."""
-    from rotor_mbs.models.printed.errata import check_errata
-
-    write_records(job.part, [errata_record(check_errata(), {KEY_ATTRIBUTE: job.case.key})])
-    return Result("ok")
+    return {RUN: perform_run, BENCH: perform_ladder}[job.case.study](job)
 
 
 def ladder_cases(scene: Scene) -> list[Case]:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.claim_records import shipped_claims
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.read import StoredRun, open_results
@@ -24,7 +23,7 @@ _SHORT = 5001  # samples: at some 30 numbers each, twenty references take 25 MB 
 
 def shipped_files() -> list[Path]:
     """The files of frozen references."""
-    return sorted(set(reference_folder().glob("*.h5")) - {shipped_claims()})
+    return sorted(reference_folder().glob("*.h5"))
 
 
 def frozen_file(scene_hash: str) -> Path | None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from rotor_mbs.analysis.claim_records import stored_claims
-from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares
+from rotor_mbs.analysis.claim_study import ClaimShare, ClaimShares, claim_study
 from rotor_mbs.analysis.claims import Claim, ClaimResult
 from rotor_mbs.analysis.published import published
 from rotor_mbs.report.pages import claim_tables
@@ -42,7 +41,7 @@ def test_the_headline_counts_what_holds_whatever_the_rounding_and_the_duration()
 
 
 def test_the_numbers_stand_in_tables_by_duration_tolerances_and_way_of_writing() -> None:
-    study = stored_claims()
+    study = claim_study()
     assert study is not None
     by_duration, by_tolerance, by_row = claim_tables.trial_tables(study.numbers)
     good = [

@@ -10,7 +10,7 @@ import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis.finding import Agreement, Finding, Tally
+from rotor_mbs.analysis.claims import Agreement, Finding, Tally
 from rotor_mbs.methods.catalogue import look_of
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.looks import COLOURS, COORDINATES, GREY, coordinate_look

@@ -13,8 +13,7 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 from support.sweeps import made_sweep
 
-from rotor_mbs.analysis.published import errata
-from rotor_mbs.models.printed.errata import CheckedEntry
+from rotor_mbs.analysis.published import CheckedEntry, errata
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core.elements import PageTable, Section
 from rotor_mbs.report.core.files import render

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import h5py
@@ -11,17 +10,10 @@ import pytest
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis.errata import entries, errata_record
-from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.records import Record, read_records, write_records
 from rotor_mbs.runs.results_file import ResultsStore, merge
 from rotor_mbs.solution.status import code_of
-
-CHECKS = [
-    CheckedEntry("(8)", "row 1", "c", "0", 1.0, False, "E1"),
-    CheckedEntry("(9)", "row 2", "x", "x", 0.0, True, ""),
-]
 
 
 def ladder(scene: str, method: str, key: str, scene_hash: str = "1") -> Record:
@@ -62,38 +54,27 @@ def test_runs_and_records_are_kept_side_by_side(tmp_path: Path) -> None:
     scene = paper("fig05")
     store(tmp_path / "runs.h5", [Made(scene, "lagrange/taylor", rotor(np.sin), attributes={"run_hash": "run"})])
     write_records(tmp_path / "record.h5", [ladder("paper/fig05", "lagrange/taylor", "record")])
-    write_records(tmp_path / "errata.h5", [errata_record(CHECKS, {"run_hash": "errata"})])
-    merge(tmp_path / "all.h5", [tmp_path / f"{name}.h5" for name in ("runs", "record", "errata")], {})
-    assert ResultsStore(tmp_path / "all.h5").stored_keys() == {"run", "record", "errata"}
+    merge(tmp_path / "all.h5", [tmp_path / f"{name}.h5" for name in ("runs", "record")], {})
+    assert ResultsStore(tmp_path / "all.h5").stored_keys() == {"run", "record"}
     with open_results(tmp_path / "all.h5") as results:
-        assert entries(results) == CHECKS
         assert list(results.scenes) == ["paper/fig05"]
 
 
 def test_files_of_earlier_versions_are_read_and_merged(tmp_path: Path) -> None:
-    """They have a group for each checked entry, no digests, and seven statuses."""
+    """They have no digests, and seven statuses."""
     write_records(tmp_path / "a.h5", [ladder("stiff/x", "exudyn_tree/rk44", "k")])
     with h5py.File(tmp_path / "a.h5", "a") as file:
         group = file["stability/steps/stiff/x/exudyn_tree/rk44"]
         del group.attrs["digests"]
         group["status"].attrs["flag_meanings"] = "ok left_out"
         group["status"][:] = [1, 0]
-        file.create_group("errata").attrs["fingerprint"] = "f"
-        for number, check in enumerate(CHECKS):
-            file.create_group(f"errata/{number:03d}").attrs.update(asdict(check))
     merge(tmp_path / "b.h5", [tmp_path / "a.h5"], {})
     (found,) = read_records(tmp_path / "b.h5", "steps")
     assert (found.key, found.statuses) == ("k", ["left_out", "ok"])
-    with open_results(tmp_path / "b.h5") as results:
-        assert entries(results) == CHECKS
 
 
 def test_records_open_in_xarray(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     write_records(tmp_path / "a.h5", [ladder("stiff/x", "exudyn_tree/rk44", "k")])
-    write_records(tmp_path / "b.h5", [errata_record(CHECKS, {})])
-    merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
-    with xarray.open_datatree(tmp_path / "all.h5", engine="h5netcdf") as tree:
+    with xarray.open_datatree(tmp_path / "a.h5", engine="h5netcdf") as tree:
         assert tree["stability/steps/stiff/x/exudyn_tree/rk44/step"].dims == ("row",)
-        assert tree["errata/difference"].values.tolist() == [1.0, 0.0]
-        assert list(tree["errata"].attrs["printed"]) == ["c", "x"]

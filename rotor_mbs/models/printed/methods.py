@@ -4,31 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Look, Method
-from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.ode45 import Ode45Result, Ode45Settings, RightHandSide, ode45
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
-from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.observables import PointMassRotor, torque_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, is_constant, value_at
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, sample_times
-
-
-@dataclass(frozen=True)
-class PrintedSettings(Ode45Settings):
-    gravity_row: str = choice(
-        DEFAULT_ROW, tuple(GRAVITY_ROWS), doc="way of writing the first row of (56): equal but for rounding, see Fig. 5"
-    )
-
 
 # (torques in N m, angles and rates) -> accelerations; all of the coordinates that move.
 Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
@@ -125,8 +115,7 @@ class PrintedModel:
     def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
         rotor = self._rotor(scene)
-        row = settings.gravity_row if isinstance(settings, PrintedSettings) else DEFAULT_ROW
-        return PrintedSolver(scene, rotor, self._accelerations(rotor, row), settings, keeps_refined=not self._errata)
+        return PrintedSolver(scene, rotor, self._accelerations(rotor), settings, keeps_refined=not self._errata)
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
         """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
@@ -149,7 +138,7 @@ class PrintedModel:
         tip = (blade.tip[0] - x, blade.tip[1] - y, blade.tip[2] - z)
         return PointMassRotor(blade.mass, x, z, scene.gravity, scene.phases, tip)
 
-    def _accelerations(self, rotor: PointMassRotor, row: str) -> Accelerations:
+    def _accelerations(self, rotor: PointMassRotor) -> Accelerations:
         m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
         if not rotor.pitches_move:
             return lambda torques, state: [
@@ -161,8 +150,7 @@ class PrintedModel:
             return lambda torques, state: derived.accelerations(torques, state[:n], state[n:])
         if len(rotor.phases) == 1:
             return lambda torques, state: literal.one_blade_accelerations(m, c, d, g, torques, state)
-        written = None if row == DEFAULT_ROW else GRAVITY_ROWS[row].moment
-        return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state, written)
+        return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state)
 
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:
@@ -194,7 +182,7 @@ def _method(name: str, label: str, look: Look, errata: Errata | None = None, err
         look=look,
         build=model.build,
         items=model.items,
-        settings=Ode45Settings if erratum else PrintedSettings,
+        settings=Ode45Settings,
         is_corrected=False,
         is_default=not erratum,
         erratum=erratum,

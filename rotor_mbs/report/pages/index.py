@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.finding import ENERGY_RISE, Finding, finding
+from rotor_mbs.analysis.claims import ENERGY_RISE, Claim, Finding, finding
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import Look, label_of, look_of

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claim_records import ClaimStudy
+from rotor_mbs.analysis.claim_study import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.report.core.elements import LegendEntry, Picture, Section, line_entry
