@@ -6,7 +6,6 @@ The Python API. Everything is loaded when it is first used: importing this packa
     run                      one scene by one method: a `Run`; by several, judged by its reference: `Runs`
     sweep                    one scene over the values of its parameters: `Runs`
     compare                  a trajectory of another program against a scene's reference: a `DataComparison`
-    claims                   the paper's claims in words as shares of many runs, its numbers under other conditions
     export                   a scene for MuJoCo, Exudyn, SymPy, as CSV, as a benchmark problem
     modes                    natural frequencies, damping and shapes over rotor speed: `Modes`
     open                     the `Runs` in a file: of scenes, or of a sweep
@@ -43,7 +42,6 @@ if TYPE_CHECKING:
     from rotor_mbs.report.mode_study import modes as modes
     from rotor_mbs.scenario.scene import Blade as Blade
     from rotor_mbs.scenario.scene import Scene as Scene
-    from rotor_mbs.studies.claims import claims as claims
     from rotor_mbs.studies.export import export as export
 
 _MODULES = {
@@ -53,7 +51,6 @@ _MODULES = {
     "rotor_mbs.report.data_comparison": "DataComparison compare",
     "rotor_mbs.report.mode_study": "modes",
     "rotor_mbs.scenario.scene": "Blade Scene",
-    "rotor_mbs.studies.claims": "claims",
     "rotor_mbs.studies.export": "export",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

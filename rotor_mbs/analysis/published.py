@@ -1,7 +1,9 @@
-"""What the paper says, read from the files under `reference/`: numbers, claims, errata. Must not compare anything."""
+"""What the paper says, read from the files under `reference/`: numbers, claims, errata, its entries checked."""
 
 from __future__ import annotations
 
+import csv
+from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, TypeVar
 
 from pydantic import Field, model_validator
@@ -94,6 +96,25 @@ class Erratum(Table):
     reaches: Texts = Field(description="a list of equation numbers")
 
 
+@dataclass(frozen=True, slots=True)
+class CheckedEntry:
+    """One printed entry against its derivative.
+
+    printed, right   formulas; a term that is not there is 0
+    difference       the largest of |printed - right| / max(1, |printed|, |right|) over random states
+    explained_by     the fewest errata with which the paper's derivation gives what is printed, where without any it
+                     gives what is right, as "E1, E2"; "" where the entry agrees, and where nothing explains it
+    """
+
+    equation: str
+    entry: str
+    printed: str
+    right: str
+    difference: float
+    agrees: bool
+    explained_by: str
+
+
 class _PublishedFile(Table):
     conditions: dict[str, Text] = Field({}, description="a table of texts")
     published: list[Published] = Field(description="[[published]] tables")
@@ -116,6 +137,26 @@ def conditions() -> dict[str, str]:
 def errata() -> tuple[Erratum, ...]:
     """The errata, in the order of the file. Raises InputError with every error of the file."""
     return tuple(_read("errata.toml", _ErrataFile).erratum)
+
+
+def checked_entries() -> list[CheckedEntry]:
+    """Every printed entry against derivatives of (3), in the order of the equations: reference/errata-check.csv.
+
+    `tests/support/printed_entries.py` computes the file, and a test compares it with the derivation.
+    """
+    with (reference_folder() / "errata-check.csv").open(encoding="utf-8", newline="") as file:
+        return [
+            CheckedEntry(
+                row["equation"],
+                row["entry"],
+                row["printed"],
+                row["right"],
+                float(row["difference"]),
+                row["agrees"] == "True",
+                row["explained_by"],
+            )
+            for row in csv.DictReader(file)
+        ]
 
 
 def _read(name: str, model: type[T]) -> T:

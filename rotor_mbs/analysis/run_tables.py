@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from rotor_mbs.analysis.claim_shares import ClaimShares
-from rotor_mbs.analysis.finding import Finding, agreement
+from rotor_mbs.analysis.claim_study import ClaimShares
+from rotor_mbs.analysis.claims import Finding, agreement
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.read import StoredRun, StoredScene

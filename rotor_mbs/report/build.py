@@ -7,9 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.analysis import errata as errata_analysis
 from rotor_mbs.analysis import published, run_selection
-from rotor_mbs.analysis.claim_records import stored_claims
+from rotor_mbs.analysis.claim_study import claim_study
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.work_precision import by_scene
@@ -118,9 +117,9 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
 
 
 def _has_errata(opened: OpenResults) -> bool:
-    """Whether there are checks of printed entries, or runs of the printed equations."""
+    """Whether there are runs of the printed equations."""
     printed = {run_selection.PRINTED, *errata_methods().values()}
-    return bool(errata_analysis.entries(opened)) or any(printed & {*scene.runs} for scene in opened.scenes.values())
+    return any(printed & {*scene.runs} for scene in opened.scenes.values())
 
 
 def _run_pages(
@@ -141,7 +140,7 @@ def _run_pages(
         page_names(opened.scenes),
         decided,
         published.conditions() if decided else {},
-        stored_claims(opened) if decided else None,
+        claim_study() if decided else None,
         by_scene(bench),
         published.errata() if has_errata else (),
         site,

@@ -119,9 +119,8 @@ def summary_of(path: Path) -> str:
     """Numbers and claims of the paper, and a line for each method over all its scenes."""
     with open_results(path) as results:
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        study = stored_claims()
         facts = finding(results.scenes, claims(results.scenes))
-        lines = finding_lines(facts, None if study is None else study.shares)
+        lines = finding_lines(facts, claim_study().shares)
         return "\n".join([*lines, "", str(method_table(runs)), ""])
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis.finding import Finding, Tally
+from rotor_mbs.analysis.claims import Finding, Tally
 from rotor_mbs.analysis.run_tables import bench_table, finding_lines, method_table, run_table
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.records import Record

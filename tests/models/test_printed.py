@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from support.gravity_rows import GRAVITY_ROWS
 
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
-from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import AS_PRINTED, CORRECTED, Errata
 from rotor_mbs.scenario.scene import Blade, Scene
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from rotor_mbs.analysis.claims import STATISTICS
 from rotor_mbs.analysis.published import conditions, published
-from rotor_mbs.analysis.trajectory_numbers import STATISTICS
 from rotor_mbs.scenario.catalogue import find_scenes
 
 

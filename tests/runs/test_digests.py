@@ -15,7 +15,6 @@ from support.checking import failed, judged, results_file
 from support.sweeps import run_local
 
 import rotor_mbs as rm
-from rotor_mbs.analysis.claim_records import shipped_claims
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.digests import seal
@@ -149,19 +148,6 @@ def test_settings_and_steps_that_are_not_the_methods_are_found_behind_new_digest
         file[RUN].attrs["settings"] = '{"absolute_tolerance": 1e-16, "relative_tolerance": 3e-14}'
         sealed_anew(file, RUN)
     assert {one.name for one in failed(judged(copy))} == {"steps"}
-
-
-def test_a_changed_record_is_found_in_a_file_without_runs(tmp_path: Path) -> None:
-    copy = Path(shutil.copy(shipped_claims(), tmp_path / "claims.h5"))
-    assert judged(copy) == []
-    with h5py.File(copy, "r+") as file:
-        in_last_bit(file["claims/shares/share"])
-    (found,) = judged(copy)
-    assert (found.passed, found.where.scene, found.hint) == (
-        False,
-        "claims/shares",
-        "share changed after it was written",
-    )
 
 
 # What is refused: links, other files' arrays, claims

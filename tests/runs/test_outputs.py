@@ -9,13 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.studies import claims
 
 SWEEP = """
 title = "two starts"
@@ -101,7 +99,7 @@ def test_references_do_not_take_the_place_of_runs(results: Path, capsys: pytest.
     assert results.read_bytes() == before
 
 
-@pytest.mark.parametrize("command", [["reference", "paper/fig03"], ["claims", "--runs", "1"], ["reproduce"]])
+@pytest.mark.parametrize("command", [["reference", "paper/fig03"], ["reproduce"]])
 def test_no_command_writes_what_another_process_is_writing(
     command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -112,23 +110,6 @@ def test_no_command_writes_what_another_process_is_writing(
         assert other.submit(main, [*command, "-o", str(given)]).result() == 2
     assert "another process is writing it now" in capsys.readouterr().err.splitlines()[-1]
     assert list(tmp_path.iterdir()) == []
-
-
-def test_claims_are_added_to_what_is_there(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = stored_claims()
-    assert study is not None
-    monkeypatch.setattr(claims, "claim_shares", lambda *_, **__: study.shares)
-    monkeypatch.setattr(claims, "number_trials", lambda **_: study.numbers)
-    output = tmp_path / "r.h5"
-    output.write_bytes(results.read_bytes())
-    kept = tmp_path / "r.h5.sweeps" / "notes.txt"
-    kept.parent.mkdir()
-    kept.touch()
-    claims.study_claims(output)
-    with open_results(output) as found:
-        assert list(found.scenes) == ["paper/fig03"]
-        assert stored_claims(found) is not None
-    assert kept.exists()
 
 
 @pytest.mark.parametrize("place", ["owner", "lock"])

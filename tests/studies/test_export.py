@@ -15,17 +15,15 @@ from support.scenes import paper
 
 import rotor_mbs as rm
 from rotor_mbs.cli import main
-from rotor_mbs.cli.arguments import EXPORT_FORMATS
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import knots
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.studies.export import FORMATS, export
+from rotor_mbs.studies.export import export
 
 # Springs, dampers, full inertia, torque with a jump between samples; blades that cannot pitch; point masses, chaotic.
-SCENES = ("check/general", "check/held", "paper/fig11")
+SCENES = ("check/general", "check/held", pytest.param("paper/fig11", marks=pytest.mark.full))
 
 # Steps of one file through plain MuJoCo: torques by the file's own segments, samples every so many steps.
 PLAIN_MUJOCO = """
@@ -46,31 +44,6 @@ for _ in range(int(sys.argv[2]) - 1):
 numpy.save(sys.argv[4], rows)
 """
 
-# The equations as exported, integrated by SciPy from kink to kink.
-SOLVED_BY_SCIPY = """
-import itertools, sys
-import numpy
-from scipy.integrate import solve_ivp
-from sympy import lambdify
-names = {}
-exec(open(sys.argv[1], encoding="utf-8").read(), names)
-n = len(names["q"])
-M, f = (lambdify([*names["q"], *names["w"], names["t"]], names[name], "numpy", cse=True) for name in "Mf")
-def derivative(t, y, middle):
-    t = min(max(t, middle[0] + 1e-12), middle[1] - 1e-12)
-    return [*y[n:], *numpy.linalg.solve(M(*y, t), f(*y, t))[:, 0]]
-times = numpy.linspace(0.0, float(sys.argv[2]), int(sys.argv[3]))
-kinks = [float(x) for x in sys.argv[5:]]
-y, rows = numpy.array(names["initial_angles"] + names["initial_rates"]), {0.0: names["initial_angles"]}
-for start, end in itertools.pairwise(sorted({0.0, *kinks, times[-1]})):
-    inside = [t for t in times if start < t <= end]
-    run = solve_ivp(derivative, (start, end), y, "DOP853", [*inside, end][: len(inside) + (end not in inside)],
-                    rtol=1e-12, atol=1e-12, args=((start, end),))
-    rows |= {t: state[:n] for t, state in zip(inside, run.y.T)}
-    y = run.y[:, -1]
-numpy.save(sys.argv[4], [rows[t] for t in times])
-"""
-
 
 def plain_python(*arguments: object) -> subprocess.CompletedProcess[str]:
     """In a process without this package on its path, with warnings as errors."""
@@ -85,8 +58,8 @@ def run_exported(folder: Path, program: str, *arguments: object) -> np.ndarray:
     script.write_text(program, encoding="utf-8")
     done = plain_python(script, *(out if one == "OUT" else one for one in arguments))
     assert done.returncode == 0, done.stderr
-    found: np.ndarray = np.load(out)
-    return found
+    rows: np.ndarray = np.load(out)
+    return rows
 
 
 def moving(scene: Scene) -> list[int]:
@@ -134,16 +107,6 @@ def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     assert np.abs(found.rates[:until] - ours.rates[:until]).max() < 1e-10
 
 
-@pytest.mark.parametrize("name", ["check/general", "check/held", "check/pitch-loads"])
-def test_the_equations_solved_by_scipy(name: str, tmp_path: Path) -> None:
-    pytest.importorskip("sympy")
-    scene, exact = references.scene(name), references.reference(name)
-    (path,) = export(scene, "sympy", tmp_path / "equations.py")
-    kinks = knots(scene.load_tables, scene.duration)
-    found = run_exported(tmp_path, SOLVED_BY_SCIPY, path, scene.duration, scene.samples, "OUT", *kinks)
-    assert per_growth(scene, found, exact) < 1e-10
-
-
 def test_the_csv_has_the_reference_bit_for_bit_with_units(tmp_path: Path) -> None:
     scene, exact = references.scene("check/held"), references.reference("check/held")
     (path,) = rm.export(scene, "csv", tmp_path / "held.csv")
@@ -159,40 +122,6 @@ def test_the_csv_has_the_reference_bit_for_bit_with_units(tmp_path: Path) -> Non
     assert all(name.endswith("]") for name in header)
 
 
-def test_the_benchmark_folder_accepts_what_is_right_and_nothing_else(tmp_path: Path) -> None:
-    scene = references.scene("check/general")
-    folder = tmp_path / "general"
-    names = {path.name for path in export(scene, "iftomm", folder)}
-    assert {"description.md", "reference.csv", "results.txt", "evaluate.py", "scene.toml"} <= names
-    assert rm.load(folder / "scene.toml").blades == scene.blades
-    text = (folder / "description.md").read_text(encoding="utf-8")
-    for heading in ("Motivation", "System", "Forces", "Initial conditions", "Required results", "Error definition"):
-        assert f"## {heading}" in text
-    header, *rows = (folder / "results.txt").read_text(encoding="utf-8").splitlines()
-
-    def evaluated(lines: list[str]) -> tuple[int, str]:
-        (tmp_path / "results.txt").write_text("\n".join([header, *lines]), encoding="utf-8")
-        done = plain_python(folder / "evaluate.py", tmp_path / "results.txt")
-        return done.returncode, done.stdout + done.stderr
-
-    def results_of(run: Trajectory) -> list[str]:
-        return [" ".join(map(repr, [t, *a])) for t, a in zip(run.time.tolist(), run.angles.tolist(), strict=True)]
-
-    no_file = plain_python(folder / "evaluate.py")
-    assert (no_file.returncode, no_file.stderr) == (2, "usage: python evaluate.py RESULTS.txt\n")
-    assert evaluated(rows) == (0, "error 0.000e+00, accepted up to 1e-06: accepted\n")
-    run = solve("exudyn_tree/rk44", scene, {"step": 5e-3}).trajectory
-    status, line = evaluated(results_of(run))
-    assert status == 0
-    error = metrics_of(scene, run, references.reference("check/general"))["angle_error_per_growth"]
-    assert float(line.split()[1].rstrip(",")) == pytest.approx(error, rel=1e-3)
-    lighter = replace(scene, blades=(replace(scene.blades[0], mass=792.0), *scene.blades[1:]))
-    assert evaluated(results_of(solve("exudyn_tree/rk67", lighter, {}).trajectory))[0] == 1
-    assert evaluated(rows[:-1])[0] == 1
-    assert evaluated([*rows[:70], rows[70].rpartition(" ")[0] + " nan", *rows[71:]])[0] == 1
-    assert "not accepted" in evaluated([*rows[:70], "text", *rows[71:]])[1]
-
-
 def test_a_scene_without_a_shipped_reference_gets_one_computed(tmp_path: Path) -> None:
     pytest.importorskip("heyoka")
     scene = paper("fig08", duration=0.2, samples=3)
@@ -206,10 +135,9 @@ def test_a_scene_without_a_shipped_reference_gets_one_computed(tmp_path: Path) -
 
 def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
-    assert tuple(FORMATS) == EXPORT_FORMATS
-    for to in ("mjcf", "exudyn", "sympy"):
+    for to in ("mjcf", "exudyn", "csv"):
         assert main(["export", "paper/fig03", "--to", to]) == 0
-    assert capsys.readouterr().out.split() == ["fig03.xml", "fig03-exudyn.py", "fig03-equations.py"]
+    assert capsys.readouterr().out.split() == ["fig03.xml", "fig03-exudyn.py", "fig03.csv"]
     assert main(["export", "paper", "--to", "csv"]) == 2
     assert "allowed: the name of one scene" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="2"):
@@ -220,5 +148,5 @@ def test_what_cannot_be_written_and_unknown_formats_are_one_line(tmp_path: Path)
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(StoreError, match="cannot be written"):
         export(paper("fig03"), "mjcf", tmp_path / "file" / "fig03.xml")
-    with pytest.raises(InputError, match="allowed: mjcf, exudyn, csv, sympy, iftomm"):
+    with pytest.raises(InputError, match=r"allowed: mjcf, exudyn, csv$"):
         export(paper("fig03"), "urdf", tmp_path / "fig03")

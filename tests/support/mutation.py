@@ -339,7 +339,7 @@ _TESTS = {
         f"{_CHECK}a_touched_reference_in_the_file_fails",
     ),
     f"{_A}.run_integrity": ("analysis/test_run_integrity.py",),
-    f"{_A}.claims": ("analysis/test_analysis.py",),
+    f"{_A}.claims": ("analysis/test_claims.py",),
 }
 
 

@@ -1,7 +1,7 @@
 """The paper's equations of motion as printed: (33) with (25), (29), (30), (32), one blade; (39)-(56), three blades.
 
 Nothing is corrected here: E1 and E2 are in the coefficients, E3 in the last terms of (53)-(55). Every formula is a
-function of the symbols it is printed with, so that its numbers and its text (see `symbols`) have one source. It is
+function of the symbols it is printed with, so that its numbers and its text have one source. It is
 run in the order of the print, with one exception: the factor of the first row of (56) is multiplied in, see
 `rotor_gravity`.
 
@@ -17,7 +17,7 @@ Where the machine reading of the print is damaged, the undamaged equation it fol
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 ROOT3 = math.sqrt(3.0)
@@ -125,7 +125,7 @@ def rotor_gravity(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5
     Equal to the printed form but for rounding, which decides Fig. 5: it starts at rest in an unstable equilibrium of
     these equations, so that its motion is amplified rounding error. There the printed bracket is exactly zero, and
     nothing moves; the three terms leave -4.2e-13 N m, with which the three published numbers come out for T = 12 s.
-    Other ways of writing the row are in `gravity_rows`.
+    Other ways of writing the row: reference/claims.json.
     """
     second, third = c2 / 2 + root3 / 2 * s2, c2 / 2 - root3 / 2 * s2
     return -c * m * g * c2 * c3 + c * m * g * second * c4 + c * m * g * third * c5
@@ -162,17 +162,9 @@ def one_blade_accelerations(
 
 
 def three_blade_accelerations(
-    m: float,
-    c: float,
-    d: float,
-    g: float,
-    torques: Sequence[float],
-    state: Sequence[float],
-    row: Callable[..., float] | None = None,
+    m: float, c: float, d: float, g: float, torques: Sequence[float], state: Sequence[float]
 ) -> tuple[float, float, float, float]:
     """(39)-(56) solved for q̈2..q̈5 in rad/s²; torques (4,): τ2..τ5 in N m; state (8,): q2..q5, q̇2..q̇5.
-
-    `row` takes the place of the first row of (56): (m, c, d, g, q2, c3, c4, c5) -> N m, see `gravity_rows`.
 
     By (39)-(41) each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one by one.
     """
@@ -189,7 +181,7 @@ def three_blade_accelerations(
     b4 = torques[3] - h_4(m, c, s2, c2, s5, c5, v22, v25, v5)
     if g:
         _, f2, f3, f4 = gravity_three(m, c, g, s2, c2, s3, c3, s4, c4, s5, c5)
-        f1 = rotor_gravity(m, c, g, s2, c2, c3, c4, c5) if row is None else row(m, c, d, g, q2, c3, c4, c5)
+        f1 = rotor_gravity(m, c, g, s2, c2, c3, c4, c5)
         b1, b2, b3, b4 = b1 - f1, b2 - f2, b3 - f3, b4 - f4
     r2, r3, r4 = d12 / d22, d13 / d33, d14 / d44
     a2 = (b1 - r2 * b2 - r3 * b3 - r4 * b4) / (d11 - r2 * d21 - r3 * d31 - r4 * d41)

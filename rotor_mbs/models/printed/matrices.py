@@ -1,7 +1,7 @@
 """The paper's transformation matrix (3) and its derivative matrices as printed, with errata E1, E2 switchable.
 
 Each function is one numbered equation: sines and cosines of q2, q3 and the lengths c, d in, four rows of four out.
-The arguments may be numbers, arrays or symbols (see `symbols`). The constants d1, d2 of (2), (3) are zero here:
+The arguments may be numbers, arrays or symbols. The constants d1, d2 of (2), (3) are zero here:
 they shift positions only.
 """
 

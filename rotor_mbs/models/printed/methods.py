@@ -14,7 +14,6 @@ from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.ode45_settings import Ode45Settings
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
-from rotor_mbs.models.printed.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 from rotor_mbs.models.printed.matrices import Errata
 
 if TYPE_CHECKING:  # the list of methods needs none of them
@@ -23,14 +22,6 @@ if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.scenario.time_table import Table
     from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-
-
-@dataclass(frozen=True)
-class PrintedSettings(Ode45Settings):
-    gravity_row: str = choice(
-        DEFAULT_ROW, tuple(GRAVITY_ROWS), doc="way of writing the first row of (56): equal but for rounding, see Fig. 5"
-    )
-
 
 # (torques in N m, angles and rates) -> accelerations; all of the coordinates that move.
 Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
@@ -139,8 +130,7 @@ class PrintedModel:
     def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
         rotor = self._rotor(scene)
-        row = settings.gravity_row if isinstance(settings, PrintedSettings) else DEFAULT_ROW
-        return PrintedSolver(scene, rotor, self._accelerations(rotor, row), settings, keeps_refined=not self._errata)
+        return PrintedSolver(scene, rotor, self._accelerations(rotor), settings, keeps_refined=not self._errata)
 
     def _rotor(self, scene: Scene) -> PointMassRotor:
         """Raises MethodRefusal, in one sentence, where the printed equations have no place for what the scene has."""
@@ -165,7 +155,7 @@ class PrintedModel:
         tip = (blade.tip[0] - x, blade.tip[1] - y, blade.tip[2] - z)
         return PointMassRotor(blade.mass, x, z, scene.gravity, scene.phases, tip)
 
-    def _accelerations(self, rotor: PointMassRotor, row: str) -> Accelerations:
+    def _accelerations(self, rotor: PointMassRotor) -> Accelerations:
         m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
         if not rotor.pitches_move:
             return lambda torques, state: [
@@ -177,8 +167,7 @@ class PrintedModel:
             return lambda torques, state: derived.accelerations(torques, state[:n], state[n:])
         if len(rotor.phases) == 1:
             return lambda torques, state: literal.one_blade_accelerations(m, c, d, g, torques, state)
-        written = None if row == DEFAULT_ROW else GRAVITY_ROWS[row].moment
-        return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state, written)
+        return lambda torques, state: literal.three_blade_accelerations(m, c, d, g, torques, state)
 
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[Table, ...]:
@@ -211,7 +200,7 @@ def _method(name: str, label: str, errata: Errata | None = None, erratum: str = 
         label=label,
         build=model.build,
         items=model.items,
-        settings=Ode45Settings if erratum else PrintedSettings,
+        settings=Ode45Settings,
         is_corrected=False,
         is_default=not erratum,
         erratum=erratum,

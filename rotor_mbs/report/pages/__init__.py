@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rotor_mbs.analysis.claim_records import ClaimStudy
+from rotor_mbs.analysis.claim_study import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.published import Erratum
 from rotor_mbs.report.core.files import Site

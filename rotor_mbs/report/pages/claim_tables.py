@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from rotor_mbs.analysis.claim_records import Conditions, NumberTrials
-from rotor_mbs.analysis.claim_shares import FAILS, HOLDS, RULE, UNDECIDED, ClaimShares
-from rotor_mbs.analysis.claims import Claim
-from rotor_mbs.analysis.published import TrajectoryNumber, published
-from rotor_mbs.analysis.trajectory_numbers import STATISTICS
-from rotor_mbs.models.printed.gravity_rows import GRAVITY_ROWS
+from rotor_mbs.analysis.claim_study import (
+    FAILS,
+    HOLDS,
+    RULE,
+    UNDECIDED,
+    ClaimShares,
+    Conditions,
+    NumberTrials,
+    count_of_rows,
+)
+from rotor_mbs.analysis.claims import STATISTICS, Claim, ClaimResult, Reading
+from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, number, power, with_unit
 
@@ -137,7 +143,7 @@ def trial_tables(trials: NumberTrials) -> list[PageTable]:
     for row in trials.rows:
         conditions = replace(usual, gravity_row=row)
         for trial in list(trials.under(conditions).values())[:1]:
-            rows[conditions] = [TableCell(GRAVITY_ROWS[row].formula), number(trial.remainder)]
+            rows[conditions] = [TableCell(trials.rows[row]), number(trial.remainder)]
     return [
         table("The published numbers by the duration of the run", ("Duration",), durations),
         table(f"The published numbers by the tolerances of ode45{over}", ("RelTol", "AbsTol"), tolerances, 2),

@@ -11,9 +11,8 @@ from html import escape
 
 from markupsafe import Markup
 
-from rotor_mbs.analysis.errata import entries as checked_entries
+from rotor_mbs.analysis.published import CheckedEntry, checked_entries
 from rotor_mbs.methods.catalogue import errata_methods
-from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages import Context
@@ -31,7 +30,7 @@ Cell = tuple[Markup, Markup | None]  # an entry as printed, in MathML; the corre
 
 def errata_page(opened: OpenResults, context: Context) -> dict[str, object]:
     """The content of the page of errata."""
-    entries = checked_entries(opened)
+    entries = checked_entries()
     agreeing = [entry for entry in entries if entry.agrees]
     differing = [entry for entry in entries if not entry.agrees]
     differing_table = PageTable(

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claim_records import ClaimStudy
+from rotor_mbs.analysis.claim_study import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.rehydrate import scene_of

@@ -14,7 +14,7 @@ from typing import Any
 
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.literal import ROOT3
-from rotor_mbs.models.symbols import Symbol
+from support.symbols import Symbol
 
 _PHASES = (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)  # (34)-(36), rad
 

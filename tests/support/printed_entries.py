@@ -1,24 +1,30 @@
-"""Every printed entry of the paper's matrices and equations by name, from three sources that can be compared.
+"""Every printed entry of the paper's matrices and equations by name, compared between three sources.
 
 A value is found by (equation, entry): ("(8)", "row 2 column 4"), ("(52)", "q̇2 q̇3"). The sources: the formulas as
-printed, the paper's derivation with chosen errata, and derivatives of (3) alone. Knows no scene and no integrator.
+printed, the paper's derivation with chosen errata, and derivatives of (3) alone.
+
+    python tests/support/printed_entries.py     # makes reference/errata-check.csv anew
 """
 
 from __future__ import annotations
 
+import csv
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
+from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rotor_mbs.analysis.published import CheckedEntry
 from rotor_mbs.models.printed import literal, matrices
 from rotor_mbs.models.printed.derivation import BladeTerms, blade_terms
 from rotor_mbs.models.printed.matrices import Errata
-from rotor_mbs.models.symbols import Symbol
 from rotor_mbs.solution.trajectory import Array
+from support.symbols import Symbol
 
 Key = tuple[str, str]
 Entries = dict[Key, Any]
@@ -242,3 +248,74 @@ def _mass_entries(equations: Sequence[Sequence[str]], matrix: Any) -> Entries:
 
 def _gravity_entries(equation: str, rows: Sequence[Any]) -> Entries:
     return {(equation, f"C({i})"): value for i, value in enumerate(rows, start=1)}
+
+
+# Lengths, mass and gravity are drawn of order one: rounding is some 1e-16, a wrong formula some 1e-1.
+TOLERANCE = 1e-12
+NAMES = ("E1", "E2", "E3")
+
+
+def check_errata(seed: int = 2020, states: int = 5) -> list[CheckedEntry]:
+    """Every entry of (8), (9), (16)-(19), (25), (29), (30), (32), (39)-(56), in the order of the equations."""
+    drawn = random_states(seed, states)
+    printed = [printed_entries(state.names) for state in drawn]
+    right = [right_entries(state) for state in drawn]
+    derived = {
+        subset: [derived_entries(state, Errata(*(name in subset for name in NAMES))) for state in drawn]
+        for size in range(len(NAMES) + 1)  # the fewest first
+        for subset in combinations(NAMES, size)
+    }
+    printed_text, right_text = printed_entries(SYMBOLS), right_formulas()
+    checks = []
+    for key in sorted(right[0], key=_place):
+        difference = _difference(key, printed, right)
+        agrees = difference <= TOLERANCE
+        checks.append(
+            CheckedEntry(
+                *key,
+                printed=str(printed_text.get(key, 0)),
+                right=str(right_text[key]),
+                difference=difference,
+                agrees=agrees,
+                explained_by="" if agrees else ", ".join(_explanation(key, printed, right, derived)),
+            )
+        )
+    return checks
+
+
+def random_states(seed: int, count: int) -> list[State]:
+    """States with angles anywhere and constants of order one: an identity holds for all of them or is none."""
+    rng = np.random.default_rng(seed)
+    return [
+        State(tuple(rng.uniform(-np.pi, np.pi, 4).tolist()), *rng.uniform(0.5, 2.0, 4).tolist()) for _ in range(count)
+    ]
+
+
+def _explanation(
+    key: Key, printed: Sequence[Entries], right: Sequence[Entries], derived: dict[tuple[str, ...], list[Entries]]
+) -> tuple[str, ...]:
+    if _difference(key, derived[()], right) > TOLERANCE:
+        return ()
+    return next((subset for subset in derived if _difference(key, printed, derived[subset]) <= TOLERANCE), ())
+
+
+def _difference(key: Key, first: Sequence[Entries], second: Sequence[Entries]) -> float:
+    pairs = [(float(a.get(key, 0)), float(b.get(key, 0))) for a, b in zip(first, second, strict=True)]
+    return max(abs(a - b) / max(1.0, abs(a), abs(b)) for a, b in pairs)
+
+
+def _place(key: Key) -> tuple[int, str]:
+    equation, entry = key
+    return int(equation.strip("()")), entry
+
+
+def write_table(path: Path) -> None:
+    """A row for each checked entry, as `analysis.published.checked_entries` reads it."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([field.name for field in fields(CheckedEntry)])
+        writer.writerows(astuple(entry) for entry in check_errata())
+
+
+if __name__ == "__main__":
+    write_table(Path(__file__).parents[2] / "reference" / "errata-check.csv")

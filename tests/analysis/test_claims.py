@@ -1,4 +1,4 @@
-"""Claims, errata and the finding against files whose numbers are known because they were made so."""
+"""Claims and the finding of files whose numbers are known because they were made so."""
 
 from __future__ import annotations
 
@@ -12,15 +12,10 @@ from support.scenes import paper
 from support.stored import Arrays, Made, rotor, store
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import claims, rounds_to
-from rotor_mbs.analysis.errata import entries, errata_record
+from rotor_mbs.analysis.claims import STATISTICS, claims, finding, measure, rounds_to
 from rotor_mbs.analysis.exact import escape_rate
-from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, errata, published
-from rotor_mbs.analysis.trajectory_numbers import STATISTICS, measure
-from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.records import write_records
 from rotor_mbs.scenario.catalogue import natural_order
 
 FIG11 = paper("fig11", samples=501)
@@ -91,11 +86,10 @@ def test_statistics_by_hand(statistic: str) -> None:
 def test_one_sample_has_no_growth_and_none_no_number() -> None:
     one: Any = Arrays(PRINTED, time=np.ones(1), angles=np.ones((1, 1)))
     assert measure(one, of("growth")) is None
-    none: Any = Arrays(
-        PRINTED, refined_time=np.ones(0), refined_angles=np.ones((0, 1)), time=np.ones(1), angles=np.ones((1, 1))
-    )
-    assert measure(none, of("max")) == 1.0
-    assert measure(none, of("max", quantity="rate")) is None
+    assert measure(one, of("max")) == 1.0
+    assert measure(one, of("max", quantity="rate")) is None
+    none: Any = Arrays(PRINTED, time=np.ones(0), angles=np.ones((0, 1)))
+    assert measure(none, of("max")) is None
     timeless: Any = Arrays(PRINTED, angles=np.ones((1, 1)))
     assert measure(timeless, of("max")) is None
 
@@ -112,17 +106,29 @@ def test_swings_are_counted_from_turning_point_to_turning_point(tmp_path: Path) 
         assert measure(run, of("growth", coordinate=1)) is None
 
 
-def test_extremes_are_read_off_the_refined_output(tmp_path: Path) -> None:
-    # A spike between two samples (0.02 s apart) that only the finer points see.
-    def spike(t: np.ndarray) -> np.ndarray:
-        return np.exp(-(((t - 5.01) / 0.002) ** 2))
-
-    made = Made(FIG11, PRINTED, rotor(spike), refined=True)
-    plain = Made(FIG11, TAYLOR, rotor(spike))
-    with open_results(store(tmp_path / "r.h5", [made, plain])) as results:
-        runs = results.scenes["paper/fig11"].methods
-        assert measure(runs[TAYLOR], of("max")) < 1e-6
-        assert measure(runs[PRINTED], of("max")) > 0.1
+@pytest.mark.parametrize(
+    ("quantity", "statistic", "coordinate", "expected"),
+    [
+        ("angle", "min", 0, -3.0),
+        ("angle", "max", 0, 2.5),
+        ("angle", "max_abs", 0, 3.0),
+        ("angle", "range", 0, 5.5),
+        ("angle", "net_change", 0, 1.0),
+        ("angle", "max", 1, 1.0),
+        ("rate", "max_abs", 0, 7.0),
+        ("rate", "max", 0, 1.0),
+    ],
+)
+def test_extremes_of_the_rotor_are_those_over_the_integrators_own_steps(
+    quantity: str, statistic: str, coordinate: int, expected: float
+) -> None:
+    """Where a run has them; all else is read off the samples, here from 0 to 1."""
+    samples = np.outer(np.arange(2.0), [1.0, 1.0])
+    run: Any = Arrays(PRINTED, time=np.arange(2.0), angles=samples, rates=samples)
+    metrics = {"rotor_angle_min": -3.0, "rotor_angle_max": 2.5, "rotor_rate_max": 7.0}
+    asked = of(statistic, coordinate, quantity=quantity)
+    assert measure(run, asked, metrics) == expected
+    assert measure(run, asked, {}) == STATISTICS[statistic].of(run.get("time"), samples[:, coordinate])
 
 
 @pytest.mark.parametrize(("value", "reproduced"), [(2.73146, True), (2.73154, True), (2.73144, False), (2.7316, False)])
@@ -230,18 +236,6 @@ def test_every_published_test_is_one_that_can_be_carried_out() -> None:
 def test_escape_rate_of_a_pendulum_upside_down() -> None:
     assert escape_rate(FIG11) == pytest.approx(math.sqrt(9.8 / math.hypot(0.08, 0.03)))
     assert escape_rate(FIG11.replace(**{"bearing.stiffness": 5.0})) is None
-
-
-def test_errata_are_read_in_order(tmp_path: Path) -> None:
-    checks = [
-        CheckedEntry("(8)", "row 2 column 4", "c c3", "0", 1.0, False, "E1"),
-        CheckedEntry("(9)", "row 1 column 1", "x", "x", 0.0, True, ""),
-    ]
-    write_records(tmp_path / "e.h5", [errata_record(checks, {})])
-    with open_results(tmp_path / "e.h5") as results:
-        assert entries(results) == checks
-    with open_results(store(tmp_path / "r.h5", [Made(FIG11, REFERENCE, rotor(np.zeros_like))])) as results:
-        assert entries(results) == []
 
 
 def test_scenes_come_in_natural_order() -> None:

@@ -1,0 +1,232 @@
+"""The paper's claims as shares of many runs, and its numbers under other conditions, from reference/claims.json.
+
+The runs are chaotic: what a claim says may hold for one rounding and fail for the next. So it was tested on runs from
+many starts moved by rounding, for several durations, and holds or fails only where nearly all runs say so. The numbers
+were read off runs for other durations, tolerances and ways of writing the first row of (56).
+`tests/support/make_claims.py` computes the file.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from rotor_mbs.scenario.catalogue import reference_folder
+
+HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
+SURE = 0.95  # share of the deciding runs from which on a claim holds; 1 - SURE: up to which it fails
+DECIDING = 0.5  # share of the runs that must decide
+ENERGY_GAIN = 1e3  # of the energy scale: a run that gains as much decides nothing
+RULE = (
+    f"A claim holds where at least {SURE:.0%} of the deciding runs say so for every duration, fails where at most "
+    f"{1 - SURE:.0%} do for every duration, and is undecided otherwise, also where fewer than {DECIDING:.0%} of the "
+    "runs decide. A run that broke off or whose energy rose a thousandfold decides nothing."
+)
+
+
+@dataclass(frozen=True)
+class ClaimShare:
+    """A claim tested on the runs of one method for one duration (s).
+
+    marks   one for each run, the first from the start as given, the others from moved starts: "y" where the claim
+            holds, "n" where it fails, "-" where the run decides nothing
+    """
+
+    claim: str
+    method: str
+    duration: float
+    marks: str
+
+    @property
+    def moved(self) -> str:
+        """Marks of the runs from moved starts."""
+        return self.marks[1:]
+
+    @property
+    def deciding(self) -> int:
+        """How many runs from moved starts decide."""
+        return len(self.moved) - self.moved.count("-")
+
+    @property
+    def share(self) -> float:
+        """Share of the deciding runs from moved starts in which the claim holds; NaN where none decides."""
+        return self.moved.count("y") / self.deciding if self.deciding else math.nan
+
+    @property
+    def verdict(self) -> str:
+        """ "holds", "fails" or "undecided" for this duration alone."""
+        if not self.deciding or self.deciding < DECIDING * len(self.moved):
+            return UNDECIDED
+        return HOLDS if self.share >= SURE else FAILS if self.share <= 1.0 - SURE else UNDECIDED
+
+
+@dataclass(frozen=True)
+class ClaimShares:
+    """All shares of a study.
+
+    spread   rad, by which starts were moved at most
+    runs     from moved starts, for each claim, method and duration
+    """
+
+    shares: tuple[ClaimShare, ...]
+    spread: float
+    runs: int
+
+    @property
+    def durations(self) -> list[float]:
+        """s, in ascending order."""
+        return sorted({share.duration for share in self.shares})
+
+    @property
+    def claims(self) -> list[str]:
+        """Ids, in order."""
+        return list(dict.fromkeys(share.claim for share in self.shares))
+
+    @property
+    def methods(self) -> list[str]:
+        """In order: the printed equations, the corrected model."""
+        return list(dict.fromkeys(share.method for share in self.shares))
+
+    def of(self, claim: str, method: str) -> list[ClaimShare]:
+        """By duration; [] where the study does not have the claim."""
+        shares = [share for share in self.shares if share.claim == claim and share.method == method]
+        return sorted(shares, key=lambda share: share.duration)
+
+    def verdict(self, claim: str, method: str) -> str:
+        """ "holds", "fails" or "undecided" whatever the rounding and the duration; "" without data."""
+        verdicts = {share.verdict for share in self.of(claim, method)} or {""}
+        return verdicts.pop() if len(verdicts) == 1 else UNDECIDED
+
+    def count(self, method: str) -> dict[str, int]:
+        """How many claims hold, fail, are undecided."""
+        verdicts = [self.verdict(claim, method) for claim in self.claims]
+        return {verdict: verdicts.count(verdict) for verdict in (HOLDS, FAILS, UNDECIDED)}
+
+
+@dataclass(frozen=True, order=True)
+class Conditions:
+    """What the paper does not print, or what depends on rounding.
+
+    gravity_row   way of writing the first row of (56)
+    duration      s
+    relative_tolerance, absolute_tolerance   of ode45; the latter in rad and rad/s
+    """
+
+    gravity_row: str
+    duration: float
+    relative_tolerance: float
+    absolute_tolerance: float
+
+
+@dataclass(frozen=True)
+class NumberTrial:
+    """A published number under some conditions.
+
+    number      its id
+    value       rad or rad/s, read off the printed model's run; NaN where there is none
+    reproduced  whether it has the printed digits
+    remainder   N m, the row's value at the start of Fig. 5: zero but for rounding
+    """
+
+    number: str
+    conditions: Conditions
+    value: float
+    reproduced: bool
+    remainder: float
+
+
+@dataclass(frozen=True)
+class NumberTrials:
+    """All trials of a study.
+
+    usual        the conditions of the paper's scenes, but for the duration
+    rows         formulas of the tried ways of writing the row by their names, in order
+    rows_of_56   those of them that are the row as printed, multiplied out in one order or another
+    """
+
+    trials: tuple[NumberTrial, ...]
+    usual: Conditions
+    rows: Mapping[str, str]
+    rows_of_56: tuple[str, ...]
+
+    @property
+    def numbers(self) -> list[str]:
+        """Ids, in order."""
+        return list(dict.fromkeys(trial.number for trial in self.trials))
+
+    @property
+    def conditions(self) -> list[Conditions]:
+        """All that were tried, in order."""
+        return list(dict.fromkeys(trial.conditions for trial in self.trials))
+
+    def under(self, conditions: Conditions) -> dict[str, NumberTrial]:
+        """The trials under these conditions, by number."""
+        return {trial.number: trial for trial in self.trials if trial.conditions == conditions}
+
+    def reproduces_all(self, conditions: Conditions) -> bool:
+        """Whether every number comes out."""
+        return sum(trial.reproduced for trial in self.under(conditions).values()) == len(self.numbers)
+
+    def of_row(self, row: str) -> list[Conditions]:
+        """Those with this way of writing the row and the usual tolerances, by duration."""
+        usual = replace(self.usual, gravity_row=row)
+        return sorted(tried for tried in self.conditions if tried == replace(usual, duration=tried.duration))
+
+    def durations_of_all(self, row: str) -> list[float]:
+        """s, for which all numbers come out with this way of writing the row and the usual tolerances."""
+        return [tried.duration for tried in self.of_row(row) if self.reproduces_all(tried)]
+
+    def with_tolerances(self) -> list[Conditions]:
+        """Those of the usual row and duration, by tolerance."""
+        usual = self.usual
+        return sorted(
+            tried
+            for tried in self.conditions
+            if (tried.gravity_row, tried.duration) == (usual.gravity_row, usual.duration)
+        )
+
+
+def count_of_rows(trials: NumberTrials, duration: float) -> tuple[int, int]:
+    """(how many of `rows_of_56` give all numbers for `duration`, in s; how many there are)."""
+    reproducing = [duration in trials.durations_of_all(row) for row in trials.rows_of_56]
+    return sum(reproducing), len(reproducing)
+
+
+@dataclass(frozen=True)
+class ClaimStudy:
+    """Both tables."""
+
+    shares: ClaimShares
+    numbers: NumberTrials
+
+
+@functools.cache
+def claim_study() -> ClaimStudy:
+    """Read reference/claims.json.
+
+    Examples
+    --------
+    >>> study = claim_study()
+    >>> study.shares.verdict("fig11-pitches-grow", "printed/ode45")
+    'holds'
+    >>> study.numbers.durations_of_all("multiplied_in")   # s, for which all four published numbers come out
+    [12.0]
+    """
+    data = json.loads((reference_folder() / "claims.json").read_text(encoding="utf-8"))
+    shares = ClaimShares(tuple(ClaimShare(**row) for row in data["shares"]), data["spread"], data["runs"])
+    trials = []
+    for row in data["trials"]:
+        number, reproduced, remainder = (row.pop(name) for name in ("number", "reproduced", "remainder"))
+        value = row.pop("value")
+        value = math.nan if value is None else value
+        trials.append(NumberTrial(number, Conditions(**row), value, reproduced, remainder))
+    numbers = NumberTrials(
+        tuple(trials),
+        Conditions(**data["usual"]),
+        {row["name"]: row["formula"] for row in data["rows"]},
+        tuple(row["name"] for row in data["rows"] if row["is_of_56"]),
+    )
+    return ClaimStudy(shares, numbers)
