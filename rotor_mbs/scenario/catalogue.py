@@ -176,5 +176,6 @@ def _scene_name(path: Path, real: Path) -> str:
     if not re.fullmatch(_PIECE, stem):
         raise InputError(f"{shown_path(path)}: the file's name cannot name a scene; allowed: a name {_NAME_RULE}")
     if stem in RESERVED_GROUPS or any(name.startswith(stem + "/") for name in _shipped()):
+        load_scene(path, stem)  # a sweep in a file sweep.toml is not to be renamed
         raise InputError(f"{shown_path(path)}: {stem} names a group of results; allowed: another file name")
     return stem
