@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import InputError, RotorError, nearest
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.scenario.toml_file import read_toml, shown_path
+
+if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
+    from rotor_mbs.scenario.scene import Scene
 
 # Groups at the top of a results file that are not scenes: no scene may take such a name.
 RESERVED_GROUPS = ("bench", "claims", "comparison", "errata", "modes", "stability", "summary", "sweep")
@@ -76,6 +78,8 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
     path to a folder of TOML files; a shipped name goes before a path (write ./paper for a folder of one's own).
     Raises InputError with all errors of all arguments and files.
     """
+    from rotor_mbs.scenario.scene_file import load_scene
+
     problems: list[str] = []
     files: dict[Path, tuple[Path, str]] = {}  # by where it leads to: the path that was given, the scene's name
     for argument in arguments:
@@ -176,6 +180,7 @@ def _scene_name(path: Path, real: Path) -> str:
     if not re.fullmatch(_PIECE, stem):
         raise InputError(f"{shown_path(path)}: the file's name cannot name a scene; allowed: a name {_NAME_RULE}")
     if stem in RESERVED_GROUPS or any(name.startswith(stem + "/") for name in _shipped()):
-        load_scene(path, stem)  # a sweep in a file sweep.toml is not to be renamed
-        raise InputError(f"{shown_path(path)}: {stem} names a group of results; allowed: another file name")
+        shown = shown_path(path)
+        hint = f"; of a sweep: rotor-mbs sweep {shown}" if stem == "sweep" else ""
+        raise InputError(f"{shown}: {stem} names a group of results; allowed: another file name{hint}")
     return stem

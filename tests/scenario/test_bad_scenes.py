@@ -188,7 +188,7 @@ def test_all_errors_of_a_file_in_the_order_of_its_lines(tmp_path: Path) -> None:
     text = SCENE
     for name in ("title empty", "blades true", "gravity NaN", "samples one", "outputs unknown", "mass zero"):
         text = text.replace(*WRONG[name][:2])
-    for name in ("centre too short", "inertia negative", "angle code", "stiffness negative", "torque entry"):
+    for name in ("centre too short", "inertia of no triangle", "angle code", "stiffness negative", "torque entry"):
         text = text.replace(*WRONG[name][:2])
     keys = [
         problem.split(": ")[0] + " " + problem.split(": ")[1].split(" ")[0] for problem in _problems(tmp_path, text)
@@ -268,7 +268,8 @@ NO_NAMES = (
         ("paper.toml", "paper names a group of results"),
         ("circle.toml", "leads to no file"),
         ("pipe.toml", "is not a regular file"),
-        ("sweep.toml", "sweep.toml: is a sweep; allowed: a scene, or: rotor-mbs sweep sweep.toml"),
+        ("study.toml", "study.toml: is a sweep; allowed: a scene, or: rotor-mbs sweep study.toml"),
+        ("sweep.toml", "sweep names a group of results; allowed: another file name; of a sweep: rotor-mbs sweep"),
     ],
 )
 def test_arguments_that_name_no_scene(
@@ -281,7 +282,7 @@ def test_arguments_that_name_no_scene(
         Path(name).write_text(SCENE, encoding="utf-8")
     Path("circle.toml").symlink_to("circle.toml")
     os.mkfifo("pipe.toml")
-    Path("sweep.toml").write_text('scene = "paper/fig11"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n', encoding="utf-8")
+    Path("study.toml").write_text('scene = "paper/fig11"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n', encoding="utf-8")
     with pytest.raises(InputError) as caught:
         find_scenes([argument])
     (problem,) = caught.value.problems
