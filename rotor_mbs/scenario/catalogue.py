@@ -180,5 +180,7 @@ def _scene_name(path: Path, real: Path) -> str:
     if not re.fullmatch(_PIECE, stem):
         raise InputError(f"{shown_path(path)}: the file's name cannot name a scene; allowed: a name {_NAME_RULE}")
     if stem in RESERVED_GROUPS or any(name.startswith(stem + "/") for name in _shipped()):
-        raise InputError(f"{shown_path(path)}: {stem} names a group of results; allowed: another file name")
+        shown = shown_path(path)
+        hint = f"; of a sweep: rotor-mbs sweep {shown}" if stem == "sweep" else ""
+        raise InputError(f"{shown}: {stem} names a group of results; allowed: another file name{hint}")
     return stem

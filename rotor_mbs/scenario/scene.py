@@ -113,9 +113,9 @@ def _per_blade(kind: Kind) -> Kind:
         _check_bare_pitches("acts on", entries, scene)
         return entries if any(entries) else ()
 
-    entry = "one or the other" if kind.over_time else "one"
-    allowed = f"{kind.allowed}, or a list with {entry} for each blade"
-    return Kind(read, allowed, in_context=True, per_blade=True, over_time=kind.over_time)
+    return Kind(
+        read, f"{kind.allowed}; or a list, one per blade", in_context=True, per_blade=True, over_time=kind.over_time
+    )
 
 
 def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
@@ -168,21 +168,16 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
     return read_each(read_blade, value)
 
 
-OUTPUT_NAMES = Kind(
-    _read_outputs, 'some of "angles", "rates", "tip", "energy", "loads" and outputs of installed packages, each once'
-)
+OUTPUT_NAMES = Kind(_read_outputs, "some of angles, rates, tip, energy, loads and packages' own")
 _OUTPUTS = where(OUTPUT_NAMES, bool, OUTPUT_NAMES.allowed, "0 entries")
 _POINT = list_of(keys.SIZE, "three numbers x, y, z{unit}, blade frame", 3, 3)
 _INERTIA = where(
     list_of(keys.SIZE, "", 6, 6),
     is_rigid_body_inertia,
-    "six numbers xx yy zz xy xz yz{unit} that a rigid body can have: positive semidefinite, no principal moment above "
-    "the sum of the others",
-    "no rigid body has this inertia",
+    "six numbers xx yy zz xy xz yz{unit} that a rigid body can have",
+    "no rigid body has this inertia: a principal moment is negative, or above the sum of the others",
 )
-_LOAD = Kind(
-    _read_load, "a number{unit}, or rows [t, number] with t from 0 s up, at most two with one t", over_time=True
-)
+_LOAD = Kind(_read_load, "a number{unit}, or rows [t, number] with t from 0 s up", over_time=True)
 _ANGLES = Kind(_read_angles, "1 + blades numbers{unit}: rotor, then a pitch per blade", in_context=True)
 _RATES = Kind(_read_rates, _ANGLES.allowed, in_context=True)
 _BLADES = Kind(_read_blades, "one [blade] table for all blades, or a [[blade]] table for each", in_context=True)
@@ -274,9 +269,7 @@ class Scene:
     )
     bearing_damping: tuple[float, ...] = _key("bearing.damping", _per_blade(keys.NOT_NEGATIVE), "N m s/rad", default=())
     shaft_damping: float = _key("shaft.damping", keys.NOT_NEGATIVE, "N m s/rad", default=0.0)
-    pitch_torque: tuple[Table, ...] = _key(
-        "torque.pitch", _per_blade(_LOAD), "N m", ": between hub and blade", default=(), added=True
-    )
+    pitch_torque: tuple[Table, ...] = _key("torque.pitch", _per_blade(_LOAD), "N m", default=(), added=True)
     bearing_rest: tuple[Table, ...] = _key(
         "bearing.rest", _per_blade(_LOAD), "rad", ": pitch at which the spring is unloaded", default=(), added=True
     )
@@ -529,8 +522,14 @@ def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
     for depth, part in enumerate(path):
         has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
         if not has_such_entries:
+<<<<<<< HEAD
             kinds: dict[type, str] = {dict: "a table", list: "a list"}
             what = f"is {kinds.get(type(here), 'a single value')}"
+=======
+            what = "is a single value"
+            if isinstance(here, dict | list):
+                what = "is a table" if isinstance(here, dict) else "is a list"
+>>>>>>> scen/main
             raise TableError([KeyProblem(path[:depth], what, KEY_FORM, is_of_key=True)])
         if isinstance(part, int) and part >= len(here):
             name = shown_key(path[:depth])

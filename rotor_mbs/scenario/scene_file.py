@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,10 @@ def _scene(text: str, tables: dict[str, Any], name: str, source: str) -> Scene:
         raise error.in_file(text, source) from error
 
 
+_HEADER = """\
+# A scene: a rotor, its loads and its start. SI units; angles in rad.
+# Numbers may be arithmetic in quotes, "11*pi/12", with pi, sqrt(x), hypot(x, y) and deg(x).
+"""
 _EXAMPLE: dict[str, Any] = {
     "title": "My rotor",
     "blades": 3,
@@ -47,6 +52,7 @@ _EXAMPLE: dict[str, Any] = {
     "samples": 1001,
     "blade.mass": 15000.0,
     "blade.centre_of_mass": [0.08, 0.0, 15.4],
+    "blade.inertia": [0, 0, 0, 0, 0, 0],
     "blade.tip": [0.08, 0.0, 33.4],
     "initial.angles": ["deg(30)", 0, "pi/4", 0],
     "initial.rates": [0, 0, 0, 0],
@@ -56,30 +62,34 @@ _EXAMPLE: dict[str, Any] = {
 
 def new_scene_text() -> str:
     """A scene file with every key, a value and what is allowed, to start a scene from."""
-    keys = []
-    for declared in SCENE_KEYS.values():
-        if declared["key"] == "blade":
-            keys += [(f"blade.{name}", blade_key) for name, blade_key in BLADE_KEYS.items()]
-        elif declared["key"] != "settings":
-            keys.append((declared["key"], declared))
-    lines: dict[str, list[str]] = {"": ["# A scene: a rotor, its loads and its start. SI units; angles in rad."]}
-    for path, declared in keys:
+    lines: dict[str, list[str]] = {"": _HEADER.splitlines()}
+    needed = {"blade"}
+    for path, declared in _all_keys():
         table, _, name = path.rpartition(".")
         value = _EXAMPLE.get(path, declared.get("optional"))
         if value == () and declared["unit"] != "1":  # no load
             value = 0.0
         entry = f"{name} = {toml_value(value)}"
-        comment = f"optional: {declared['allowed']}" if "optional" in declared else declared["allowed"]
-        first, *more = textwrap.wrap(comment, max(40, 116 - max(34, len(entry))))
+        comment = declared["allowed"]
+        if "optional" not in declared:
+            needed.add(table)
+        elif table in ("", "blade"):
+            comment = f"optional: {comment}"
+        first, *more = textwrap.wrap(comment, 117 - max(34, len(entry)))
         lines.setdefault(table, []).append(f"{entry:34} # {first}")
         lines[table] += [f"{'':34} # {rest}" for rest in more]
-    lines[""] += [
-        '# Numbers may be arithmetic in quotes, "11*pi/12", with pi, sqrt(x), hypot(x, y) and deg(x).',
-        "# A table of optional keys may be left out: nothing is then built for it.",
-    ]
-    lines["settings"] = [f"{'# step = 1e-3':34} # optional: {SCENE_KEYS['settings']['allowed']}"]
+    lines["settings"] = [f"{'# step = 1e-3':34} # {SCENE_KEYS['settings']['allowed']}"]
     parts = []
     for table, entries in lines.items():
-        header = [f"[{table}]"] if table else []
+        header = [f"[{table}]" if table in needed else f"{f'[{table}]':34} # optional"] if table else []
         parts.append("\n".join([*header, *entries, ""]))
     return "\n".join(parts)
+
+
+def _all_keys() -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Path and declaration of every key but settings, those of a blade in the place of `blade`."""
+    for declared in SCENE_KEYS.values():
+        if declared["key"] == "blade":
+            yield from ((f"blade.{name}", of_blade) for name, of_blade in BLADE_KEYS.items())
+        elif declared["key"] != "settings":
+            yield declared["key"], declared

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rotor_mbs
-from rotor_mbs.analysis.claim_records import stored_claims
 from rotor_mbs.analysis.claims import claims
 from rotor_mbs.analysis.finding import finding
 from rotor_mbs.analysis.run_tables import finding_lines, method_table

@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.runs.files import replace_file
-from rotor_mbs.runs.files import KEYWORDS
+from rotor_mbs.runs.files import KEYWORDS, replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.scenario.sweep_design import SPLITS
 from rotor_mbs.solution.status import code_of

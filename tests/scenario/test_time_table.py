@@ -49,11 +49,11 @@ def test_segments_have_the_values_of_their_tables() -> None:
 def test_a_sample_on_a_jump_has_the_value_before_it() -> None:
     parts = segments([RAMP, CONSTANT], 1.0)
     times = np.linspace(0.0, 1.0, 101)
-    found = values_before(parts, times)
-    assert found[0, 47] == pytest.approx(2.0)
+    values = values_before(parts, times)
+    assert values[0, 47] == pytest.approx(2.0)
     exact = np.where(np.arange(101) == 47, 2.0, values_at(RAMP, times))
-    assert found[0] == pytest.approx(exact, abs=1e-14)
-    assert (found[1] == 7.0).all()
+    assert values[0] == pytest.approx(exact, abs=1e-14)
+    assert (values[1] == 7.0).all()
 
 
 def test_a_load_that_changes_has_no_constant_value() -> None:
@@ -64,13 +64,15 @@ def test_intervals_meet_samples_and_kinks() -> None:
     parts = segments([RAMP], 1.0)
     assert [(p.start, p.values[0]) for p in parts] == [(0.0, 0.0), (0.3, 0.0), (0.47, 5.0), (0.8, 1.0)]
     few = intervals(parts, 11, every_sample=False)
-    assert np.allclose([one.end for one in few], [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])
-    assert [one.sample_intervals for one in few] == [3, 1, 1, 1, 3, 2]
-    assert [one.ends_at_sample for one in few] == [True, True, False, True, True, True]
+    assert np.allclose([interval.end for interval in few], [0.3, 0.4, 0.47, 0.5, 0.8, 1.0])
+    assert [interval.sample_intervals for interval in few] == [3, 1, 1, 1, 3, 2]
+    assert [interval.ends_at_sample for interval in few] == [True, True, False, True, True, True]
     every = intervals(parts, 11, every_sample=True)
-    assert [one.end for one in every if one.ends_at_sample] == np.linspace(0.0, 1.0, 11)[1:].tolist()
-    assert [one.end for one in every if not one.ends_at_sample] == [0.47]
-    assert all(one.segment.start <= 0.5 * (one.start + one.end) <= one.segment.end for one in every)
+    assert [interval.end for interval in every if interval.ends_at_sample] == np.linspace(0.0, 1.0, 11)[1:].tolist()
+    assert [interval.end for interval in every if not interval.ends_at_sample] == [0.47]
+    assert all(
+        interval.segment.start <= 0.5 * (interval.start + interval.end) <= interval.segment.end for interval in every
+    )
 
 
 def test_the_last_interval_ends_at_the_end_and_not_beside_it() -> None:
@@ -80,7 +82,7 @@ def test_the_last_interval_ends_at_the_end_and_not_beside_it() -> None:
 
 def test_a_kink_that_is_off_a_sample_by_rounding_is_on_it() -> None:
     parts = segments([((0.0, 1.0), (0.1 + 1e-14, 5.0), (0.1 + 1e-14, 2.0))], 1.2)
-    assert all(one.ends_at_sample for one in intervals(parts, 61, every_sample=True))
+    assert all(interval.ends_at_sample for interval in intervals(parts, 61, every_sample=True))
     first, second = parts
     assert first.loads_at(first.end) == pytest.approx([5.0])
     assert second.loads_at(second.end) == [2.0]

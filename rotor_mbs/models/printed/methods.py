@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Method
-from rotor_mbs.methods.settings import choice
 from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.ode45_settings import Ode45Settings
 from rotor_mbs.models.printed import literal

@@ -13,10 +13,9 @@ from rotor_mbs.analysis.claim_study import (
     ClaimShares,
     Conditions,
     NumberTrials,
-    count_of_rows,
 )
-from rotor_mbs.analysis.claims import STATISTICS, Claim, ClaimResult, Reading
-from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
+from rotor_mbs.analysis.claims import STATISTICS, Claim
+from rotor_mbs.analysis.published import TrajectoryNumber, published
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, number, power, with_unit
 

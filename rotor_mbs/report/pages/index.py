@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import ENERGY_RISE, Claim, Finding, finding
-from rotor_mbs.analysis.published import Erratum
+from rotor_mbs.analysis.claim_study import HOLDS, ClaimShares
+from rotor_mbs.analysis.claims import ENERGY_RISE, Claim, Finding, Tally, finding
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, power, prefixed, with_unit
