@@ -5,17 +5,17 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from markupsafe import escape
 from support.checking import add_run, results_file
 from support.scenes import paper
-from support.stored import Made, rotor, store
+from support.stored import Arrays, Made, rotor, store
 from support.sweeps import made_sweep
 
 from rotor_mbs.analysis.claim_records import stored_claims
@@ -31,7 +31,7 @@ from rotor_mbs.report.core import numbers
 from rotor_mbs.report.core.elements import PageTable, Row, Section
 from rotor_mbs.report.core.files import page_names, render, write_pages
 from rotor_mbs.report.core.looks import COLOURS, COORDINATES
-from rotor_mbs.report.pages import claim_tables
+from rotor_mbs.report.pages import claim_tables, quantities
 from rotor_mbs.report.pages.errata import matrices
 from rotor_mbs.report.pages.index import heat_map
 from rotor_mbs.report.pages.quantities import parting
@@ -39,6 +39,7 @@ from rotor_mbs.report.pages.scene import range_table
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.solution.quantities import Plot, Quantity
 from rotor_mbs.studies.check import judge_file
 
 FIG11 = paper("fig11", samples=101)
@@ -87,14 +88,20 @@ def rows_of(text: str) -> dict[str, list[str]]:
 
 
 def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> None:
-    page = Page(text_of(report, "paper-fig11.html"))
+    text = text_of(report, "paper-fig11.html")
+    page = Page(text)
     assert page.sections == ["failures", "paper", "motion", "paths", "energy", "difference", "cost", "metrics", "file"]
     headings = [tag for tag in page.tags if re.fullmatch(r"h\d", tag)]
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
     assert page.tags.count("figcaption") == page.tags.count("figure") == 1 + 2 + 5 + 1 + 1 + 1
     images = [value for name, value in page.attributes if name == "role" and value == "img"]
     assert len(images) == page.tags.count("figure") + page.tags.count("canvas")
-    assert (report / "paper-fig11.html").stat().st_size < 250_000
+    opening = text[text.index('<div class="opening">') : text.index("What the paper says")]
+    assert 'class="viewer"' in opening
+    assert re.search(r"both models, which differ by up to [\d.]+ rad", opening)
+    assert re.search(r">0\.05 rad apart at 0\.\d+ s<", opening)
+    assert ">published 2.7315 rad<" in opening
+    assert len(text.encode()) < 250_000
 
 
 def test_the_index_opens_with_what_was_found_and_pictures_and_folds_its_other_tables(report: Path) -> None:
@@ -122,15 +129,6 @@ def test_the_heat_map_has_the_errors_the_methods_and_the_marks(report: Path, tmp
     assert "≠: inaccurate" in heat
     with open_results(store(tmp_path / "r.h5", [Made(FIG11, TAYLOR, SWING)])) as opened:
         assert heat_map(opened.scenes, {"paper/fig11": "x.html"}) is None  # nothing was compared
-
-
-def test_the_opening_of_a_scene_has_the_viewer_and_the_published_number(report: Path) -> None:
-    text = text_of(report, "paper-fig11.html")
-    opening = text[text.index('<div class="opening">') : text.index("What the paper says")]
-    assert 'class="viewer"' in opening
-    assert re.search(r"both models, which differ by up to [\d.]+ rad", opening)
-    assert re.search(r">0\.05 rad apart at 0\.\d+ s<", opening)
-    assert ">published 2.7315 rad<" in opening
 
 
 def test_equations_that_are_not_claimed_correct_are_not_called_ok(report: Path) -> None:
@@ -327,49 +325,36 @@ def test_formulas_are_typeset_and_the_faulty_entry_of_a_matrix_is_marked_and_cor
 # Stored quantities
 
 
-PACKAGE = """
-from rotor_mbs.solution.quantities import Plot, Quantity
-BROUGHT = (
-    Quantity("shaft_power", ("time",), "W", "power", output="report_test",
-             producer=lambda scene, samples: 1e3 * samples.rates[:, 0], plot=Plot("Power at the shaft", "power (W)")),
-    Quantity("pitch_speed", ("time", "blade"), "rad/s", "pitch speed", output="report_test",
-             producer=lambda scene, samples: samples.rates[:, 1:], plot=Plot("Pitch speeds", "speed (rad/s)")),
-    Quantity("spread", ("time", "blade"), "rad", "distance of the pitches", output="report_test",
-             producer=lambda scene, samples: abs(samples.angles[:, 1:]),
-             plot=Plot("Spread of the pitches", "spread (rad)", logarithmic=True)),
-)
-"""
-
-
-def sections_of(folder: Path, name: str) -> dict[str, str]:
-    """The sections of quantities of a page."""
-    return dict(re.findall(r'<section id="quantity-(\w+)">(.*?)</section>', text_of(folder, name), re.S))
-
-
-def test_a_stored_quantity_of_an_installed_package_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "report_test_quantities.py").write_text(PACKAGE)
-    information = tmp_path / "report_test_quantities-1.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: report-test-quantities\nVersion: 1\n")
-    (information / "entry_points.txt").write_text(
-        "[rotor_mbs.quantities]\nreport_test = report_test_quantities:BROUGHT\n"
+def test_a_quantity_is_drawn_as_its_declaration_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One component: all runs in a picture; several: a picture of each run; logarithmic: all runs by their sizes."""
+    declared = [
+        Quantity("shaft_power", ("time",), "W", "power", plot=Plot("Power at the shaft", "power (W)")),
+        Quantity("pitch_speed", ("time", "blade"), "rad/s", "pitch speed", plot=Plot("Pitch speeds", "speed (rad/s)")),
+        Quantity("spread", ("time", "blade"), "rad", "spread", plot=Plot("Spread", "spread (rad)", logarithmic=True)),
+    ]
+    monkeypatch.setattr(
+        quantities, "plotted_quantities", lambda _: [(quantity, quantity.plot) for quantity in declared]
     )
-    monkeypatch.syspath_prepend(tmp_path)
-    text = f'outputs = ["angles", "rates", "report_test"]\n{re.sub(r"outputs = .*", "", FIG11.text)}'
-    scene = replace(FIG11, outputs=("angles", "rates", "report_test"), text=text)
-    runs = [Made(scene, name, rotor(np.sin, np.cos)) for name in (TAYLOR, TREE)]
-    sections = sections_of(write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent, "paper-fig11.html")
-    assert list(sections) == ["shaft_power", "pitch_speed", "spread"]
-    assert "<h2>Power at the shaft</h2>" in sections["shaft_power"]
-    assert [section.count("<figure>") for section in sections.values()] == [1, 2, 1]  # of pitches one for each run
-    assert "blade 3" in sections["pitch_speed"]
-    assert "closed form, Taylor" in sections["shaft_power"]
+    time = np.linspace(0.0, 1.0, 11)
+    blades = np.stack([time, 2.0 * time, 3.0 * time], axis=1)
+    runs = {
+        name: Arrays(name, time=time, shaft_power=time, pitch_speed=blades, spread=blades) for name in (TAYLOR, TREE)
+    }
+    for run in runs.values():
+        run.labels = []
+    sections = quantities.quantity_sections(None, runs, None)
+    assert [heading for _, heading, _ in sections] == ["Power at the shaft", "Pitch speeds", "Spread"]
+    assert [len(section.pictures) for _, _, section in sections] == [1, 2, 1]
+    legends = [[entry.label for entry in section.legend] for _, _, section in sections]
+    methods = ["closed form, Taylor", "Exudyn tree, RK67"]
+    assert legends == [methods, ["blade 1", "blade 2", "blade 3"], methods]
 
 
 def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(tmp_path: Path) -> None:
     """Of the reference a picture per axis, one of the errors, and a table of the extremes with their times."""
     path = results_file(tmp_path / "r.h5", ["check/loads"], ["lagrange/dop853", TREE])
-    sections = sections_of(write_report(path, tmp_path / "out").parent, "check-loads.html")
+    text = text_of(write_report(path, tmp_path / "out").parent, "check-loads.html")
+    sections = dict(re.findall(r'<section id="quantity-(\w+)">(.*?)</section>', text, re.S))
     loads = ["blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment"]
     assert [name for name in sections if name in loads] == loads
     assert [sections[name].count("<figure>") for name in loads] == [4, 4, 2, 2, 2]
@@ -504,28 +489,17 @@ def test_the_report_is_built_without_any_engine(results: Path, tmp_path: Path) -
     assert (tmp_path / "out" / "paper-fig11.html").is_file()
 
 
-def _truncated(path: Path, results: Path) -> None:
-    path.write_bytes(results.read_bytes()[: results.stat().st_size // 2])
-
-
-def _foreign(path: Path, results: Path) -> None:  # noqa: ARG001
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        file["data"] = np.arange(3.0)
-
-
-def _no_hdf5(path: Path, results: Path) -> None:  # noqa: ARG001
-    path.write_text("<script>alert(1)</script>")
-
-
 @pytest.mark.parametrize("command", [["figures"], ["animate", "paper/fig11"], ["report"]])
-@pytest.mark.parametrize("make", [_truncated, _foreign, _no_hdf5])
+@pytest.mark.parametrize("kind", ["truncated", "foreign", "no HDF5"])
 def test_a_damaged_or_foreign_file_is_refused_and_nothing_is_written(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str],
-    make: Callable[[Path, Path], None],
-) -> None:  # fmt: skip
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str], kind: str
+) -> None:
     path = tmp_path / "bad.h5"
-    make(path, results)
+    if kind == "foreign":
+        with h5py.File(path, "w") as file:
+            file["data"] = np.arange(3.0)
+    else:
+        path.write_bytes(results.read_bytes()[:5000] if kind == "truncated" else b"<script>alert(1)</script>")
     assert main([*command, str(path), "-o", str(tmp_path / "out.webp")]) == 2
     error = capsys.readouterr().err
     assert str(path) in error

@@ -20,7 +20,7 @@ from rotor_mbs.report.pages.scene import key_picture
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, metric, status_cell, status_text, versions
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import paths
-from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.runs.read import OpenResults, StoredScene
 
 Scenes = Mapping[str, StoredScene]
 # Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
@@ -31,56 +31,53 @@ _LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 
 
 def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
-    """The content of the index. Tables are folded, below what it opens with."""
+    """The content of the index; what the file has no data for is None or empty. Its last tables are folded."""
     scenes, claims, study = opened.scenes, context.claims, context.study
     shares = None if study is None else study.shares
-    trials = [] if study is None else claim_tables.trial_tables(study.numbers)
     facts = finding(scenes, claims)
-    errata = PageTable(
-        "The errors in the printed equations; all else follows from them",
-        ("Erratum", "Equation", "Printed", "Correct", "Reason"),
-        [
-            (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
-            for e in context.errata
-        ],
-    )
+    shown = _shown_scene(scenes, claims)
+    sides = list(run_selection.sides(scenes[shown]).values())
+    own_claims = [claim for claim in claims if shown in claim.published.scenes]
+    still = None
+    for run in sides:
+        if "tip" in run:
+            still = picture(paths.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
+    benched = next((scene for scene in context.curves if scene in scenes), "")
+    curves = context.curves.get(benched, ())
+    errata_rows = [
+        (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
+        for e in context.errata
+    ]
+    errata_head = ("Erratum", "Equation", "Printed", "Correct", "Reason")
     return {
-        "glance": _glance(scenes, context),
         "paper": _paper_table(facts, shares),
+        "scene": shown,
+        "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
+        "still": still,
+        "crest": key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
+        "energy": _energy(scenes),
+        "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
         "methods": Section(tables=[_agreement_table(facts)]),
         "heat": heat_map(scenes, context.files),
         "scenes": Section(tables=[_scene_table(scenes, context.files)]),
         "numbers": Section(
-            tables=[claim_tables.number_table(claims), *trials],
+            tables=[
+                claim_tables.number_table(claims),
+                *(claim_tables.trial_tables(study.numbers) if study is not None else ()),
+            ],
             notes=[text for key, text in context.conditions.items() if not key.startswith("fig")],
         ),
         "claims": Section(
             tables=[claim_tables.claim_table(claims, shares)],
             notes=[] if shares is None else [claim_tables.study_note(shares)],
         ),
-        "errata": Section(tables=[errata]),
+        "errata": Section(
+            tables=[
+                PageTable("The errors in the printed equations; all else follows from them", errata_head, errata_rows)
+            ]
+        ),
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
-    }
-
-
-def _glance(scenes: Scenes, context: Context) -> dict[str, object]:
-    """What the index opens with; what the file has no data for is None."""
-    name = _shown_scene(scenes, context.claims)
-    sides = list(run_selection.sides(scenes[name]).values())
-    benched = next((scene for scene in context.curves if scene in scenes), "")
-    tips = next((run for run in reversed(sides) if "tip" in run), None)
-    own = [claim for claim in context.claims if name in claim.published.scenes]
-    curves = context.curves.get(benched, ())
-    return {
-        "scene": name,
-        "viewer": viewer(scenes[name], {label_of(run.method): run for run in sides}),
-        "still": None
-        if tips is None
-        else picture(paths.paths(tips.array("tip")), "still", f"{name}: paths of the tips"),
-        "crest": key_picture(sides, own, horizon(scenes[name]), "crest"),
-        "energy": _energy(scenes),
-        "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
     }
 
 
@@ -172,32 +169,38 @@ def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels
 def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:
     """Scene by method, the largest angle error before the horizon; None where no run was compared with a reference.
 
-    methods: (label, name); rows: (scene, page, cells); key: the marks that occur, with their meaning
+    methods: (label, name); rows: (scene, page, cells), of a cell the number of its shade, the error, the mark of the
+    status, and a text that is read out; key: the marks that occur, with their meaning
     """
     names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
     methods = run_selection.in_catalogue_order(names)
     if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):
         methods.insert(0, run_selection.PRINTED)
-    rows = [
-        (name, files[name], [_heat_cell(scene.methods.get(method)) for method in methods])
-        for name, scene in scenes.items()
-    ]
-    known = [cell for _, _, cells in rows for cell in cells if cell]
-    if not any(error for _, error, _, _ in known):
+    rows = []
+    key = {}
+    is_compared = False
+    for name, scene in scenes.items():
+        cells: list[tuple[int, str, str, str] | None] = []
+        for method in methods:
+            run = scene.methods.get(method)
+            if run is None:
+                cells.append(None)
+                continue
+            error = metric(run, "angle_error_max")
+            is_compared = is_compared or error is not None
+            text = "" if error is None else number(error)
+            shade = len(_SHADES)
+            if error is not None and math.isfinite(error):
+                shade = sum(error > 10.0**exponent for exponent in _SHADES)
+            mark = _MARKS.get(run.status, _FAILED)
+            if mark:
+                key[mark] = status_text(run.status)
+            spoken = f"{label_of(method)}: {text or 'no error known'}, {status_text(run.status)}"
+            cells.append((shade, text, mark, spoken))
+        rows.append((name, files[name], cells))
+    if not is_compared:
         return None
-    used = {mark: spoken.rpartition(", ")[2] for _, _, mark, spoken in known if mark}
-    return {"methods": [(label_of(name), name) for name in methods], "rows": rows, "key": sorted(used.items())}
-
-
-def _heat_cell(run: StoredRun | None) -> tuple[int, str, str, str] | None:
-    """The number of its shade, the error as text, the mark of the status, and a text that is read out."""
-    if run is None:
-        return None
-    error = metric(run, "angle_error_max")
-    text = "" if error is None else number(error)
-    spoken = f"{label_of(run.method)}: {text or 'no error known'}, {status_text(run.status)}"
-    shade = len(_SHADES) if error is None or not math.isfinite(error) else sum(error > 10.0**e for e in _SHADES)
-    return shade, text, _MARKS.get(run.status, _FAILED), spoken
+    return {"methods": [(label_of(name), name) for name in methods], "rows": rows, "key": sorted(key.items())}
 
 
 def _scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
@@ -205,10 +208,13 @@ def _scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) ->
     head = ("Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain")
     rows: list[Row] = []
     for name, scene in scenes.items():
-        cells: list[TableCell | str] = [str(scene.attributes.get("figures", "")), with_unit(horizon(scene), "s", 3)]
+        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title)]
+        row += [str(scene.attributes.get("figures", "")), with_unit(horizon(scene), "s", 3)]
         run = scene.methods.get(run_selection.PRINTED)
-        if run is not None:
-            gain = prefixed(metric(run, "energy_gain_J"), "J")
-            cells += [status_cell(run), number(metric(run, "angle_error_whole")), gain]
-        rows.append([TableCell(name, href=files[name], note=scene.title), *cells, *[""] * (len(head) - 1 - len(cells))])
+        if run is None:
+            row += ["", "", ""]
+        else:
+            row += [status_cell(run), number(metric(run, "angle_error_whole"))]
+            row.append(prefixed(metric(run, "energy_gain_J"), "J"))
+        rows.append(row)
     return PageTable("", head, rows, numeric=(2, 4, 5)).without_empty_columns()

@@ -25,69 +25,45 @@ MAX_GROWTH = 1e3
 
 
 def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
-    """What the template has of the modes of some scenes."""
+    """The content of the page: a part for each scene, of which each id is unique on the page."""
     return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)]}
 
 
 def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
-    """What the page has of a scene; `name` is unique on the page."""
+    sources = max((list(kind.values()) for kind in (modes.rest, modes.rotation)), key=len)
     rest = next(iter(modes.rest.values()), None)
     rotation = next(iter(modes.rotation.values()), None)
-    pictures, fastest = _rotation(rotation, modes.scene, name)
+    pictures: list[Picture] = []
+    legend: list[LegendEntry] = []
+    fastest = Section()
+    if rotation is not None and not np.isnan(rotation.growth_rates).all():
+        last = len(rotation.speeds) - 1
+        state = f"{modes.scene}, {number(float(rotation.speeds[last]), 4)} rad/s"
+        fastest = Section(tables=_tables(rotation, last, state))
+        if last > 0:
+            caption = "Damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
+            pictures.append(picture(campbell(rotation), f"{name}-campbell", caption))
+            legend += [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
+            if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
+                caption = "Damping ratios and growth rates"
+                pictures.append(picture(damping(rotation), f"{name}-damping", caption))
     return {
         "id": name,
         "name": modes.scene,
         "title": modes.title,
-        "agreement": _agreement(modes),
+        "models": [f"{linear.label} ({linear.source})" for linear in sources],
+        "agrees": modes.agrees,
+        "difference": modes.disagreement,
         "notes": ([floquet_sentence(modes.floquet)] if modes.floquet is not None else []) + list(modes.notes),
         "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
-        "campbell": pictures,
+        "campbell": Section(pictures, legend),
         "fastest": fastest,
         "turning": _turning(modes, name),
     }
 
 
-def _agreement(modes: SceneModes) -> dict[str, object] | None:
-    """The models whose modes were found, and how much their frequencies differ; None with one model."""
-    sources = max((list(kind.values()) for kind in (modes.rest, modes.rotation)), key=len)
-    if len(sources) < 2:
-        return None
-    return {
-        "models": [f"{linear.label} ({linear.source})" for linear in sources],
-        "agrees": modes.agrees,
-        "difference": modes.disagreement,
-    }
-
-
-def _rotation(rotation: LinearModes | None, scene: str, name: str) -> tuple[Section, Section]:
-    """The pictures over speed; the tables of the highest speed."""
-    if rotation is None or np.isnan(rotation.growth_rates).all():
-        return Section(), Section()
-    last = len(rotation.speeds) - 1
-    fastest = Section(tables=_tables(rotation, last, f"{scene}, {number(float(rotation.speeds[last]), 4)} rad/s"))
-    if last == 0:
-        return Section(), fastest
-    caption = (
-        "Campbell diagram: damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
-    )
-    drawn = [picture(campbell(rotation), f"{name}-campbell", caption)]
-    if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
-        caption = "Damping ratios and growth rates"
-        drawn.append(picture(damping(rotation), f"{name}-damping", caption))
-    legend = [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
-    return Section(drawn, legend), fastest
-
-
 def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
-    """The tables of the i-th speed; state: the beginning of their captions, which differ on the whole page."""
-    return [
-        _mode_table(f"{state}: modes by the {linear.label} ({linear.source})", linear, i),
-        _shape_table(f"{state}: shapes, the largest amplitude 1", linear, i),
-    ]
-
-
-def _mode_table(caption: str, linear: LinearModes, i: int) -> PageTable:
-    """Frequencies at the i-th speed."""
+    """Frequencies and shapes at the i-th speed; state: the beginning of captions, which differ on the whole page."""
     columns = {
         "undamped (Hz)": linear.undamped_frequencies / (2.0 * math.pi),
         "undamped (rad/s)": linear.undamped_frequencies,
@@ -97,19 +73,16 @@ def _mode_table(caption: str, linear: LinearModes, i: int) -> PageTable:
         "backward whirl (rad/s)": linear.whirl[0],
         "forward whirl (rad/s)": linear.whirl[1],
     }
-    rows = [[name, *(_shown(float(x[i, k]), 7) for x in columns.values())] for k, name in enumerate(linear.names)]
-    return PageTable(caption, ("Mode", *columns), rows, range(1, 1 + len(columns))).without_empty_columns()
-
-
-def _shape_table(caption: str, linear: LinearModes, i: int) -> PageTable:
-    """Moduli of the amplitudes in multiblade coordinates."""
-    amplitudes = np.abs(linear.multiblade_shapes[i])
-    rows = []
-    for name, shape in zip(linear.names, amplitudes, strict=True):
-        largest = max(float(shape.max()), 1e-300)
-        rows.append([name, *(_shown(float(value) / largest, 3) for value in shape)])
+    frequencies, shapes = [], []
+    for k, name in enumerate(linear.names):
+        frequencies.append([name, *(_shown(float(values[i, k]), 7) for values in columns.values())])
+        amplitudes = np.abs(linear.multiblade_shapes[i][k])
+        largest = max(float(amplitudes.max()), 1e-300)
+        shapes.append([name, *(_shown(float(amplitude) / largest, 3) for amplitude in amplitudes)])
+    caption = f"{state}: modes by the {linear.label} ({linear.source})"
+    table = PageTable(caption, ("Mode", *columns), frequencies, range(1, 1 + len(columns))).without_empty_columns()
     head = ("Shape", "rotor", *multiblade(linear.blades)[0])
-    return PageTable(caption, head, rows, tuple(range(1, len(head))))
+    return [table, PageTable(f"{state}: shapes, the largest amplitude 1", head, shapes, range(1, len(head)))]
 
 
 def _shown(value: float, digits: int) -> str:
