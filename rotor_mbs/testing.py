@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotor_mbs.report.data_comparison import DataComparison, compare_data
+from rotor_mbs.report.data_comparison import DataComparison, compare
 from rotor_mbs.scenario.catalogue import only_scene
 from rotor_mbs.scenario.scene import Scene
 
@@ -41,7 +41,7 @@ def assert_agrees(
     """
     chosen = only_scene(scene) if isinstance(scene, str) else scene
     arrays = {"time": time, "angles": angles} | ({} if rates is None else {"rates": rates})
-    found = compare_data(arrays, chosen, tolerance=tolerance)
+    found = compare(arrays, chosen, tolerance=tolerance)
     if not found.agrees:
         raise AssertionError(str(found))
     return found

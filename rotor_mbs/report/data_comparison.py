@@ -24,7 +24,7 @@ from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.compare_data import DataStudy, compare_with_reference
 
 
-def compare_data(
+def compare(
     data: str | os.PathLike[str] | Mapping[str, Any],
     scene: Scene | str,
     *,

@@ -522,14 +522,9 @@ def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
     for depth, part in enumerate(path):
         has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
         if not has_such_entries:
-<<<<<<< HEAD
-            kinds: dict[type, str] = {dict: "a table", list: "a list"}
-            what = f"is {kinds.get(type(here), 'a single value')}"
-=======
             what = "is a single value"
             if isinstance(here, dict | list):
                 what = "is a table" if isinstance(here, dict) else "is a list"
->>>>>>> scen/main
             raise TableError([KeyProblem(path[:depth], what, KEY_FORM, is_of_key=True)])
         if isinstance(part, int) and part >= len(here):
             name = shown_key(path[:depth])

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rotor_mbs
-from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.finding import finding
+from rotor_mbs.analysis.claim_study import claim_study
+from rotor_mbs.analysis.claims import claims, finding
 from rotor_mbs.analysis.run_tables import finding_lines, method_table
 from rotor_mbs.errors import RotorError
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, find_method, ladders
