@@ -10,11 +10,8 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import find_method, ladders, methods, settings_for
+from rotor_mbs.methods.catalogue import find_method, methods, settings_for
 from rotor_mbs.methods.settings import Settings, choice, number
-from rotor_mbs.methods.solve import solve
-from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.bench import with_settings
 
 ALL = [*methods(), find_method("reference")]
 NUMBERS = [
@@ -64,12 +61,6 @@ def test_the_range_of_scipys_tolerance_starts_where_scipy_would_change_it() -> N
         assert "at least 2.22045e-14" in refused(find_method(name), relative_tolerance=0.99 * least)
 
 
-def test_nothing_runs_with_a_refused_setting() -> None:
-    (scene,) = find_scenes(["paper/fig03"])
-    with pytest.raises(InputError, match="perhaps tolerance"):
-        solve("lagrange/taylor", scene, {"tolerence": 1e-3})
-
-
 @dataclass(frozen=True)
 class Own(Settings):
     stages: int = number(4, at_least=1, at_most=8, doc="stages")
@@ -78,9 +69,9 @@ class Own(Settings):
 
 
 def test_numbers_are_converted_to_the_declared_type() -> None:
-    found = Own.of("own", {"stages": 3.0, "step": np.float32(0.5), "scheme": "b"})
-    assert found == Own(3, 0.5, "b")
-    assert [type(value) for value in found.as_dict().values()] == [int, float, str]
+    result = Own.of("own", {"stages": 3.0, "step": np.float32(0.5), "scheme": "b"})
+    assert result == Own(3, 0.5, "b")
+    assert [type(value) for value in result.as_dict().values()] == [int, float, str]
     with pytest.raises(InputError) as caught:
         Own.of("own", {"stages": 3.5, "scheme": "c", "steps": 1.0})
     assert str(caught.value) == (
@@ -99,13 +90,3 @@ def test_settings_go_to_the_methods_that_have_them() -> None:
         settings_for(names, {"stp": 1e-3})
     with pytest.raises(InputError, match=r"step = -1 is not allowed"):
         settings_for(names, {"step": -1})
-
-
-def test_a_bench_keeps_settings_fixed_that_its_ladders_do_not_vary() -> None:
-    names = ("exudyn_tree/generalized_alpha", "lagrange/taylor")
-    fixed = with_settings(ladders(names), {"newton_relative_tolerance": 1e-6})
-    for ladder, plain in zip(fixed, ladders(names), strict=True):
-        own = {"newton_relative_tolerance": 1e-6} if ladder.method == names[0] else {}
-        assert ladder.choices == own | dict(plain.choices)
-    with pytest.raises(InputError, match="bench varies step itself"):
-        with_settings(ladders(names), {"step": 1e-3})

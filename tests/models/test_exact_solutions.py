@@ -10,7 +10,7 @@ import pytest
 from scipy.special import ellipk
 from support.exudyn_runs import CHAIN, EXPLICIT, METHODS, energy_error
 from support.exudyn_runs import run as solved
-from support.rotors import AXIAL, FIG11, PAPER, SLIM, STOUT, C, D, closed_form, energies, make_scene, pendulum
+from support.rotors import AXIAL, FIG11, MIXED, PAPER, SLIM, STOUT, C, D, closed_form, energies, make_scene, pendulum
 
 from rotor_mbs.methods.catalogue import find_method
 
@@ -149,6 +149,20 @@ def test_turning_the_rotor_by_a_third_and_renaming_blades_changes_nothing(name) 
     back = run(name, turned).angles[:, [0, 3, 1, 2]] - [2 * pi / 3, 0, 0, 0]
     # round-off, for the chain Newton's tolerance
     assert np.abs(run(name, scene).angles - back).max() < (1e-6 if name in CHAIN else 1e-11)
+
+
+@every_method
+def test_repeats_are_bit_identical(name) -> None:
+    method = find_method(name)
+    if not method.is_installed:
+        pytest.skip(f"{name} is not installed")
+    scene = replace(MIXED, duration=0.2, samples=21, rotor_torque=((0.0, 0.0), (0.0737, 500.0), (0.1, 100.0)))
+    solver = method.build(scene, method.settings())
+    first_report, first = solver.integrate(), solver.observe()
+    second_report, second = solver.integrate(), solver.observe()
+    assert first_report == second_report
+    for quantity in ("angles", "rates", "tip", "kinetic_energy", "potential_energy", "work"):
+        assert np.array_equal(first.get(quantity), second.get(quantity)), quantity
 
 
 # The oracle itself: elliptic pendulum, period, energy.

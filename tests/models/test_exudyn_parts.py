@@ -127,10 +127,10 @@ def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None
 def test_a_solve_that_fails_is_counted_to_the_last_step_that_it_took(name) -> None:
     """The kink of the torque comes after it, and makes another interval, which is not begun."""
     kinked = replace(SINGULAR, rotor_torque=((0.0, 0.0), (0.5, 0.0), (1.0, 1.0)))
-    found = solve(name, kinked, {"step": 1e-3}).integration
-    assert found.time_reached < 0.1
-    assert found.time_reached == pytest.approx(1e-3 * found.steps, rel=1e-9)
-    assert not found.out_of_time
+    result = solve(name, kinked, {"step": 1e-3}).integration
+    assert result.time_reached < 0.1
+    assert result.time_reached == pytest.approx(1e-3 * result.steps, rel=1e-9)
+    assert not result.out_of_time
     first = solve(name, replace(SINGULAR, samples=2), {"step": 1.0}).integration
     assert (first.steps, first.time_reached) == (0, 0.0)
 

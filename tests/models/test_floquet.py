@@ -57,8 +57,8 @@ def mathieu_trace(a: float, q: float) -> float:
     """Trace of the transition matrix over s = π by Hill's determinant: 2 - 4 Δ(0) sin²(π √a / 2)."""
     before, determinant = 1.0, 1.0
     ratios = q / ((2.0 * np.arange(-4000, 4001)) ** 2 - a)
-    for one, other in pairwise(ratios.tolist()):
-        before, determinant = determinant, determinant - one * other * before
+    for given, other in pairwise(ratios.tolist()):
+        before, determinant = determinant, determinant - given * other * before
     return 2.0 - 4.0 * determinant * math.sin(0.5 * math.pi * math.sqrt(a)) ** 2
 
 
@@ -129,14 +129,14 @@ def test_the_product_of_the_multipliers_is_the_exponential_of_the_integrated_tra
 def test_without_gravity_the_multipliers_are_those_of_the_eigenvalues():
     scene = replace(DAMPED, gravity=0.0)
     turn = periodic_turn(scene, 2.0)
-    found, _ = floquet(turn.transition, turn.flow, turn.gradient, 2.0)
+    result, _ = floquet(turn.transition, turn.flow, turn.gradient, 2.0)
     angles = [0.3, *turn.start[1:4]]
     linear = linearize(scene, angles, [2.0, 0, 0, 0], turn.torque)
     n = len(linear.stiffness)
     values = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-linear.stiffness, -linear.damping]]))
     expected = np.exp(values * math.pi)
     for multiplier in expected:
-        assert np.abs(found - multiplier).min() < 1e-7
+        assert np.abs(result - multiplier).min() < 1e-7
 
 
 def test_where_no_motion_is_found_the_reason_is_given():

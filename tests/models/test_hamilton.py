@@ -51,11 +51,13 @@ def cos(half_tangent: Exact) -> Exact:
     return Exact((1 - t * t) / (1 + t * t))
 
 
-def derivatives_of_momenta(angles: list[Exact], rates: list[Exact], found: list[Exact], form: RotorForm) -> list[Exact]:
+def derivatives_of_momenta(
+    angles: list[Exact], rates: list[Exact], second: list[Exact], form: RotorForm
+) -> list[Exact]:
     """d(M q̇)/dt from accelerations: M q̈ + (dM/dt) q̇."""
-    spin, turned = rates[0], found[0]
+    spin, turned = rates[0], second[0]
     total, out = form.inertia * turned, []
-    for blade, theta, rate, acceleration in zip(form.blades, angles[1:], rates[1:], found[1:], strict=True):
+    for blade, theta, rate, acceleration in zip(form.blades, angles[1:], rates[1:], second[1:], strict=True):
         s, c = sin(theta), cos(theta)
         a = blade.inertia_ss * (s * s) + blade.inertia_cc * (c * c) + blade.inertia_sc * (s * c)
         slope = (blade.inertia_ss - blade.inertia_cc) * (2 * (s * c)) + blade.inertia_sc * (c * c - s * s)
@@ -66,11 +68,11 @@ def derivatives_of_momenta(angles: list[Exact], rates: list[Exact], found: list[
 
 
 @pytest.mark.parametrize(
-    "one", [general(), scene("check/general"), paper("fig11"), paper("fig03")], ids=lambda s: s.name
+    "given", [general(), scene("check/general"), paper("fig11"), paper("fig03")], ids=lambda s: s.name
 )
-def test_both_forms_are_the_same_equations_exactly(one: Scene) -> None:
+def test_both_forms_are_the_same_equations_exactly(given: Scene) -> None:
     """Every term, at random rational states: no rounding, so that one wrong coefficient cannot hide in it."""
-    form, numbers = rotor_form(one, Exact), random.Random(5)
+    form, numbers = rotor_form(given, Exact), random.Random(5)
 
     def some(count: int) -> list[Exact]:
         return [Exact(Fraction(numbers.randint(-99, 99), numbers.randint(1, 50))) for _ in range(count)]
@@ -83,5 +85,5 @@ def test_both_forms_are_the_same_equations_exactly(one: Scene) -> None:
         rates_again = hamilton.rates(angles, p, form, sin, cos)
         forces = hamilton.forces(angles, rates, form, loads, sin, cos)
         expected = derivatives_of_momenta(angles, rates, accelerations(angles, rates, form, loads, sin, cos), form)
-        assert [one.value for one in rates_again] == [one.value for one in rates]
-        assert [one.value for one in forces] == [one.value for one in expected]
+        assert [given.value for given in rates_again] == [given.value for given in rates]
+        assert [given.value for given in forces] == [given.value for given in expected]

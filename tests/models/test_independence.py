@@ -32,9 +32,9 @@ def python(code: str, blocked: tuple[str, ...] = ()) -> subprocess.CompletedProc
     [
         ("lagrange/dop853", ("exudyn", "heyoka", "mujoco")),
         ("lagrange/taylor", ("exudyn", "scipy", "mujoco", "h5py")),
-        ("reference", ("exudyn", "heyoka", "mujoco")),
+        pytest.param("reference", ("exudyn", "heyoka", "mujoco"), marks=pytest.mark.full),
         ("exudyn_tree/rk67", ("heyoka", "scipy", "mujoco", "h5py")),
-        ("exudyn_chain/generalized_alpha", ("heyoka", "scipy", "mujoco")),
+        pytest.param("exudyn_chain/generalized_alpha", ("heyoka", "scipy", "mujoco"), marks=pytest.mark.full),
         ("printed/ode45", ("heyoka", "scipy", "exudyn", "mujoco")),
         ("mujoco/rk4", ("heyoka", "scipy", "exudyn")),
     ],

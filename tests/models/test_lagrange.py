@@ -90,12 +90,12 @@ def test_equals_lagranges_equations_derived_by_machine(scene: Scene) -> None:
     random = np.random.default_rng(7)
     for _ in range(50):
         q, w = random.uniform(-4, 4, count), random.uniform(-3, 3, count)
-        found = np.array(closed_form.accelerations(list(q), list(w), form, LoadValues(0.0), math.sin, math.cos))
+        computed = np.array(closed_form.accelerations(list(q), list(w), form, LoadValues(0.0), math.sin, math.cos))
         driven = closed_form.accelerations(list(q), list(w), form, LoadValues(1e6), math.sin, math.cos)
-        schur = 1e6 / (driven[0] - found[0])
+        schur = 1e6 / (driven[0] - computed[0])
         share = schur / sum(b.mass * float(np.dot(b.centre_of_mass, b.centre_of_mass)) for b in scene.blades)
         right = derived(np.concatenate([q, w]))
-        assert np.abs(found - right).max() <= 1e-13 / share * (np.abs(right).max() + cancelling)
+        assert np.abs(computed - right).max() <= 1e-13 / share * (np.abs(right).max() + cancelling)
 
 
 def test_a_torque_that_rises_over_the_whole_run() -> None:
@@ -104,10 +104,10 @@ def test_a_torque_that_rises_over_the_whole_run() -> None:
     scene = paper("fig05", gravity=0.0, rotor_torque=((0.0, 0.0), (20.0, 20.0 * slope)))
     inertia = 3 * MASS * (OFFSET**2 + ARM**2)
     for method in (*METHODS, "reference"):
-        found = run(scene, method)
-        turned = slope * found.time**3 / (6 * inertia)
-        assert np.abs(found.angles[:, 0] - math.pi / 6 - turned).max() <= 1e-12
-        assert np.abs(found.work - slope**2 * found.time**4 / (8 * inertia)).max() <= 1e-12 * found.work.max()
+        computed = run(scene, method)
+        turned = slope * computed.time**3 / (6 * inertia)
+        assert np.abs(computed.angles[:, 0] - math.pi / 6 - turned).max() <= 1e-12
+        assert np.abs(computed.work - slope**2 * computed.time**4 / (8 * inertia)).max() <= 1e-12 * computed.work.max()
 
 
 def test_time_runs_back() -> None:
@@ -144,17 +144,17 @@ def test_the_fallback_reference_states_its_uncertainty(monkeypatch: pytest.Monke
     scene = paper("fig11", duration=7.0, samples=701)
     true = run(scene, "reference")
     monkeypatch.setattr(reference, "is_available", lambda: False)
-    found = solve("reference", scene, {}).trajectory
-    assert found.angle_uncertainty is not None
-    assert found.angle_uncertainty[-1] > 1e6 * true.angle_uncertainty[-1]
-    assert found.error_growth is not None
+    computed = solve("reference", scene, {}).trajectory
+    assert computed.angle_uncertainty is not None
+    assert computed.angle_uncertainty[-1] > 1e6 * true.angle_uncertainty[-1]
+    assert computed.error_growth is not None
     assert true.error_growth is not None
-    error = np.abs(found.angles - true.angles).max(axis=1)
-    assert (error <= found.angle_uncertainty).all()
-    first = [int(np.argmax(np.maximum.accumulate(g) >= 1e5)) for g in (found.error_growth, true.error_growth)]
+    error = np.abs(computed.angles - true.angles).max(axis=1)
+    assert (error <= computed.angle_uncertainty).all()
+    first = [int(np.argmax(np.maximum.accumulate(g) >= 1e5)) for g in (computed.error_growth, true.error_growth)]
     assert abs(first[0] - first[1]) <= 2  # the same horizon to two samples
     # Not for nothing: the looser tolerance, grown 1e5-fold, the safety factor of ten, and as much again.
-    assert found.angle_uncertainty[: first[1]].max() < 1e5 * 2.3e-12 * 10.0 * 10.0
+    assert computed.angle_uncertainty[: first[1]].max() < 1e5 * 2.3e-12 * 10.0 * 10.0
 
 
 @pytest.mark.parametrize(

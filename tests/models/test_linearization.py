@@ -49,7 +49,7 @@ def frequencies(linearization, scene: Scene, speed: float) -> np.ndarray:
 
 def test_derivatives_of_the_closed_form_are_those_of_the_equations_written_once_more():
     angles, rates = np.array([0.4, 0.7, -1.1, 2.0]), np.array([1.3, -0.4, 0.9, 0.2])
-    found = closed.linearize(DAMPED, angles, rates, 0.0)
+    result = closed.linearize(DAMPED, angles, rates, 0.0)
     start = np.concatenate([angles, rates])
     for k in range(8):
         step = np.zeros(8)
@@ -60,7 +60,7 @@ def test_derivatives_of_the_closed_form_are_those_of_the_equations_written_once_
             for j, w in ((1, 45.0), (2, -9.0), (3, 1.0))
         )
         column = -change[4:] / (60.0 * 1e-3)
-        ours = (found.stiffness if k < 4 else found.damping)[:, k % 4]
+        ours = (result.stiffness if k < 4 else result.damping)[:, k % 4]
         np.testing.assert_allclose(ours, column, rtol=1e-9, atol=1e-9)
 
 
@@ -134,8 +134,8 @@ def test_closed_form_tree_chain_and_mujoco_have_the_same_frequencies(scene, spee
 def test_joint_forces_stiffen_the_chain(monkeypatch):
     """Without the geometric stiffness the same comparison fails, by percents."""
     monkeypatch.setattr(engine, "_geometric_stiffness", lambda _system, _forces, N, _step: np.zeros_like(N))
-    found = frequencies(engine.linearize_chain(DAMPED, state(DAMPED, 0.0), 0.0, 0.0), DAMPED, 0.0)
-    assert np.abs(found[1:] / frequencies(linear(DAMPED, 0.0), DAMPED, 0.0)[1:] - 1.0).max() > 0.01
+    result = frequencies(engine.linearize_chain(DAMPED, state(DAMPED, 0.0), 0.0, 0.0), DAMPED, 0.0)
+    assert np.abs(result[1:] / frequencies(linear(DAMPED, 0.0), DAMPED, 0.0)[1:] - 1.0).max() > 0.01
 
 
 def test_no_steady_state_is_an_input_error():

@@ -55,8 +55,8 @@ def loads(method: str, scene: Scene, **settings: object):
     return run
 
 
-def off(found, expected) -> float:
-    return float(np.abs(found - np.asarray(expected)).max())
+def off(result, expected) -> float:
+    return float(np.abs(result - np.asarray(expected)).max())
 
 
 def test_hanging_blade_pulls_with_its_weight(method: str) -> None:
@@ -203,11 +203,12 @@ def chain_loads(name: str, refinement: int, extrapolation: str = "none") -> dict
     return {load: run.get(load) for load in LOADS}
 
 
-def load_error(scene: Scene, found: dict[str, np.ndarray], exact) -> float:
+def load_error(scene: Scene, result: dict[str, np.ndarray], exact) -> float:
     """Of the largest force at a root; moments of that force at the longest arm."""
     force = np.linalg.norm(exact.blade_root_force, axis=-1).max()
     return max(
-        off(found[name], exact.get(name)) / (force * (1.0 if "force" in name else longest_arm(scene))) for name in LOADS
+        off(result[name], exact.get(name)) / (force * (1.0 if "force" in name else longest_arm(scene)))
+        for name in LOADS
     )
 
 
@@ -255,8 +256,8 @@ def test_printed_loads_are_what_its_own_motion_needs() -> None:
         place = frames @ np.array(blade.centre_of_mass)
         acceleration = sum(w * place[k : len(place) - 6 + k] for k, w in enumerate(weights)) / h**2
         force = blade.mass * (acceleration + np.array([0.0, 0.0, scene.gravity]))
-        found = np.einsum("nij,nj->ni", frames, run.blade_root_force[:, i])[3:-3]
-        assert off(found, force) < 1e-6 * np.abs(force).max()
+        result = np.einsum("nij,nj->ni", frames, run.blade_root_force[:, i])[3:-3]
+        assert off(result, force) < 1e-6 * np.abs(force).max()
         assert off(np.cross(blade.centre_of_mass, run.blade_root_force[:, i]), run.blade_root_moment[:, i]) < 1e-6
     assert np.abs(run.pitch_actuator_moment).max() > 100.0
     assert np.abs(run.shaft_moment[:, 1]).max() > 1e4

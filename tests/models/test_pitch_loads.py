@@ -130,41 +130,41 @@ CASES = {"constant torque": (FREE, constant_torque), "step of the command": (COM
 def test_exact_solutions_by_every_corrected_method(method: str, case: str) -> None:
     """Seen: 1.4e-11 rad of the extrapolated chain (generalized-α), 3e-12 of the others of low order."""
     scene, exact = CASES[case]
-    found = best(scene, method)
-    angle, rate = exact(found.time)
-    assert np.abs(found.angles[:, 1] - angle).max() < 1e-10
-    assert np.abs(found.rates[:, 1] - rate).max() < 1e-9
-    assert np.abs(found.angles[:, 0] - (0.1 + found.time)).max() < 1e-10  # the rotor does not feel it
+    result = best(scene, method)
+    angle, rate = exact(result.time)
+    assert np.abs(result.angles[:, 1] - angle).max() < 1e-10
+    assert np.abs(result.rates[:, 1] - rate).max() < 1e-9
+    assert np.abs(result.angles[:, 0] - (0.1 + result.time)).max() < 1e-10  # the rotor does not feel it
 
 
 @pytest.mark.parametrize("method", CORRECTED)
 def test_work_and_energy_of_a_step_of_the_command(method: str) -> None:
     """The jump puts ½ k r² into the spring while the pitch is at 0; from there on only the damper does work."""
-    found = best(COMMAND, method)
+    result = best(COMMAND, method)
     stored = 0.5 * STIFFNESS * STEP**2
-    work = np.where(found.time < STEP_S, 0.0, stored) - damper_work(found.time)
-    assert np.abs(found.work - work).max() < 1e-9 * stored
-    angle, rate = step_response(found.time)
-    rest = np.where(found.time < STEP_S, 0.0, STEP)
+    work = np.where(result.time < STEP_S, 0.0, stored) - damper_work(result.time)
+    assert np.abs(result.work - work).max() < 1e-9 * stored
+    angle, rate = step_response(result.time)
+    rest = np.where(result.time < STEP_S, 0.0, STEP)
     kinetic = 0.5 * INERTIA * rate**2 + 0.5 * (12.0 + 50.0 * 9.0)
     potential = 0.5 * STIFFNESS * (angle - rest) ** 2
-    assert np.abs(found.kinetic_energy - kinetic).max() < 1e-9 * kinetic[0]
-    assert np.abs(found.potential_energy - potential).max() < 1e-9 * stored
-    assert np.abs(found.kinetic_energy + found.potential_energy - found.work - kinetic[0]).max() < 1e-9 * kinetic[0]
+    assert np.abs(result.kinetic_energy - kinetic).max() < 1e-9 * kinetic[0]
+    assert np.abs(result.potential_energy - potential).max() < 1e-9 * stored
+    assert np.abs(result.kinetic_energy + result.potential_energy - result.work - kinetic[0]).max() < 1e-9 * kinetic[0]
 
 
 @pytest.mark.parametrize("method", CORRECTED)
 def test_work_of_a_constant_torque_and_of_a_constant_rest_angle(method: str) -> None:
     """Of the torque on the pitch, and of one on the rotor beside it."""
     scene = replace(FREE, rotor_torque=((0.0, 5.0),), bearing_stiffness=(STIFFNESS,), bearing_rest=(((0.0, 0.7),),))
-    found = best(scene, method)
-    work = 5.0 * (found.angles[:, 0] - 0.1) + 12.0 * (found.angles[:, 1] - 0.2)
-    assert np.abs(found.work - work).max() < 1e-12 * np.abs(found.work).max()
-    spring = 0.5 * STIFFNESS * (found.angles[:, 1] - 0.7) ** 2
+    result = best(scene, method)
+    work = 5.0 * (result.angles[:, 0] - 0.1) + 12.0 * (result.angles[:, 1] - 0.2)
+    assert np.abs(result.work - work).max() < 1e-12 * np.abs(result.work).max()
+    spring = 0.5 * STIFFNESS * (result.angles[:, 1] - 0.7) ** 2
     # Energies extrapolated are those of the extrapolated angles but for what is left of their errors.
     bound = 1e-12 if method in TO_ROUND_OFF else 1e-9
-    assert np.abs(found.potential_energy - spring).max() < bound * spring.max()
-    energy = found.kinetic_energy + found.potential_energy - found.work
+    assert np.abs(result.potential_energy - spring).max() < bound * spring.max()
+    energy = result.kinetic_energy + result.potential_energy - result.work
     assert np.abs(energy - energy[0]).max() < 1e-9 * energy[0]
 
 
@@ -197,18 +197,18 @@ BOUND |= dict.fromkeys(
 )
 def test_every_load_at_once_follows_the_equations_written_anew(method: str) -> None:
     """Constant, ramps and jumps between samples, on unlike blades of full inertia, with springs, dampers, gravity."""
-    found, exact = run(EVERYTHING, method), closed_form(EVERYTHING)
+    result, exact = run(EVERYTHING, method), closed_form(EVERYTHING)
     bound = BOUND.get(method, 1e-10)
-    assert np.abs(found.angles - exact[:, :4]).max() < bound
+    assert np.abs(result.angles - exact[:, :4]).max() < bound
     kinetic, potential = energies(EVERYTHING, exact)
     scale = np.abs(kinetic).max()
-    assert np.abs(found.kinetic_energy - kinetic).max() < 10 * bound * scale
-    assert np.abs(found.potential_energy - potential).max() < 10 * bound * scale
-    balance = found.kinetic_energy + found.potential_energy - found.work
+    assert np.abs(result.kinetic_energy - kinetic).max() < 10 * bound * scale
+    assert np.abs(result.potential_energy - potential).max() < 10 * bound * scale
+    balance = result.kinetic_energy + result.potential_energy - result.work
     assert np.abs(balance - balance[0]).max() < 10 * bound * scale
-    own = kinematics.potential_energy(EVERYTHING, found.time, found.angles)
+    own = kinematics.potential_energy(EVERYTHING, result.time, result.angles)
     gap = 1e-7 if method.startswith("exudyn_chain") else 1e-12  # its bodies leave the joints by some 1e-9 m
-    assert np.abs(found.potential_energy - own).max() < gap * scale
+    assert np.abs(result.potential_energy - own).max() < gap * scale
 
 
 LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment")
@@ -226,9 +226,9 @@ LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment",
 def test_loads_at_roots_and_actuators_with_every_load_at_once(method: str, bound: float) -> None:
     """The actuator's moment is spring, command, damper and torque; bounds are shares of the largest load."""
     scene = replace(EVERYTHING, outputs=("angles", "rates", "loads"))
-    exact, found = run(scene, "lagrange/dop853").quantities, run(scene, method).quantities
+    exact, result = run(scene, "lagrange/dop853").quantities, run(scene, method).quantities
     for name in LOADS:
-        assert np.abs(found[name] - exact[name]).max() < bound * np.abs(exact[name]).max(), name
+        assert np.abs(result[name] - exact[name]).max() < bound * np.abs(exact[name]).max(), name
 
 
 def test_a_command_on_a_spring_without_stiffness_does_nothing() -> None:
@@ -248,14 +248,14 @@ def test_the_printed_equations_take_the_torques_of_the_pitches(pitches: int) -> 
         start, [0.0] * len(start), gravity=0.0, duration=1e-2, samples=3, pitch_torque=tables,
         rotor_torque=((0.0, 1e5),), outputs=ALL,
     )  # fmt: skip
-    found = run(scene, "printed/ode45", relative_tolerance=1e-12, absolute_tolerance=1e-15)
+    result = run(scene, "printed/ode45", relative_tolerance=1e-12, absolute_tolerance=1e-15)
     text = literal.one_blade_accelerations if pitches == 1 else literal.three_blade_accelerations
     x, _, z = PAPER.centre_of_mass
     torques = [1e5, *(table[0][1] for table in tables)]
     expected = text(PAPER.mass, x, z, 0.0, torques, [*start, *[0.0] * len(start)])
-    np.testing.assert_allclose(2.0 * (found.angles[-1] - start) / 1e-4, expected, rtol=2e-2)
+    np.testing.assert_allclose(2.0 * (result.angles[-1] - start) / 1e-4, expected, rtol=2e-2)
     mean = [0.5 * (value_at(table, 0.0) + value_at(table, 1e-2)) for table in tables]
-    assert found.work[-1] == pytest.approx(np.dot([1e5, *mean], found.angles[-1] - found.angles[0]), rel=1e-3)
+    assert result.work[-1] == pytest.approx(np.dot([1e5, *mean], result.angles[-1] - result.angles[0]), rel=1e-3)
     assert "pitch torque" in [item.name for item in PRINTED[0].items(scene)]
 
 

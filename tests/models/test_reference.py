@@ -41,16 +41,16 @@ def test_recomputed_is_frozen(name: str) -> None:
     """Quad precision leaves nothing to the machine in a double's digits: equal but for the last bit."""
     pytest.importorskip("heyoka")
     scene = paper(name)
-    found = solve("reference", scene, {}).trajectory
-    assert found.error_growth is not None
+    result = solve("reference", scene, {}).trajectory
+    assert result.error_growth is not None
     with open_results(FROZEN) as results:
         reference = results.scenes[scene.name].reference
         assert reference is not None
-        np.testing.assert_allclose(found.angles, reference.array("angles"), rtol=3e-16, atol=0)
-        np.testing.assert_allclose(found.rates, reference.array("rates"), rtol=3e-16, atol=0)
-        assert reference.array("angle_uncertainty").max() >= found.angle_uncertainty.max() * 0.1
+        np.testing.assert_allclose(result.angles, reference.array("angles"), rtol=3e-16, atol=0)
+        np.testing.assert_allclose(result.rates, reference.array("rates"), rtol=3e-16, atol=0)
+        assert reference.array("angle_uncertainty").max() >= result.angle_uncertainty.max() * 0.1
         # The growth is in double precision and grows its own errors: a hundredth decides no horizon.
-        np.testing.assert_allclose(found.error_growth, reference.array("error_growth"), rtol=1e-2)
+        np.testing.assert_allclose(result.error_growth, reference.array("error_growth"), rtol=1e-2)
 
 
 def _propagated(name: str, tolerance: float) -> Any:
@@ -105,8 +105,8 @@ def test_a_reference_that_its_time_limit_ends_is_ended() -> None:
 def test_the_uncertainty_is_ten_times_difference_and_rounding_and_never_falls() -> None:
     """The rounding of 1 rad at least, and of 4 rad where an angle is that large."""
     angles = np.array([[0.1, 0.2], [0.1, -4.0], [0.1, 0.2]])
-    found = uncertainty(np.array([1e-9, 0.0, 3e-9]), angles, 1e-9)
-    np.testing.assert_allclose(found, [2e-8, 4e-8, 4e-8], rtol=1e-12)
+    result = uncertainty(np.array([1e-9, 0.0, 3e-9]), angles, 1e-9)
+    np.testing.assert_allclose(result, [2e-8, 4e-8, 4e-8], rtol=1e-12)
 
 
 @pytest.mark.parametrize("failing", ["", "best", "check"])
@@ -118,9 +118,9 @@ def test_a_reference_that_fails_says_why_and_how_far_the_better_run_came(failing
     }
     solver: Any = object.__new__(ReferenceSolver)
     solver._runs = [SimpleNamespace(integrate=lambda report=report: report) for report in runs.values()]
-    found = solver.integrate()
-    assert (found.success, found.time_reached, found.steps) == (not failing, 2.0, 20)
-    assert found.message == (f"{failing} failed" if failing else "")
+    result = solver.integrate()
+    assert (result.success, result.time_reached, result.steps) == (not failing, 2.0, 20)
+    assert result.message == (f"{failing} failed" if failing else "")
 
 
 def test_a_reference_has_loads_where_they_are_asked_for() -> None:
@@ -131,10 +131,10 @@ def test_a_reference_has_loads_where_they_are_asked_for() -> None:
     scene = replace(scene, outputs=("angles", "rates", "loads"))
     solver = build(scene, ReferenceSettings())
     solver.integrate()
-    found = solver.observe()
-    name, at_doubles = "blade_root_force", sampled_loads(scene, found.time, found.angles, found.rates)
-    in_quad = quad_loads(scene, found.time, solver._runs[0].states)
-    assert found.quantities[name].tobytes() == in_quad[name].tobytes() != at_doubles[name].tobytes()
+    result = solver.observe()
+    name, at_doubles = "blade_root_force", sampled_loads(scene, result.time, result.angles, result.rates)
+    in_quad = quad_loads(scene, result.time, solver._runs[0].states)
+    assert result.quantities[name].tobytes() == in_quad[name].tobytes() != at_doubles[name].tobytes()
 
 
 @pytest.mark.parametrize("is_available", [True, False])
@@ -151,13 +151,13 @@ def test_a_reference_of_which_one_run_ends_early(
     solver.integrate()
     whole = solver.observe()
     solver._runs[shorter].states = solver._runs[shorter].states[:rows]
-    found = solver.observe()
-    assert found.error_growth is not None
-    assert len(found.time) == len(found.error_growth) == len(found.angle_uncertainty) == rows
-    assert found.angles.tobytes() == whole.angles[:rows].tobytes()
-    assert found.angle_uncertainty.tobytes() == whole.angle_uncertainty[:rows].tobytes()
+    result = solver.observe()
+    assert result.error_growth is not None
+    assert len(result.time) == len(result.error_growth) == len(result.angle_uncertainty) == rows
+    assert result.angles.tobytes() == whole.angles[:rows].tobytes()
+    assert result.angle_uncertainty.tobytes() == whole.angle_uncertainty[:rows].tobytes()
     # Without heyoka quotients of differences of 1e-9.
-    np.testing.assert_allclose(found.error_growth, whole.error_growth[:rows], rtol=1e-6)
+    np.testing.assert_allclose(result.error_growth, whole.error_growth[:rows], rtol=1e-6)
 
 
 def test_where_heyoka_is_not_installed_the_fallback_takes_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,10 +186,10 @@ def test_quotients_are_known_as_far_as_both_runs_went(is_perturbed: bool, monkey
     times = np.linspace(0.0, 0.1, 4)
     whole = reference_module._matrices_by_quotients(scene, times)
     monkeypatch.setattr(reference_module, "_in_doubles", EndsEarly)
-    found = reference_module._matrices_by_quotients(scene, times)
-    assert found[:2].tobytes() == whole[:2].tobytes()
-    assert np.all(np.isposinf(found[2:]))
-    assert len(found) == (4 if is_perturbed else 2)
+    result = reference_module._matrices_by_quotients(scene, times)
+    assert result[:2].tobytes() == whole[:2].tobytes()
+    assert np.all(np.isposinf(result[2:]))
+    assert len(result) == (4 if is_perturbed else 2)
 
 
 @pytest.mark.parametrize(("known", "finite"), [(2, [True, True, False]), (3, [True] * 3), (4, [True] * 3)])
@@ -199,19 +199,19 @@ def test_growth_is_known_as_far_as_the_variational_equations_went(
     pytest.importorskip("heyoka")
     matrices = np.full((known, 4, 4), 3.0)  # rows of norm 6, columns in units of 1
     monkeypatch.setattr(reference_module, "_transition_matrices", lambda _scene, _times: matrices)
-    found = reference_at(paper("fig03", duration=0.1, samples=3), np.linspace(0.0, 0.1, 3))
-    assert found.growth.tolist() == [[6.0 if is_finite else np.inf] * 4 for is_finite in finite]
-    assert found.trajectory.error_growth is not None
-    assert np.isfinite(found.trajectory.error_growth).tolist() == finite
+    result = reference_at(paper("fig03", duration=0.1, samples=3), np.linspace(0.0, 0.1, 3))
+    assert result.growth.tolist() == [[6.0 if is_finite else np.inf] * 4 for is_finite in finite]
+    assert result.trajectory.error_growth is not None
+    assert np.isfinite(result.trajectory.error_growth).tolist() == finite
 
 
 def test_growth_over_one_interval_is_that_over_its_halves() -> None:
     pytest.importorskip("heyoka")
-    one, halves = (solve("reference", paper("fig03", duration=0.1, samples=n), {}).trajectory for n in (2, 3))
-    assert one.error_growth is not None
+    given, halves = (solve("reference", paper("fig03", duration=0.1, samples=n), {}).trajectory for n in (2, 3))
+    assert given.error_growth is not None
     assert halves.error_growth is not None
-    assert one.error_growth[-1] == pytest.approx(halves.error_growth[-1], rel=1e-9)
-    assert one.error_growth[-1] > 1.01
+    assert given.error_growth[-1] == pytest.approx(halves.error_growth[-1], rel=1e-9)
+    assert given.error_growth[-1] > 1.01
 
 
 def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -221,10 +221,10 @@ def test_a_pitch_that_is_fixed_has_no_growth_and_no_unit(monkeypatch: pytest.Mon
     scene = replace(paper("fig03"), blades=blades, initial_angles=(0.2, 0.0, 0.1), initial_rates=(0.5, 0.0, 0.2))
     scene = replace(scene, bearing_stiffness=(0.0, 1e8), duration=0.1, samples=3)
     assert list(scene.moving_coordinates) == [0, 2]
-    found = reference_at(scene, np.linspace(0.0, 0.1, 3))
-    assert (found.growth[:, [1, 4]] == 1.0).all()
-    assert (found.growth[1:, [0, 2, 3, 5]] != 1.0).all()
-    assert (found.units == 1.0).tolist() == [True] * 5 + [False]
+    result = reference_at(scene, np.linspace(0.0, 0.1, 3))
+    assert (result.growth[:, [1, 4]] == 1.0).all()
+    assert (result.growth[1:, [0, 2, 3, 5]] != 1.0).all()
+    assert (result.units == 1.0).tolist() == [True] * 5 + [False]
 
 
 def test_amplification_of_a_stiff_oscillation_is_one() -> None:
@@ -235,7 +235,7 @@ def test_amplification_of_a_stiff_oscillation_is_one() -> None:
         "[bearing]\nstiffness = 1e6\n[initial]\nangles = [0, 0.01]\nrates = [0, 0]\n"
     )
     scene = parse_scene(text, "s")
-    found = reference_at(scene, np.linspace(0.0, 0.1, 6))
-    np.testing.assert_allclose(found.units, [1.0, 1.0, 1.0, 1000.0])
-    np.testing.assert_allclose(found.growth[:, [1, 3]], 1.0, rtol=1e-9)
-    np.testing.assert_allclose(found.growth[:, 0], np.hypot(1.0, found.trajectory.time), rtol=1e-9)
+    result = reference_at(scene, np.linspace(0.0, 0.1, 6))
+    np.testing.assert_allclose(result.units, [1.0, 1.0, 1.0, 1000.0])
+    np.testing.assert_allclose(result.growth[:, [1, 3]], 1.0, rtol=1e-9)
+    np.testing.assert_allclose(result.growth[:, 0], np.hypot(1.0, result.trajectory.time), rtol=1e-9)

@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 from support.scenes import ARM, MASS, OFFSET, paper
 
-from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods import time_limit
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.models.lagrange import taylor
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, ode45_integrator, scipy_integrator, work_unit
@@ -38,15 +36,15 @@ def advanced(message: str = "", evaluations: int | None = 5) -> tuple[Any, Any]:
 
 
 def test_a_run_has_the_steps_and_evaluations_of_all_its_segments() -> None:
-    states, found = advanced()
+    states, result = advanced()
     assert states[:, 0].tolist() == TIMES.tolist()
-    assert (found.success, found.time_reached, found.steps, found.rhs_evaluations) == (True, 3.0, 6, 15)
+    assert (result.success, result.time_reached, result.steps, result.rhs_evaluations) == (True, 3.0, 6, 15)
     assert advanced(evaluations=None)[1].rhs_evaluations is None
 
 
 def test_a_run_ends_in_the_segment_that_fails() -> None:
-    states, found = advanced("no step is short enough")
-    assert (found.success, found.out_of_time, found.time_reached, found.steps) == (False, False, 1.5, 4)
+    states, result = advanced("no step is short enough")
+    assert (result.success, result.out_of_time, result.time_reached, result.steps) == (False, False, 1.5, 4)
     assert len(states) == 4
     assert advanced(time_limit.MESSAGE)[1].out_of_time
 
@@ -66,32 +64,32 @@ def test_every_evaluation_is_counted(name: str) -> None:
         calls.append(time)
         return [-state[0]]
 
-    found = INTEGRATORS[name](decay, 1.0, 3.0, np.ones(1), np.array([1.5, 2.0, 3.0]))
+    result = INTEGRATORS[name](decay, 1.0, 3.0, np.ones(1), np.array([1.5, 2.0, 3.0]))
     # Radau's differences of the right-hand side for its Jacobian are no steps of it; SciPy does not count them.
-    assert found.evaluations == len(calls) or (name == "Radau" and found.evaluations < len(calls))
-    assert found.states[:, 0] == pytest.approx(np.exp(-np.array([0.5, 1.0, 2.0])), rel=1e-5)
-    assert found.end[0] == pytest.approx(math.exp(-2.0), rel=1e-5)
-    assert not found.message
+    assert result.evaluations == len(calls) or (name == "Radau" and result.evaluations < len(calls))
+    assert result.states[:, 0] == pytest.approx(np.exp(-np.array([0.5, 1.0, 2.0])), rel=1e-5)
+    assert result.end[0] == pytest.approx(math.exp(-2.0), rel=1e-5)
+    assert not result.message
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_a_motion_that_ends_is_a_run_that_says_why(name: str) -> None:
     """1 / (1 - t) at t = 1."""
-    found = INTEGRATORS[name](lambda _, y: [y[0] * y[0]], 0.0, 2.0, np.ones(1), np.array([0.5, 1.5]))
-    assert len(found.states) == 1
-    assert "step size" in found.message
+    result = INTEGRATORS[name](lambda _, y: [y[0] * y[0]], 0.0, 2.0, np.ones(1), np.array([0.5, 1.5]))
+    assert len(result.states) == 1
+    assert "step size" in result.message
 
 
 def test_a_start_that_is_no_number_is_a_run_without_steps() -> None:
-    found = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.array([np.nan]), np.array([1.0]))
-    assert (found.steps, found.evaluations, len(found.states)) == (0, 0, 0)
-    assert found.message.startswith("SciPy: ")
+    result = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.array([np.nan]), np.array([1.0]))
+    assert (result.steps, result.evaluations, len(result.states)) == (0, 0, 0)
+    assert result.message.startswith("SciPy: ")
 
 
 def test_a_time_limit_ends_a_run_between_two_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time_limit, "is_over", lambda: True)
-    found = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.ones(1), np.array([1.0]))
-    assert found.message == time_limit.MESSAGE
+    result = INTEGRATORS["DOP853"](lambda _, y: [-y[0]], 0.0, 1.0, np.ones(1), np.array([1.0]))
+    assert result.message == time_limit.MESSAGE
 
 
 @pytest.mark.parametrize("engine", ["scipy", "heyoka"])
@@ -104,9 +102,9 @@ def test_a_solver_at_chosen_times_has_those(engine: str) -> None:
     if engine == "heyoka":
         solver = Propagation(scene, times=times, tol=1e-15, compact_mode=True)
     assert solver.integrate().success
-    found = solver.observe()
-    assert found.time.tolist() == times.tolist()
-    assert found.angles[:, 0] == pytest.approx(scene.initial_angles[0] + 0.5 * times, abs=1e-9)
+    result = solver.observe()
+    assert result.time.tolist() == times.tolist()
+    assert result.angles[:, 0] == pytest.approx(scene.initial_angles[0] + 0.5 * times, abs=1e-9)
 
 
 def test_a_load_over_time_is_in_quad_precision_in_a_quad_run() -> None:
@@ -140,38 +138,24 @@ def test_the_order_of_taylors_series_is_that_of_its_tolerance(tolerance: float |
     assert solver._integrator.order == expected
 
 
-def test_what_taylor_builds_is_listed_without_loading_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
-    def load() -> None:
-        raise MethodRefusal("heyoka is not installed")
-
-    monkeypatch.setattr(taylor, "heyoka", load)
-    monkeypatch.setattr(taylor, "find_spec", lambda _: object())
-    assert taylor.items(paper("fig03"))
-    monkeypatch.setattr(taylor, "find_spec", lambda _: None)
-    with pytest.raises(MethodRefusal, match="not installed"):
-        taylor.items(paper("fig03"))
-
-
-def _work_unit(weight: float, kinetic: float, torque: float) -> float:
-    """Of a scene with these energies (J) and torque (N m)."""
+@pytest.mark.parametrize(
+    ("weight", "kinetic", "torque", "unit"),
+    [
+        (1.2e6, 0.0, 0.0, 2.0**20),
+        (0.0, 2.0e6, 0.0, 2.0**20),
+        (0.0, 0.0, 1.2e6, 2.0**20),
+        (4e5, 4e5, 4e5, 2.0**20),
+        (9e5, 9e5, 9e5, 2.0**21),
+        (0.0, 0.0, 2.5, 2.0),
+        (0.0, 0.0, 0.7, 1.0),
+        (0.0, 0.0, 0.0, 1.0),
+    ],
+)
+def test_the_unit_of_work_is_the_power_of_two_below_the_energies(
+    weight: float, kinetic: float, torque: float, unit: float
+) -> None:
+    """Of a scene with these energies (J) and torque (N m); 1 where there is none that counts."""
     arm = math.hypot(OFFSET, ARM)
-    return work_unit(
-        paper(
-            "fig03",
-            gravity=weight / (MASS * arm),
-            initial_rates=(math.sqrt(2.0 * kinetic / MASS) / arm, 0.0),
-            rotor_torque=((0.0, torque),) if torque else (),
-        )
-    )
-
-
-def test_the_unit_of_work_is_of_the_size_of_the_energies() -> None:
-    """The power of two below their sum, and 1 where there is none that counts."""
-    for part in ((1.2e6, 0.0, 0.0), (0.0, 1.2e6, 0.0), (0.0, 0.0, 1.2e6), (4e5, 4e5, 4e5)):
-        assert _work_unit(*part) == 2.0**20
-        assert _work_unit(*(1.7 * size for size in part)) == 2.0**20
-    assert _work_unit(9e5, 9e5, 9e5) == 2.0**21
-    growing = paper("fig03", gravity=0.0, rotor_torque=((0.0, 1e5), (1.0, 1.2e6), (2.0, 0.0)))
-    assert work_unit(growing) == 2.0**20
-    assert _work_unit(0.0, 0.0, 0.0) == _work_unit(0.0, 0.0, 0.7) == _work_unit(0.0, 0.0, 1.5) == 1.0
-    assert _work_unit(0.0, 0.0, 2.5) == 2.0
+    rates = (math.sqrt(2.0 * kinetic / MASS) / arm, 0.0)
+    scene = paper("fig03", gravity=weight / (MASS * arm), initial_rates=rates)
+    assert work_unit(replace(scene, rotor_torque=((0.0, 0.0), (1.0, torque), (2.0, 0.0)))) == unit

@@ -40,17 +40,17 @@ def test_the_largest_loads_with_their_times_and_blades(run: Solution) -> None:
 def test_a_load_that_is_off_is_inaccurate(run: Solution, load: str) -> None:
     """By a millionth of the largest force (at the arm): a hundred thousand times the bound, not yet another motion."""
     exact, metric = run.trajectory, f"{load}_error"
-    found = judge(SCENE, run, exact)
-    assert (found.status, found.metrics[metric]) == ("ok", 0.0)
+    result = judge(SCENE, run, exact)
+    assert (result.status, result.metrics[metric]) == ("ok", 0.0)
     force = np.linalg.norm(exact.blade_root_force, axis=2).max() * (1.0 if load.endswith("force") else 6.0)
     for share, is_false in ((1e-6, False), (0.1, True)):
         wrong = exact.get(load).copy()
         wrong[20].flat[0] += share * force
-        found = judge(SCENE, replace(run, trajectory=exact.replace(**{load: wrong})), exact)
-        assert found.status == "inaccurate"
-        assert load.replace("_", " ") in found.message
-        assert found.metrics[metric] == pytest.approx(share, rel=0.1)
-        assert found.false_success is is_false
+        result = judge(SCENE, replace(run, trajectory=exact.replace(**{load: wrong})), exact)
+        assert result.status == "inaccurate"
+        assert load.replace("_", " ") in result.message
+        assert result.metrics[metric] == pytest.approx(share, rel=0.1)
+        assert result.false_success is is_false
 
 
 def test_loads_are_drawn_from_python() -> None:

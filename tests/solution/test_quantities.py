@@ -70,9 +70,9 @@ def test_a_quantity_of_another_package_is_computed_for_every_method(method: str)
 def test_it_is_judged_against_the_same_producer_applied_to_the_reference(error: float, status: str) -> None:
     exact, run = moved(ASKED, 1.0), moved(ASKED, 1.0)
     run.quantities["pitch_squares"] = exact.angles[:, 1:] ** 2 + error
-    found = judge(ASKED, Solution(ASKED, "lagrange/taylor", run, Integration(True)), exact)
-    assert found.status == status
-    assert found.metrics["pitch_squares_error_max"] == pytest.approx(error, nan_ok=True)
+    result = judge(ASKED, Solution(ASKED, "lagrange/taylor", run, Integration(True)), exact)
+    assert result.status == status
+    assert result.metrics["pitch_squares_error_max"] == pytest.approx(error, nan_ok=True)
 
 
 @pytest.mark.usefixtures("plug_in")
