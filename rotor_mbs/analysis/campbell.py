@@ -1,4 +1,4 @@
-"""Modes of a scene over rotor speed, as arrays, and as tables for readers. Knows no model, no file and no drawing."""
+"""Modes of a scene over rotor speed, as arrays, and as tables for readers."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class SceneModes:
 
 def _difference(sources: Sequence[LinearModes]) -> float:
     """Largest difference of all other sources from the first one, modes in the order of their size."""
-    expected, *others = (np.sort(np.abs(one.eigenvalues).max(axis=2), axis=1) for one in sources)
+    expected, *others = (np.sort(np.abs(source.eigenvalues).max(axis=2), axis=1) for source in sources)
     fast = expected > _SLOW * np.nanmax(expected, initial=0.0)
     shares = (np.abs(other - expected)[fast] / expected[fast] for other in others)
     return max((float(np.nanmax(share, initial=0.0)) for share in shares), default=0.0)
@@ -136,19 +136,19 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
     """A row for each state, speed and mode of the closed form: speeds and frequencies in rad/s, growth in 1/s."""
     rows: list[dict[str, object]] = []
     for kind in (modes.rest, modes.rotation):
-        for one in list(kind.values())[:1]:
+        for linear in list(kind.values())[:1]:
             rows += [
                 {
-                    "state": "at rest" if one.kind == REST else "steady rotation without gravity",
+                    "state": "at rest" if linear.kind == REST else "steady rotation without gravity",
                     "speed": float(speed),
                     "mode": name,
-                    "undamped_frequency": _number(one.undamped_frequencies[i, k]),
-                    "damped_frequency": _number(one.damped_frequencies[i, k]),
-                    "damping_ratio": _number(one.damping_ratios[i, k]),
-                    "growth_rate": _number(one.growth_rates[i, k]),
+                    "undamped_frequency": _number(linear.undamped_frequencies[i, k]),
+                    "damped_frequency": _number(linear.damped_frequencies[i, k]),
+                    "damping_ratio": _number(linear.damping_ratios[i, k]),
+                    "growth_rate": _number(linear.growth_rates[i, k]),
                 }
-                for i, speed in enumerate(one.speeds)
-                for k, name in enumerate(one.names)
+                for i, speed in enumerate(linear.speeds)
+                for k, name in enumerate(linear.names)
             ]
     return rows
 
@@ -157,9 +157,9 @@ def modes_summary(modes: SceneModes) -> list[str]:
     """Lines for a terminal: modes at rest, at the lowest and the highest speed, agreement, multipliers."""
     lines = [f"{modes.scene}: {modes.title}"]
     for kind in (modes.rest, modes.rotation):
-        for one in list(kind.values())[:1]:
-            for i in sorted({0, len(one.speeds) - 1}):
-                lines += _state_lines(one, i)
+        for linear in list(kind.values())[:1]:
+            for i in sorted({0, len(linear.speeds) - 1}):
+                lines += _state_lines(linear, i)
     compared = [
         f"{', '.join(s.label for s in kind.values())}" for kind in (modes.rest, modes.rotation) if len(kind) > 1
     ]
@@ -171,13 +171,13 @@ def modes_summary(modes: SceneModes) -> list[str]:
     return [*lines, *(f"  {note}" for note in modes.notes)]
 
 
-def _state_lines(one: LinearModes, i: int) -> list[str]:
-    state = "at rest" if one.kind == REST else f"at {one.speeds[i]:.4g} rad/s without gravity"
-    if one.messages[i]:
-        return [f"  {state}: {one.messages[i]}"]
+def _state_lines(modes: LinearModes, i: int) -> list[str]:
+    state = "at rest" if modes.kind == REST else f"at {modes.speeds[i]:.4g} rad/s without gravity"
+    if modes.messages[i]:
+        return [f"  {state}: {modes.messages[i]}"]
     lines = [f"  {state}"]
-    columns = (one.undamped_frequencies, one.damped_frequencies, one.damping_ratios, one.growth_rates)
-    for name, undamped, damped, ratio, growth in zip(one.names, *(column[i] for column in columns), strict=True):
+    columns = (modes.undamped_frequencies, modes.damped_frequencies, modes.damping_ratios, modes.growth_rates)
+    for name, undamped, damped, ratio, growth in zip(modes.names, *(column[i] for column in columns), strict=True):
         if not math.isfinite(undamped):
             lines.append(f"    {name:18} grows without oscillating, {growth:.5g} 1/s")
             continue

@@ -1,5 +1,5 @@
 """How far data are from a reference, channel by channel: errors, per unit of error growth, until when they agree, and
-what a constant lag, scale and offset would explain. Knows samples; no file, no model.
+what a constant lag, scale and offset would explain.
 """
 
 from __future__ import annotations
@@ -99,18 +99,18 @@ def channel_errors(
     values, expected, slopes, carried   (n, channels) data, reference, its time derivative, and `carried_errors`
     until       rows up to the horizon
     """
-    found = []
+    channels = []
     for j, (name, unit) in enumerate(names):
         error = np.abs(values[:, j] - expected[:, j])
         lag, scale, offset = _fit(values[:until, j], expected[:until, j], slopes[:until, j], carried[:until, j])
-        found.append(
+        channels.append(
             ChannelErrors(
                 name, unit, float(error[:until].max()), float(error.max()),
                 float((error / carried[:, j])[:until].max()),
                 tuple(_agrees_until(time, error, level) for level in LEVELS), lag, scale, offset,
             )
         )  # fmt: skip
-    return tuple(found)
+    return tuple(channels)
 
 
 def _agrees_until(time: Array, error: Array, level: float) -> float:
@@ -124,8 +124,8 @@ def _fit(values: Array, expected: Array, slopes: Array, carried: Array) -> tuple
     columns = np.stack([-slopes, expected, np.ones(len(expected))], axis=1) / carried[:, None]
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0.0] = 1.0
-    found = np.linalg.lstsq(columns / sizes, (values - expected) / carried, rcond=1e-9)[0] / sizes
-    return float(found[0]), 1.0 + float(found[1]), float(found[2])
+    parameters = np.linalg.lstsq(columns / sizes, (values - expected) / carried, rcond=1e-9)[0] / sizes
+    return float(parameters[0]), 1.0 + float(parameters[1]), float(parameters[2])
 
 
 def rows_to_the_horizon(reference: Trajectory, time: Array) -> tuple[float, int]:
@@ -135,21 +135,22 @@ def rows_to_the_horizon(reference: Trajectory, time: Array) -> tuple[float, int]
     return end, len(time) if whole else int(np.searchsorted(time, end, side="right"))
 
 
-def from_dictionary(found: Mapping[str, Any]) -> DataVerdict:
+def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
     """The verdict of which `as_dictionary` made this, also where it has been JSON since."""
-    values = {one.name: found[one.name] for one in fields(DataVerdict)}
+    values = {item.name: stored[item.name] for item in fields(DataVerdict)}
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
     channels = [
-        one | {"agrees_until": tuple(math.nan if time is None else time for time in one["agrees_until"].values())}
-        for one in found["channels"]
+        channel
+        | {"agrees_until": tuple(math.nan if time is None else time for time in channel["agrees_until"].values())}
+        for channel in stored["channels"]
     ]
-    return DataVerdict(**values | {"channels": tuple(ChannelErrors(**one) for one in channels)})
+    return DataVerdict(**values | {"channels": tuple(ChannelErrors(**channel) for channel in channels)})
 
 
 def as_dictionary(verdict: DataVerdict) -> dict[str, object]:
     """For JSON: NaN as None."""
-    found = asdict(verdict) | {"agrees": verdict.agrees}
-    for channel in found["channels"]:
+    values = asdict(verdict) | {"agrees": verdict.agrees}
+    for channel in values["channels"]:
         times = dict(zip(map(str, LEVELS), channel["agrees_until"], strict=True))
-        channel["agrees_until"] = {level: None if time != time else time for level, time in times.items()}
-    return found
+        channel["agrees_until"] = {level: None if math.isnan(time) else time for level, time in times.items()}
+    return values

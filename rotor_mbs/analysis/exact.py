@@ -1,7 +1,6 @@
 """What is known of a scene without any model: exact solutions, what an exact run conserves, its symmetries.
 
-Exact runs conserve angular momentum, symmetry, time reversal, and energy up to a random walk of round-off. Knows scenes
-and samples; no model, no file.
+Exact runs conserve angular momentum, symmetry, time reversal, and energy up to a random walk of round-off.
 """
 
 from __future__ import annotations
@@ -101,10 +100,10 @@ def _negative(table: Table) -> Table:
     return tuple((time, -value) for time, value in table)
 
 
-def mirror_error(one: Array, other: Array) -> float:
+def mirror_error(angles: Array, other: Array) -> float:
     """rad: of (n, 1 + blades) angles of a scene and of its mirror image."""
-    sign = np.array([1.0, *([-1.0] * (one.shape[1] - 1))])
-    return float(np.abs(one - sign * other).max())
+    sign = np.array([1.0, *([-1.0] * (angles.shape[1] - 1))])
+    return float(np.abs(angles - sign * other).max())
 
 
 def relabelled(scene: Scene) -> Scene:
@@ -126,11 +125,11 @@ def _rolled(values: Sequence[object]) -> tuple:  # type: ignore[type-arg]
     return (*values[-1:], *values[:-1])
 
 
-def relabelling_error(one: Array, other: Array) -> float:
-    """rad: of angles of a scene and of the relabelled one."""
-    turn = 2.0 * math.pi / (one.shape[1] - 1)
-    rotor = np.abs(one[:, 0] - (other[:, 0] + turn)).max()
-    return float(max(rotor, np.abs(one[:, 1:] - np.roll(other[:, 1:], -1, axis=1)).max()))
+def relabelling_error(angles: Array, other: Array) -> float:
+    """rad: of angles of a scene and of the relabelled scene."""
+    turn = 2.0 * math.pi / (angles.shape[1] - 1)
+    rotor = np.abs(angles[:, 0] - (other[:, 0] + turn)).max()
+    return float(max(rotor, np.abs(angles[:, 1:] - np.roll(other[:, 1:], -1, axis=1)).max()))
 
 
 def drift_exponent(time: Array, drift: Array) -> float:

@@ -1,7 +1,4 @@
-"""Tip paths and energies by plain rotation of the scene's bodies: computed again, independently of all models.
-
-Knows scenes and samples; no results file, no model.
-"""
+"""Tip paths and energies by plain rotation of the scene's bodies: computed again, independently of all models."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Modes of linearized equations: frequencies, damping ratios, shapes in multiblade coordinates; Floquet multipliers.
 
-Knows matrices and blade counts; no model, no scene, no file.
-
 Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd = |Im λ| damped frequency (rad/s),
 ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier.
 """
@@ -108,9 +106,9 @@ def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool) -> ModeSet:
     values.real[np.abs(values.real) < 1e-14 * np.abs(values).max(initial=0.0)] = 0.0  # rounding of undamped modes
     shapes = [_shape(vectors[:, k], n, first) for k in range(len(values))]
     pairs = _pairs(values, shapes, is_cyclic)
-    found = ModeSet(np.array([pair for pair, _ in pairs]), np.array([shape for _, shape in pairs]))
-    order = np.argsort(np.nan_to_num(found.undamped_frequencies), kind="stable")
-    return ModeSet(found.eigenvalues[order], found.shapes[order])
+    modes = ModeSet(np.array([pair for pair, _ in pairs]), np.array([shape for _, shape in pairs]))
+    order = np.argsort(np.nan_to_num(modes.undamped_frequencies), kind="stable")
+    return ModeSet(modes.eigenvalues[order], modes.shapes[order])
 
 
 def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
@@ -213,10 +211,10 @@ def _pairs(
         slowest = single.pop(0)
         pairs.append(((values[slowest], 0j), shapes[slowest]))
     while single:
-        one = single.pop()
-        partner = max(single, key=lambda k: float(_assurance(shapes[one][None], shapes[k][None])[0, 0]))
+        last = single.pop()
+        partner = max(single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0]))
         single.remove(partner)
-        pairs.append(((values[one], values[partner]), shapes[partner]))
+        pairs.append(((values[last], values[partner]), shapes[partner]))
     return [((complex(a), complex(b)), shape) for (a, b), shape in pairs]
 
 

@@ -28,12 +28,12 @@ def copies(scene: StoredScene) -> Iterator[tuple[StoredRun, str, str]]:
     Methods round differently, so that equal bits are a copy. Columns that are zero, constant or a straight line do not
     count, nor short ones; nor two runs by MATLAB's ode45, whose steps are the same where an erratum has no effect.
     """
-    found = {name: _bent_columns(run) for name, run in scene.runs.items()}
+    columns = {name: _bent_columns(run) for name, run in scene.runs.items()}
     for first, second in itertools.combinations(scene.runs, 2):
         if first.endswith("/ode45") and second.endswith("/ode45"):
             continue
-        for place in sorted(found[first].keys() & found[second].keys()):
-            if found[first][place] == found[second][place]:
+        for place in sorted(columns[first].keys() & columns[second].keys()):
+            if columns[first][place] == columns[second][place]:
                 yield scene.runs[second], first, f"{place[0]} {place[1]}"
 
 

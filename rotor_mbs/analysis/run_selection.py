@@ -40,8 +40,8 @@ def reference_or_corrected_run(scene: StoredScene) -> StoredRun | None:
 
 def sides(scene: StoredScene) -> dict[str, StoredRun]:
     """The "printed" run and the one that stands for the "corrected" model, those that there are."""
-    found = {"printed": printed_run(scene), "corrected": reference_or_corrected_run(scene)}
-    return {side: run for side, run in found.items() if run is not None}
+    runs = {"printed": printed_run(scene), "corrected": reference_or_corrected_run(scene)}
+    return {side: run for side, run in runs.items() if run is not None}
 
 
 def in_order(scene: StoredScene) -> dict[str, StoredRun]:

@@ -96,7 +96,7 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     entry = re.fullmatch(r"(.*)\[(\d+)\]", name)
     if entry is not None:
         array = entry[1].rpartition("/")[2].strip().lower()
-        fitting = [one for one in known if array in _VECTORS.get(one.kind, ())]
+        fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]
         return fitting[int(entry[2])] if len(fitting) == vector else None
     plain = split_unit(name)[0].lower()
     letters = re.sub(r"[^a-z]", "", plain)
@@ -107,11 +107,15 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
     stem = letters.removesuffix(ending)
     digits = re.findall(r"\d+", plain)
     if stem in _PITCH_NAMES:
-        only = "1" if len([one for one in known if one.kind == "angle"]) == 2 else ""
-        return next((one for one in known if one.name == f"pitch {digits[-1] if digits else only}{rate}"), None)
-    if letters in _ROTOR_RATE_NAMES:
-        stem, rate = "rotor", " rate"
-    return next((one for one in known if one.name == f"rotor{rate}"), None) if stem in _ROTOR_NAMES else None
+        only = "1" if len([channel for channel in known if channel.kind == "angle"]) == 2 else ""
+        wanted = f"pitch {digits[-1] if digits else only}{rate}"
+    elif letters in _ROTOR_RATE_NAMES:
+        wanted = "rotor rate"
+    elif stem in _ROTOR_NAMES:
+        wanted = f"rotor{rate}"
+    else:
+        return None
+    return next((channel for channel in known if channel.name == wanted), None)
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -158,9 +162,14 @@ class Source:
     def __str__(self) -> str:
         """A line of the list of what was read."""
         shift = f" {self.entry.offset:+g}" if self.entry.offset else ""
-        notes = ", ".join(["unit assumed"] * self.assumed + ["wrapped"] * self.entry.wrapped)
+        notes = []
+        if self.assumed:
+            notes.append("unit assumed")
+        if self.entry.wrapped:
+            notes.append("wrapped")
         sign = "-" if self.entry.sign < 0 else ""
-        return f"{self.channel.name} = {sign}{self.entry.column!r}{shift} [{self.unit}]" + (notes and f" ({notes})")
+        line = f"{self.channel.name} = {sign}{self.entry.column!r}{shift} [{self.unit}]"
+        return f"{line} ({', '.join(notes)})" if notes else line
 
 
 def read_mapping(
@@ -178,53 +187,53 @@ def read_mapping(
     model = create_model("MappingTable", __base__=Table, **keys)
     try:
         if isinstance(columns, Mapping):
-            name, found = "columns", dict(validate(model, columns))
+            name, values = "columns", dict(validate(model, columns))
         else:
             name, (text, tables) = str(columns), read_toml(Path(columns))
-            found = dict(validate_file(model, tables, text, name))
+            values = dict(validate_file(model, tables, text, name))
     except TableError as error:
         raise InputError(f"columns: {problem.message}" for problem in error.problems) from error
-    group = found.pop("group")
-    entries = {key: entry for key, entry in found.items() if entry is not None}
+    group = values.pop("group")
+    entries = {key: entry for key, entry in values.items() if entry is not None}
     if entries.keys() == {TIME} or not (entries or group):
-        raise InputError(f"{name}: no channel to compare; allowed: {', '.join(found)}")
+        raise InputError(f"{name}: no channel to compare; allowed: {', '.join(values)}")
     return entries, group
 
 
 def sources(table: DataTable, scene: Scene, entries: Mapping[str, Entry]) -> list[Source]:
     """Where each channel comes from, the time first. Raises InputError where there is no time or nothing else."""
     known = channels(scene)
-    guessed = _guesses(table, known, {TIME} if entries else {one.name for one in known})
-    found = []
+    guessed = _guesses(table, known, {TIME} if entries else {channel.name for channel in known})
+    channel_sources = []
     for channel in known:
         if channel.key in entries or channel.name in guessed:
             entry = entries.get(channel.key) or Entry(column=guessed[channel.name])
-            found.append(_source(table, channel, entry))
+            channel_sources.append(_source(table, channel, entry))
     shown = shown_names(list(table.columns))
-    if not found or found[0].channel.name != TIME:
+    if not channel_sources or channel_sources[0].channel.name != TIME:
         raise InputError(f"{table.source}: no column for the time; it has: {shown}; allowed: `time` in a mapping file")
-    if len(found) == 1:
+    if len(channel_sources) == 1:
         raise InputError(
             f"{table.source}: no column for an angle or a rate; it has: {shown}; allowed: a mapping file (columns)"
         )
-    return found
+    return channel_sources
 
 
 def _guesses(table: DataTable, known: Sequence[Channel], wanted: set[str]) -> dict[str, str]:
     """Column by the name of a channel. Raises InputError where two columns could be one channel."""
     vectors = Counter(name.rpartition("[")[0] for name in table.columns if name.endswith("]"))
-    found: dict[str, str] = {}
+    names: dict[str, str] = {}
     for name in table.columns:
         channel = guess(name, vectors[name.rpartition("[")[0]], known)
         if channel is None or channel.name not in wanted:
             continue
-        if channel.name in found:
+        if channel.name in names:
             raise InputError(
-                f"{table.source}: both {found[channel.name]!r} and {name!r} could be {channel.name}; allowed: "
+                f"{table.source}: both {names[channel.name]!r} and {name!r} could be {channel.name}; allowed: "
                 f"`{channel.key}` in a mapping file says which"
             )
-        found[channel.name] = name
-    return found
+        names[channel.name] = name
+    return names
 
 
 def _source(table: DataTable, channel: Channel, entry: Entry) -> Source:

@@ -81,18 +81,18 @@ def _matlab(path: Path) -> DataTable:
     from scipy.io.matlab import MatReadError
 
     try:
-        found: dict[str, Any] = loadmat(path)
+        variables: dict[str, Any] = loadmat(path)
     except (MatReadError, TypeError, IndexError) as exc:
         raise InputError(f"{path}: a damaged MAT file: {_line(exc)}") from exc
-    return table_of(str(path), {name: values for name, values in found.items() if not name.startswith("__")})
+    return table_of(str(path), {name: values for name, values in variables.items() if not name.startswith("__")})
 
 
 def _netcdf3(path: Path) -> DataTable:
     from scipy.io import netcdf_file  # late: as above
 
     with netcdf_file(path, "r", mmap=False) as file:
-        arrays = {name: np.array(one[:]) for name, one in file.variables.items()}
-        units = {name: one.units.decode() for name, one in file.variables.items() if hasattr(one, "units")}
+        arrays = {name: np.array(variable[:]) for name, variable in file.variables.items()}
+        units = {name: item.units.decode() for name, item in file.variables.items() if hasattr(item, "units")}
     return table_of(str(path), arrays, units)
 
 

@@ -1,4 +1,4 @@
-"""Named columns of numbers, whatever file they came from. Knows no file format and no scene."""
+"""Named columns of numbers, whatever file they came from."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ def table_of(source: str, arrays: Mapping[str, Any], units: Mapping[str, str] | 
     of length n is turned, as MATLAB's are where they are stored by HDF5.
     """
     try:
-        found = {name: np.squeeze(_plain(values)) for name, values in arrays.items()}
+        numeric = {name: np.squeeze(_plain(values)) for name, values in arrays.items()}
     except ValueError as exc:
         raise InputError(f"{source}: rows of different lengths; allowed: arrays (n,) and (n, columns)") from exc
-    found = {name: values for name, values in found.items() if values.dtype.kind in "fiu" and values.ndim in (1, 2)}
-    rows = max((values.size for values in found.values() if values.ndim == 1), default=0)
+    numeric = {name: values for name, values in numeric.items() if values.dtype.kind in "fiu" and values.ndim in (1, 2)}
+    rows = max((values.size for values in numeric.values() if values.ndim == 1), default=0)
     columns: dict[str, DataColumn] = {}
-    for name, values in found.items():
+    for name, values in numeric.items():
         plain, unit = named_unit(name)
         unit = (units or {}).get(name, unit)
         if values.ndim == 1:

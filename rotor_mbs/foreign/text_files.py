@@ -90,7 +90,7 @@ def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float6
         try:
             values[i] = [float(field or "nan") for field in fields]
         except ValueError:
-            bad = next(j for j, one in enumerate(fields) if one and not _is_number(one, decimal_comma=False))
+            bad = next(j for j, field in enumerate(fields) if field and not _is_number(field, decimal_comma=False))
             raise InputError(
                 f"{source}:{number}: {fields[bad][:40]!a} in column {bad + 1}; allowed: a number"
             ) from None
@@ -105,14 +105,14 @@ def _names(source: str, head: Sequence[str], width: int, divider: str | None) ->
     units = [word.strip("[]() ") for word in last]
     above = _words(head[-2], divider, width) if len(head) > 1 else []
     if len(above) == len(last) and not UNITS["time"].keys().isdisjoint(unit.lower() for unit in units):
-        found = list(zip(above, units, strict=True))
+        names = list(zip(above, units, strict=True))
     else:
-        found = [named_unit(word) for word in last]
-    if len(found) == width - 1 and divider is not None:
-        found.append(("", ""))
-    if len(found) != width:
-        raise InputError(f"{source}: {len(found)} names in the header, {width} columns of numbers; allowed: as many")
-    return found
+        names = [named_unit(word) for word in last]
+    if len(names) == width - 1 and divider is not None:
+        names.append(("", ""))
+    if len(names) != width:
+        raise InputError(f"{source}: {len(names)} names in the header, {width} columns of numbers; allowed: as many")
+    return names
 
 
 def _words(line: str, divider: str | None, width: int) -> list[str]:

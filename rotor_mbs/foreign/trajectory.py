@@ -49,7 +49,7 @@ class ForeignData:
     @property
     def columns(self) -> list[int]:
         """Places of the channels in a matrix of all angles, then all rates."""
-        return [one.column for one in self.channels]
+        return [channel.column for channel in self.channels]
 
 
 def load_data(
@@ -63,24 +63,24 @@ def load_data(
     return _data(table, sources(table, scene, entries))
 
 
-def _data(table: DataTable, found: Sequence[Source]) -> ForeignData:
-    lengths = {source.entry.column: len(table[source.entry.column].values) for source in found}
+def _data(table: DataTable, channel_sources: Sequence[Source]) -> ForeignData:
+    lengths = {source.entry.column: len(table[source.entry.column].values) for source in channel_sources}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
         raise InputError(f"{table.source}: columns of different lengths: {shown}; allowed: a row for every time")
-    arrays = [_values(table, source) for source in found]
+    arrays = [_values(table, source) for source in channel_sources]
     time = arrays[0]
     _refuse_wrong_times(table.source, time)
-    used = {source.entry.column for source in found}
+    used = {source.entry.column for source in channel_sources}
     return ForeignData(
         table.source,
         time,
         np.stack(arrays[1:], axis=1),
-        tuple(source.channel for source in found[1:]),
-        tuple(str(source) for source in found),
+        tuple(source.channel for source in channel_sources[1:]),
+        tuple(str(source) for source in channel_sources),
         tuple(name for name in table.columns if name not in used),
-        tuple(source.entry.wrapped for source in found[1:]),
-        max(_digits(table[source.entry.column].values) for source in found[1:]),
+        tuple(source.entry.wrapped for source in channel_sources[1:]),
+        max(_digits(table[source.entry.column].values) for source in channel_sources[1:]),
     )
 
 
@@ -93,8 +93,8 @@ def _values(table: DataTable, source: Source) -> Array:
             f"{table.source}: column {source.entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of {len(values)}; "
             "allowed: finite numbers"
         )
-    found: Array = source.entry.sign * (values + source.entry.offset) * source.factor
-    return np.unwrap(found) if source.entry.wrapped else found
+    si_values: Array = source.entry.sign * (values + source.entry.offset) * source.factor
+    return np.unwrap(si_values) if source.entry.wrapped else si_values
 
 
 def _digits(values: Array) -> int:

@@ -75,10 +75,10 @@ class DataStudy:
             "_error": (", data less reference", values - self.expected),
             "_growth": (", an error of 1 at the start by then", self.carried),
         }
-        for j, one in enumerate(self.data.channels):
+        for j, channel in enumerate(self.data.channels):
             for ending, (what, array) in kinds.items():
-                arrays[one.key + ending] = array[:, j]
-                columns[one.key + ending] = Column(("time",), one.unit, one.name + what)
+                arrays[channel.key + ending] = array[:, j]
+                columns[channel.key + ending] = Column(("time",), channel.unit, channel.name + what)
         verdict = replace(self.verdict, unused=self.verdict.unused[:_MOST_NAMES])  # an attribute has 64 kB
         facts = {
             "title": self.scene.title,
@@ -110,7 +110,7 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     at_rows = Trajectory(run.time[place], run.angles[place], run.rates[place], error_growth=run.error_growth[place])
     cut = _with_whole_turns(cut, at_rows)
     verdict = _verdict(scene, data, cut, at_rows, exact, carried, tolerance)
-    worst = max(one.error_per_growth for one in verdict.channels)
+    worst = max(channel.error_per_growth for channel in verdict.channels)
     if not verdict.agrees:
         ends = monotonic() + _SEARCH_S
         whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
@@ -154,9 +154,9 @@ def _verdict(
     run = _as_run(scene, compared, reference, tolerance)
     status, message, metrics = "unchecked", "a single row", {}
     if rows > 1:
-        found = judge(run.scene, run, reference)
-        status, message, metrics = found.status, found.message, found.metrics
-    worst = max(errors, key=lambda one: one.error_per_growth)
+        judgement = judge(run.scene, run, reference)
+        status, message, metrics = judgement.status, judgement.message, judgement.metrics
+    worst = max(errors, key=lambda channel: channel.error_per_growth)
     if not worst.error_per_growth <= tolerance:
         status, message = "inaccurate", (
             f"{worst.name}: error {worst.error_max:.1e} {worst.unit} up to the horizon, "

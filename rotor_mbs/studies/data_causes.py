@@ -140,8 +140,8 @@ def causes_in_the_data(search: CauseSearch) -> list[str]:
         return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else []
     inside = search.rows(search.data.time)
     time, values = search.data.time[inside], search.data.values[inside]
-    found = mistakes_in_columns(search, time, values, search.expected(time))
-    return found or _other_time(search) or _lag(search, time, values) or _scatter(search, time, values)
+    mistakes = mistakes_in_columns(search, time, values, search.expected(time))
+    return mistakes or _other_time(search) or _lag(search, time, values) or _scatter(search, time, values)
 
 
 def mistakes_in_columns(search: CauseSearch, time: Array, values: Array, states: Array | None) -> list[str]:

@@ -13,16 +13,16 @@ from rotor_mbs.scenario.scene import Scene, scene_fields
 def scene_data(scene: Scene) -> dict[str, object]:
     """Every key of the scene that is set, with its unit."""
     data: dict[str, object] = {}
-    for one in scene_fields("label", "run", "start", "rotor"):
-        value, unit = getattr(scene, one.name), one.metadata["unit"]
-        if one.name == "blades":
+    for item in scene_fields("label", "run", "start", "rotor"):
+        value, unit = getattr(scene, item.name), item.metadata["unit"]
+        if item.name == "blades":
             data["blades"] = len(value)
             alike = all(blade == value[0] for blade in value)
             for i, blade in enumerate(value[:1] if alike else value):
                 numbers = {f"{part.name}, {part.metadata['unit']}": getattr(blade, part.name) for part in fields(blade)}
                 data["every blade" if alike else f"blade {i + 1}"] = numbers
-        elif one.metadata["key"] and one.name != "title" and (value not in ((), 0.0) or one.name == "gravity"):
-            data[one.metadata["key"] if unit == "1" else f"{one.metadata['key']}, {unit}"] = value
+        elif item.metadata["key"] and item.name != "title" and (value not in ((), 0.0) or item.name == "gravity"):
+            data[item.metadata["key"] if unit == "1" else f"{item.metadata['key']}, {unit}"] = value
     return data
 
 

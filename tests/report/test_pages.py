@@ -13,19 +13,19 @@ import h5py
 import numpy as np
 import pytest
 from markupsafe import escape
+from rotor_mbs.analysis.claim_records import stored_claims
+from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares
+from rotor_mbs.models.printed.errata import CheckedEntry
 from support.checking import add_run, results_file
 from support.scenes import paper
 from support.stored import Arrays, Made, rotor, store
 from support.sweeps import made_sweep
 
-from rotor_mbs.analysis.claim_records import stored_claims
-from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares
 from rotor_mbs.analysis.claims import Claim, ClaimResult
 from rotor_mbs.analysis.published import errata, published
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.printed.errata import CheckedEntry
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core import numbers
 from rotor_mbs.report.core.elements import PageTable, Row, Section

@@ -86,10 +86,10 @@ class PrintedSolver:
         """(n, 1 + blades) rad/s² by the equations that are run; zero of a fixed pitch."""
         import numpy as np
 
-        found = np.zeros((len(time), len(self._scene.initial_angles)))
+        accelerations = np.zeros((len(time), len(self._scene.initial_angles)))
         for k, (t, state) in enumerate(zip(time.tolist(), states.tolist(), strict=True)):
-            found[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
-        return found
+            accelerations[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
+        return accelerations
 
     def _refined(self, result: Ode45Result) -> dict[str, Array]:
         """ode45's own output points, of the equations as printed alone: the paper's numbers are read off at them."""

@@ -1,5 +1,4 @@
-"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3). Knows no equation of
-motion.
+"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3).
 
 Energies and loads are the physical ones, with the velocities and accelerations that (3) implies, whatever equations
 made the motion. The sum of the energies less the work of the torque tells how much energy those equations make; the
