@@ -789,7 +789,7 @@ def warm_up(modules: Sequence[str]) -> None:
     for name in ("support.checking", *dict.fromkeys(target.module for target in TARGETS)):
         importlib.import_module(name)
     sys.modules["rotor_mbs.runs.versions"].versions()
-    sys.modules["rotor_mbs.studies.stored_references"].frozen_file("")
+    sys.modules["rotor_mbs.studies.stored_references"].shipped_reference("")
     tests = [str(ROOT / "tests" / test) for module in modules for test in _TESTS.get(module, ())]
     with contextlib.redirect_stdout(io.StringIO()):
         if tests and pytest.main([*_PYTEST, "--collect-only", *tests]):
