@@ -24,7 +24,7 @@ from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line, pool_of
+from rotor_mbs.runs.pool import OF_THE_MACHINE, TaskPool, Workers, one_line, pool_of
 from rotor_mbs.runs.results import Asked, TableFile, fit, results_tables, row_of_run
 from rotor_mbs.runs.runner import Ended, Task, compute
 from rotor_mbs.runs.table import MISSING, Place, Rows, Table, text_of
@@ -43,44 +43,12 @@ _REPEAT_BUDGET_S = 0.05
 _FIXED_WORK = 3.0  # building, judging, storing
 
 
-@dataclass(frozen=True)
-class RunTask:
-    """A run on its way to a worker process.
-
-    Attributes
-    ----------
-    asked : the run.
-    place : where its row is.
-    reference : where the row of its reference is; None for the reference itself.
-    time_limit_s : after which it ends itself.
-    """
+@dataclass(frozen=True, kw_only=True)
+class RunTask(Task):
+    """A run on its way to a worker process, which ends itself after `time_limit_s`."""
 
     asked: Asked
-    place: Place
-    reference: Place | None
     time_limit_s: float
-
-    @property
-    def first(self) -> int:
-        return self.place.first
-
-    @property
-    def limit_s(self) -> float:
-        # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
-        return 1.2 * self.time_limit_s + 10.0
-
-    @property
-    def label(self) -> str:
-        """In a line of progress."""
-        return f"{self.asked.scene.name} {self.asked.method}"
-
-    @property
-    def work(self) -> float:
-        """Roughly how much there is to compute: 1 is 10 s of a scene by the fastest method."""
-        return _FIXED_WORK + find_method(self.asked.method).relative_cost * self.asked.scene.duration / 10.0
-
-    def split(self) -> Sequence[RunTask]:
-        return ()
 
     def failed(self, status: str, message: str) -> Rows:
         """The row of a run that left no samples."""
@@ -88,6 +56,11 @@ class RunTask:
         run = without_samples(asked.scene, asked.method, asked.settings, status, message)
         limit = self.time_limit_s if status == "timed_out" else np.nan
         return row_of_run(run, self.place, {"false_success": 0, "time_limit_s": limit})
+
+
+def work_of(scene: Scene, method: str) -> float:
+    """Roughly how much there is to compute: 1 is 10 s of a scene by the fastest method."""
+    return _FIXED_WORK + find_method(method).relative_cost * scene.duration / 10.0
 
 
 @dataclass(frozen=True)
@@ -208,12 +181,12 @@ def run_scenes(
 
 
 def compute_in_order(
-    pool: Any, perform: Callable[[Any], Rows], tasks: Sequence[RunTask], others: Sequence[Any] = ()
+    pool: TaskPool, perform: Callable[[Any], Rows], tasks: Sequence[Task], others: Sequence[Task] = ()
 ) -> Iterator[Ended]:
     """References first; then, if their references are there, the other runs, the slowest first."""
     yield from compute(pool, perform, [task for task in tasks if task.reference is None])
     waiting = [task for task in (*tasks, *others) if task.reference is not None]
-    ready = [task for task in waiting if is_stored(task.reference)]
+    ready = [task for task in waiting if task.reference is not None and is_stored(task.reference)]
     # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
     # fastest, which are those that are compiled, so that two processes seldom compile the same code at once.
     ready.sort(key=lambda task: -task.work)
@@ -231,24 +204,23 @@ def is_stored(place: Place) -> bool:
     return bool(place.stored(marked)[0] != MISSING)
 
 
-def outcomes(ends: Iterable[Ended], tasks: Sequence[Any]) -> Iterator[Outcome]:
+def outcomes(ends: Iterable[Ended], tasks: Sequence[Task]) -> Iterator[Outcome]:
     """What is reported of tasks that have ended."""
     work, done = sum(task.work for task in tasks), 0.0
     for end in ends:
-        task: Any = end.task
+        task = end.task
         done += task.work
-        share = done / work
-        method = task.asked.method
-        if not isinstance(task, RunTask) and end.rows is not None:
-            yield Outcome(task.label, method, "ok", f"{len(end.rows['status'])} points", share=share)
-            continue
-        if end.rows is None:
-            yield Outcome(task.label, method, end.failure, end.message, is_stored=False, share=share)
-            continue
-        status, message = STATUSES[int(end.rows["status"][0])], text_of(end.rows["message"][0])
-        is_read = task.asked.is_read
-        seconds = float("nan") if is_read else float(end.rows["run_time_s"][0])
-        yield Outcome(task.label, method, status, message, seconds, is_read=is_read, share=share)
+        outcome = Outcome(task.label, task.method, end.failure, end.message, is_stored=False, share=done / work)
+        if end.rows is not None and isinstance(task, RunTask):
+            status, message = STATUSES[int(end.rows["status"][0])], text_of(end.rows["message"][0])
+            seconds = float("nan") if task.asked.is_read else float(end.rows["run_time_s"][0])
+            is_read = task.asked.is_read
+            outcome = replace(
+                outcome, status=status, message=message, seconds=seconds, is_stored=True, is_read=is_read
+            )
+        elif end.rows is not None:
+            outcome = replace(outcome, status="ok", message=f"{len(end.rows['status'])} points", is_stored=True)
+        yield outcome
 
 
 def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list[Asked]:
@@ -267,8 +239,17 @@ def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> l
 
 
 def _task(file: TableFile, run: Asked, timeout_s: float) -> RunTask:
-    reference = None if run.method == REFERENCE else file.place(f"{run.scene.name}/{REFERENCE}")
-    return RunTask(run, file.place(run.run), reference, timeout_s)
+    return RunTask(
+        label=f"{run.scene.name} {run.method}",
+        method=run.method,
+        place=file.place(run.run),
+        reference=None if run.method == REFERENCE else file.place(f"{run.scene.name}/{REFERENCE}"),
+        # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
+        limit_s=1.2 * timeout_s + 10.0,
+        work=work_of(run.scene, run.method),
+        asked=run,
+        time_limit_s=timeout_s,
+    )
 
 
 def _stored_failures(file: TableFile, kept: Sequence[Asked]) -> list[str]:

@@ -59,7 +59,7 @@ def _run_fault(scene: object, method: str, folder: Path, statuses: Counter[objec
             (folder / "r.h5").unlink(missing_ok=True)
             asked = Asked(scene, method)
             place = fit(folder / "r.h5", results_tables([asked])).place(asked.run)
-            row = perform_run(RunTask(asked, place, None, _LIMIT_S))
+            row = perform_run(RunTask(label="", method=method, place=place, asked=asked, time_limit_s=_LIMIT_S))
             place.write(place.first, row)
             statuses[STATUSES[int(row["status"][0])]] += 1
             message = text_of(row["message"][0])

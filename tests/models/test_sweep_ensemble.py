@@ -169,7 +169,10 @@ def test_any_chunks_give_the_same_bytes(changes: dict[str, object], keys: list[s
     variants = Variants("t", tables, keys)
     sweep = sweep_of(variants.scene(values[0]), {"gravity": [9.8]}, outputs=["angles", "rates", "tip", "energy"])
     row = sweep_table(sweep, ["lagrange/taylor"], range(len(values))).row_type
-    whole = Chunk(variants, "lagrange/taylor", {}, Place(Path(), 0, 0, {}, row), 0, np.array(values), 60.0, code=0)
+    whole = Chunk(
+        label="", method="lagrange/taylor", place=Place(Path(), 0, 0, {}, row), start=0, values=np.array(values),
+        variants=variants, settings={}, time_limit_s=60.0, code=0,
+    )  # fmt: skip
     expected = rows_of(whole)
     for size in (1, LANES - 1, LANES):
         for start in range(0, len(values), size):
