@@ -279,7 +279,7 @@ def test_arguments_keep_their_order_and_name_a_scene_once(tmp_path: Path) -> Non
 
 
 def test_list_needs_neither_pydantic_nor_numpy() -> None:
-    # Each costs more than half of the 0.3 s that `rotor-mbs list` may take.
+    # Either takes longer than `rotor-mbs list` may.
     code = (
         "import sys; from rotor_mbs.scenario.catalogue import list_scenes; assert list_scenes(); "
         "assert not {'pydantic', 'numpy'} & set(sys.modules)"
