@@ -9,5 +9,4 @@ plausibility            numbers that look like a slip
 sweep, sweep_design     a sweep file; its rows
 variants                the scenes of a sweep
 accuracy_bounds         the bounds that results are judged by
-validation              tables against pydantic models: published claims, columns of foreign data
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -157,9 +158,9 @@ def test_relations_and_what_is_undefined(tmp_path: Path) -> None:
             results.scenes,
             [
                 claim(less),
-                claim(less.model_copy(update={"relation": ">"})),
+                claim(replace(less, relation=">")),
                 claim(opposite),
-                claim(less.model_copy(update={"relation": "opposite"})),
+                claim(replace(less, relation="opposite")),
                 claim(undefined),
                 claim(less, undefined),
             ],
@@ -174,7 +175,7 @@ def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
     elsewhere = Condition(of=of("range", scene="paper/fig12"), relation=">", bound=0.5)
     with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(lambda t: 0.1 * t))])) as results:
         assert claims(results.scenes, [claim(elsewhere), claim(holds, elsewhere)]) == []
-        number_elsewhere = number("max", 1.0).model_copy(update={"of": of("max", scene="paper/fig12")})
+        number_elsewhere = replace(number("max", 1.0), of=of("max", scene="paper/fig12"))
         assert claims(results.scenes, [number_elsewhere]) == []
         # One that fails decides, whatever the others would say.
         assert [one.printed.holds for one in claims(results.scenes, [claim(fails, elsewhere)])] == [False]
