@@ -81,6 +81,7 @@ class Ode45Result:
 
     @property
     def steps(self) -> int:
+        """How many steps were accepted."""
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:
@@ -113,6 +114,8 @@ class Ode45Result:
 
 @dataclass(frozen=True)
 class Ode45Settings(Settings):
+    """Tolerances of ode45."""
+
     relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
     absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
 

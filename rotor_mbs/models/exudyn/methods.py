@@ -38,6 +38,8 @@ _EXTRAPOLATION = choice(NONE, (NONE, RICHARDSON), doc="richardson: three runs, w
 
 @dataclass(frozen=True)
 class ChainAlphaSettings(schemes.AlphaSettings):
+    """Generalized-alpha of the chain."""
+
     step: float = step(5e-4)
     node: str = _NODE
     extrapolation: str = _EXTRAPOLATION
@@ -45,6 +47,8 @@ class ChainAlphaSettings(schemes.AlphaSettings):
 
 @dataclass(frozen=True)
 class ChainNewmarkSettings(schemes.NewtonSettings):
+    """The trapezoidal rule of the chain."""
+
     node: str = _NODE
     extrapolation: str = _EXTRAPOLATION
 
