@@ -21,11 +21,15 @@ _MAX_STEPS = 1e10
 
 @dataclass(frozen=True)
 class Rk4Settings(Settings):
+    """Classical Runge-Kutta, order 4."""
+
     step: float = step(2.5e-4)
 
 
 @dataclass(frozen=True)
 class ImplicitFastSettings(Settings):
+    """Semi-implicit Euler, dampers at the end of the step, order 1."""
+
     step: float = step(5e-5)
 
 
