@@ -233,7 +233,7 @@ def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
         row = [name]
         if printed is not None and corrected is not None:
             parted, largest = parting(printed, corrected)
-            row += ["never" if parted is None else number(parted), number(largest)]
+            row += ["never" if parted is None else number(parted, 3), number(largest)]
         else:
             row += ["", ""]
         if printed is not None:
