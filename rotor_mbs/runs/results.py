@@ -243,9 +243,7 @@ class TableFile:
         """What the design says of a row."""
         return {name: values[row] for name, (_, values) in self.tables[group].known.items()}
 
-    def missing(
-        self, asked: Sequence[Asked], time_limit_s: float
-    ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
+    def missing(self, asked: Sequence[Asked], time_limit_s: float) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
         """The runs that are to be computed, and those that are stored with their status and message.
 
         To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
