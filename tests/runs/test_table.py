@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -190,10 +191,8 @@ def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
             subprocess.Popen([sys.executable, "-c", program, str(path), str(first)], env=environment)
             for first in (0, 1)
         ]
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):
             writers[0].wait(timeout=0.5 + 0.03 * round_)
-        except subprocess.TimeoutExpired:
-            pass
         for writer in writers:
             writer.send_signal(signal.SIGKILL)
             writer.wait()
