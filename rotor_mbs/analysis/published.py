@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple
 
-from pydantic import Field, model_validator
-
+from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.scenario.toml_file import read_toml, shown_path
-from rotor_mbs.scenario.validation import Number, Table, Text, invalid, validate_file
-
-T = TypeVar("T", bound=Table)
+from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, wrong
+from rotor_mbs.scenario.toml_file import TableError, read_toml, shown_path
 
 
 class TrajectoryNumber(NamedTuple):
@@ -24,47 +22,61 @@ class TrajectoryNumber(NamedTuple):
     statistic: str
 
 
-ReadOff = Annotated[TrajectoryNumber, Field(description='[scene, "angle" or "rate", coordinate, statistic]')]
-Texts = Annotated[tuple[Text, ...], Field(strict=False)]
+def _read_trajectory_number(value: object) -> TrajectoryNumber:
+    if not isinstance(value, list) or len(value) != 4:
+        raise wrong(f"{keys.shown(value)} is not a list of four")
+    scene, quantity, coordinate, statistic = value
+    return TrajectoryNumber(
+        keys.read_text(scene),
+        keys.choice(("angle", "rate")).read(quantity),
+        keys.whole(0, 1000).read(coordinate),
+        keys.read_text(statistic),
+    )
 
 
-class Condition(Table):
+def _text(allowed: str) -> Kind:
+    return Kind(keys.read_text, allowed)
+
+
+_READ_OFF = Kind(_read_trajectory_number, '[scene, "angle" or "rate", coordinate, statistic]')
+_RELATION = keys.choice(("<", ">", "opposite"))
+
+
+@dataclass(frozen=True)
+class Condition:
     """`of` stands in `relation` to another number, or to a bound; "opposite" means of opposite sign."""
 
-    of: ReadOff
-    relation: Literal["<", ">", "opposite"] = Field(description='"<", ">" or "opposite"')
-    than: ReadOff | None = None
-    bound: Number | None = None
+    of: TrajectoryNumber = file_key("of", _READ_OFF)
+    relation: Literal["<", ">", "opposite"] = file_key("relation", _RELATION)
+    than: TrajectoryNumber | None = file_key("than", _READ_OFF, default=None)
+    bound: float | None = file_key("bound", keys.NUMBER, default=None)
 
-    @model_validator(mode="after")
-    def _has_one_limit(self) -> Condition:
+    def __post_init__(self) -> None:
         if (self.than is None) == (self.bound is None) or (self.relation == "opposite" and self.than is None):
-            raise invalid(f"a relation {self.relation} with than {self.than}, bound {self.bound}", "than or bound")
-        return self
+            raise wrong(f"a relation {self.relation} with than {self.than}, bound {self.bound}", "than or bound")
 
 
-class Published(Table):
+@dataclass(frozen=True)
+class Published:
     """A number or claim of the paper. A number has of, value, decimals; a claim has statement, tests.
 
     rounding: of a number, whether it is amplified rounding error, which depends on how the equations are written.
     """
 
-    id: Text = Field(description="a name")
-    figure: Text = Field(description="the figure's number")
-    kind: Literal["number", "claim"] = Field(description='"number" or "claim"')
-    quote: Text = Field(description="the paper's words")
-    statement: str = Field("", description="the claim as one sentence")
-    of: ReadOff | None = None
-    value: Number = Field(0.0, description="the printed number")
-    decimals: int = Field(0, ge=0, description="how many decimals are printed")
-    rounding: bool = Field(False, description="true or false")
-    tests: Annotated[tuple[Condition, ...], Field(strict=False)] = Field((), description="a list of conditions")
+    id: str = file_key("id", _text("a name"))
+    figure: str = file_key("figure", _text("the figure's number"))
+    kind: Literal["number", "claim"] = file_key("kind", keys.choice(("number", "claim")))
+    quote: str = file_key("quote", _text("the paper's words"))
+    statement: str = file_key("statement", _text("the claim as one sentence"), default="")
+    of: TrajectoryNumber | None = file_key("of", _READ_OFF, default=None)
+    value: float = file_key("value", keys.NUMBER, note=", as printed", default=0.0)
+    decimals: int = file_key("decimals", keys.whole(0, 100), default=0)
+    rounding: bool = file_key("rounding", keys.FLAG, default=False)
+    tests: Sequence[Condition] = file_key("tests", list_of(table_of(Condition), "a list of conditions"), default=())
 
-    @model_validator(mode="after")
-    def _is_complete(self) -> Published:
+    def __post_init__(self) -> None:
         if self.is_number != (self.of is not None) or self.is_number == bool(self.statement and self.tests):
-            raise invalid(f"{self.id} is no complete {self.kind}", "of, value, decimals; or statement, tests")
-        return self
+            raise wrong(f"{self.id} is no complete {self.kind}", "of, value, decimals; or statement, tests")
 
     @property
     def is_number(self) -> bool:
@@ -82,18 +94,22 @@ class Published(Table):
         return frozenset(number.scene for number in self.numbers)
 
 
-class Erratum(Table):
+_NUMBERS = list_of(keys.TEXT, "a list of equation numbers")
+
+
+@dataclass(frozen=True)
+class Erratum:
     """An error in the printed equations; fields as in reference/errata.toml."""
 
-    id: Text = Field(description="a name")
-    entry: Text = Field(description="the matrix entry")
-    pages: Text = Field(description="pages of the paper")
-    printed: Text = Field(description="the entry as printed")
-    right: Text = Field(description="the corrected entry")
-    reason: Text = Field(description="a sentence")
-    evidence: Texts = Field(description="a list of sentences")
-    stands_in: Texts = Field(description="a list of equation numbers")
-    reaches: Texts = Field(description="a list of equation numbers")
+    id: str = file_key("id", _text("a name"))
+    entry: str = file_key("entry", _text("the matrix entry"))
+    pages: str = file_key("pages", _text("pages of the paper"))
+    printed: str = file_key("printed", _text("the entry as printed"))
+    right: str = file_key("right", _text("the corrected entry"))
+    reason: str = file_key("reason", _text("a sentence"))
+    evidence: tuple[str, ...] = file_key("evidence", list_of(keys.TEXT, "a list of sentences"))
+    stands_in: tuple[str, ...] = file_key("stands_in", _NUMBERS)
+    reaches: tuple[str, ...] = file_key("reaches", _NUMBERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,28 +131,33 @@ class CheckedEntry:
     explained_by: str
 
 
-class _PublishedFile(Table):
-    conditions: dict[str, Text] = Field({}, description="a table of texts")
-    published: list[Published] = Field(description="[[published]] tables")
+@dataclass(frozen=True, kw_only=True)
+class _PublishedFile:
+    conditions: dict[str, str] = file_key("conditions", keys.dict_of(keys.TEXT, "a table of texts"), optional={})
+    published: tuple[Published, ...] = file_key("published", list_of(table_of(Published), "[[published]] tables"))
 
 
-class _ErrataFile(Table):
-    erratum: list[Erratum] = Field(description="[[erratum]] tables")
+@dataclass(frozen=True)
+class _ErrataFile:
+    erratum: tuple[Erratum, ...] = file_key("erratum", list_of(table_of(Erratum), "[[erratum]] tables"))
 
 
 def published() -> tuple[Published, ...]:
     """All numbers and claims, in the order of the file. Raises InputError with every error of the file."""
-    return tuple(_read("published.toml", _PublishedFile).published)
+    file: _PublishedFile = _read("published.toml", _PublishedFile)
+    return file.published
 
 
 def conditions() -> dict[str, str]:
     """What had to be found out to reproduce the numbers: by subject (gravity, duration) or scene (fig05)."""
-    return dict(_read("published.toml", _PublishedFile).conditions)
+    file: _PublishedFile = _read("published.toml", _PublishedFile)
+    return file.conditions
 
 
 def errata() -> tuple[Erratum, ...]:
     """The errata, in the order of the file. Raises InputError with every error of the file."""
-    return tuple(_read("errata.toml", _ErrataFile).erratum)
+    file: _ErrataFile = _read("errata.toml", _ErrataFile)
+    return file.erratum
 
 
 def checked_entries() -> list[CheckedEntry]:
@@ -159,7 +180,10 @@ def checked_entries() -> list[CheckedEntry]:
         ]
 
 
-def _read(name: str, model: type[T]) -> T:
+def _read(name: str, cls: type) -> Any:
     path = reference_folder() / name
     text, tables = read_toml(path)
-    return validate_file(model, tables, text, shown_path(path))
+    try:
+        return table_of(cls).read(tables)
+    except TableError as error:
+        raise error.in_file(text, shown_path(path)) from error

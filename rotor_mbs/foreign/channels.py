@@ -20,15 +20,14 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from pydantic import BeforeValidator, Field, create_model
+from typing import Any
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.table import DataTable, shown_names
+from rotor_mbs.scenario import keys
+from rotor_mbs.scenario.keys import Kind, file_key, wrong
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError, read_toml
-from rotor_mbs.scenario.validation import Number, Table, validate, validate_file
 
 TIME = "time"
 # By dimension: factor to s, rad or rad/s.
@@ -130,20 +129,34 @@ def split_unit(name: str) -> tuple[str, str]:
     return name[: match.start()], match[1].lower().replace("_per_s", "/s").replace("_s", "/s")
 
 
-class Entry(Table):
+def _read_sign(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or abs(value) != 1:
+        raise wrong(f"{keys.shown(value)} is not one of them")
+    return value
+
+
+@dataclass(frozen=True)
+class Entry:
     """What a mapping file says of a channel: sign * (column + offset) in `unit`.
 
     wrapped   whether turns are missing, so that jumps of more than half a turn are taken out
     """
 
-    column: str = Field(description="the name of a column")
-    unit: str = Field(default="", description="a unit such as deg")
-    sign: Literal[1, -1] = Field(default=1, description="1, -1")
-    offset: Number = Field(default=0.0, description="a number, in the column's unit")
-    wrapped: bool = Field(default=False, description="true, false")
+    column: str = file_key("column", Kind(keys.read_text, "the name of a column"))
+    unit: str = file_key("unit", Kind(keys.read_text, "a unit such as deg"), default="")
+    sign: int = file_key("sign", Kind(_read_sign, "1, -1"), default=1)
+    offset: float = file_key("offset", keys.NUMBER, note=", in the column's unit", default=0.0)
+    wrapped: bool = file_key("wrapped", keys.FLAG, default=False)
 
 
-_OfName = BeforeValidator(lambda value: {"column": value} if isinstance(value, str) else value)
+def _read_entry(value: object) -> Entry:
+    """A column's name stands for a table with this column alone."""
+    entry: Entry = keys.table_of(Entry).read({"column": value} if isinstance(value, str) else value)
+    return entry
+
+
+_ENTRY = Kind(_read_entry, "a column's name, or a table with `column`")
+_GROUP = Kind(keys.read_text, "the path of a group in the file")
 
 
 @dataclass(frozen=True)
@@ -181,22 +194,22 @@ def read_mapping(
     """
     if columns is None:
         return {}, ""
-    described = Field(None, description="a column's name, or a table with `column`")
-    keys: dict[str, Any] = {channel.key: (Annotated[Entry | None, _OfName], described) for channel in channels(scene)}
-    keys["group"] = (str, Field("", description="the path of a group in the file"))
-    model = create_model("MappingTable", __base__=Table, **keys)
-    try:
-        if isinstance(columns, Mapping):
-            name, values = "columns", dict(validate(model, columns))
-        else:
-            name, (text, tables) = str(columns), read_toml(Path(columns))
-            values = dict(validate_file(model, tables, text, name))
-    except TableError as error:
-        raise InputError(f"columns: {problem.message}" for problem in error.problems) from error
-    group = values.pop("group")
-    entries = {key: entry for key, entry in values.items() if entry is not None}
+    declared = {channel.key: file_key(channel.key, _ENTRY, default=None).metadata for channel in channels(scene)}
+    declared["group"] = file_key("group", _GROUP, default="").metadata
+    text: str | None = None
+    name, tables = "columns", columns
+    if not isinstance(columns, Mapping):
+        name, (text, tables) = str(columns), read_toml(Path(columns))
+    assert isinstance(tables, Mapping)
+    found, problems = keys.read_keys(declared, tables)
+    if problems and text is not None:
+        raise TableError(problems).in_file(text, name)
+    if problems:
+        raise InputError(f"columns: {problem.message}" for problem in problems)
+    group = found.pop("group")
+    entries = {key: entry for key, entry in found.items() if entry is not None}
     if entries.keys() == {TIME} or not (entries or group):
-        raise InputError(f"{name}: no channel to compare; allowed: {', '.join(values)}")
+        raise InputError(f"{name}: no channel to compare; allowed: {', '.join(declared)}")
     return entries, group
 
 

@@ -14,6 +14,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.table import DataTable, table_of
 from rotor_mbs.foreign.text_files import read_text
 from rotor_mbs.runs import files
+from rotor_mbs.runs.read import is_sweep, run_arrays
 
 LARGEST = 1 << 29  # bytes; a trajectory of a million rows of ten columns is 80 MB
 FORMATS = "text with a header, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
@@ -32,6 +33,8 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
     source = str(path)
     try:
         if head.startswith(_HDF5) or head[512:].startswith(_HDF5):  # MATLAB puts a block of its own in front
+            if files.is_of_this_program(path) and not is_sweep(path):
+                return table_of(source, run_arrays(path, group, scene))
             return table_of(source, *files.read_arrays(path, group, scene))
         if head.startswith(_ZIP):
             with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:

@@ -81,6 +81,7 @@ class Ode45Result:
 
     @property
     def steps(self) -> int:
+        """How many steps were accepted."""
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:

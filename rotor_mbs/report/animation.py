@@ -26,18 +26,33 @@ from rotor_mbs.solution.trajectory import Array
 
 SUFFIXES = (".webp", ".gif", ".mp4")
 RATE = 20  # frames a second, in real time
-_LONGEST = 600  # frames: a longer scene is shown faster
+_MAX_FRAMES = 600  # a longer scene is shown faster
 _SIDE, _TOP, _FINE = 420, 40, 2  # pixels of a square, of the line of text above; drawn at twice the size, then reduced
 _PATH_POINTS = 4  # along a path, from one frame to the next
 _INK, _FAINT = "#1b1f24", "#d5dae0"
 
 
 def write_animation(results: Path, name: str, output: Path, magnified: float | None = None) -> Path:
-    """Write the scene `name` of a results file as an animation; the suffix of `output` gives the format.
+    """Write a scene of a results file as an animation.
 
-    magnified: how many times the tip's distance from the pitch axis is drawn (stated in the picture); None: so many
-    times that it is visible. Returns `output`. Raises InputError for a scene that the file does not have and for a
-    format that cannot be made, StoreError where a file cannot be read or written.
+    Parameters
+    ----------
+    results, name : the file, and the name of the scene in it.
+    output : the animation; its suffix gives the format.
+    magnified : how many times the tip's distance from the pitch axis is drawn, which the picture states; None: so many
+        times that it is visible.
+
+    Returns
+    -------
+    Path
+        `output`.
+
+    Raises
+    ------
+    InputError
+        For a scene that the file does not have, and for a format that cannot be made.
+    StoreError
+        Where a file cannot be read or written.
     """
     kind = output.suffix.lower()
     if kind not in SUFFIXES:
@@ -70,7 +85,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
     if scene is None or not runs:
         raise InputError(f"{stored.name}: nothing to draw: no angles, or its scene file is not known")
     end = max(float(run.array("time")[-1]) for run in runs.values())
-    count = max(2, min(round(end * RATE) + 1, _LONGEST))
+    count = max(2, min(round(end * RATE) + 1, _MAX_FRAMES))
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
     needed = magnification(scene)
     factor = 1.0 if needed is None else float(magnified or needed)

@@ -152,15 +152,6 @@ def member(group: Any, name: str) -> Any:
     return group[name]
 
 
-def mapped(dataset: Any) -> NDArray[Any]:
-    """A contiguous array as it lies in the file, read where it is indexed: for reading across its first dimension."""
-    offset = dataset.id.get_offset()
-    if offset is None:
-        raise StoreError(f"{dataset.file.filename}: {dataset.name} is not contiguous")
-    values: NDArray[Any] = np.memmap(dataset.file.filename, dataset.dtype, "r", offset, dataset.shape)
-    return values
-
-
 def is_text(dataset: Any) -> bool:
     """Whether a dataset has texts of any length."""
     return h5py.check_string_dtype(dataset.dtype) is not None and dataset.dtype.kind == "O"
@@ -311,6 +302,15 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
+def is_of_this_program(path: Path) -> bool:
+    """Whether an HDF5 file says that this program wrote it."""
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(plain(file.attrs.get("format")) == FORMAT)
+    except OSError:
+        return False
+
+
 def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
     """Arrays of numbers of up to two dimensions and their units by name, of any HDF5 file: those of one group.
 
@@ -321,7 +321,7 @@ def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str,
     try:
         with h5py.File(path, "r") as file:
             places = _array_places(file)
-            name = _chosen(path, list(places), group.strip("/"), scene)
+            name = chosen_group(path, list(places), group.strip("/"), scene)
             chosen = file[name or "/"]
             arrays = {name: chosen[name][()] for name in places[name]}
             units = {name: str(plain(chosen[name].attrs.get("units", ""))) for name in arrays}
@@ -330,17 +330,19 @@ def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str,
     return arrays, {name: unit for name, unit in units.items() if unit}
 
 
-def _chosen(path: Path, places: Sequence[str], group: str, scene: str) -> str:
-    """The one group that is meant. Raises StoreError."""
-    inside = [one for one in places if one.startswith(f"{scene}/")] or list(places)
-    fitting = [one for one in inside if one == group] or [one for one in inside if f"/{one}".endswith(f"/{group}")]
-    if not group:
-        fitting = [one for one in inside if not one.endswith("/reference")]
+def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:
+    """The one of `places` that is meant, see `read_arrays`. Raises StoreError."""
+    inside = [place for place in places if place.startswith(f"{scene}/")] or list(places)
+    if group:
+        fitting = [place for place in inside if place == group]
+        fitting = fitting or [place for place in inside if f"/{place}".endswith(f"/{group}")]
+    else:
+        fitting = [place for place in inside if not place.endswith("/reference")]
     if len(fitting) == 1:
         return fitting[0]
     if not places:
         raise StoreError(f"{path}: no arrays of numbers in it; allowed: a time and angles")
-    shown = ", ".join(one or "/" for one in inside[:12]) + (", ..." if len(inside) > 12 else "")
+    shown = ", ".join(place or "/" for place in inside[:12]) + (", ..." if len(inside) > 12 else "")
     problem = f"no group {group!r}" if group else "arrays in several groups"
     raise StoreError(f"{path}: {problem}; allowed: a mapping file with group = one of {shown}")
 

@@ -184,6 +184,14 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
     raise StoreError(f"{path}: is being replaced by another process")
 
 
+def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
+    """The arrays of one run of a results file; group, scene: as for `files.read_arrays`, the run "scene/method"."""
+    with open_results(path) as results:
+        runs = {f"{name}/{run.method}": run for name, known in results.scenes.items() for run in known.runs.values()}
+        run = runs[files.chosen_group(path, list(runs), group.strip("/"), scene)]
+        return {name: run.array(name) for name in run.names if run.array(name).ndim <= 2}
+
+
 def is_sweep(path: Path) -> bool:
     """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
     with files.open_file(path) as file, files.reading(path):

@@ -21,13 +21,13 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.runs import files, table
 from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column
-from rotor_mbs.runs.table import MISSING, Place, Rows, StoredTable, Table, blank_rows, characters
+from rotor_mbs.runs.table import Place, Rows, StoredTable, Table, blank_rows, characters, text_of
 from rotor_mbs.runs.versions import machine, row_versions, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.quantities import SCALES, quantities, scale_values
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.status import code_of
+from rotor_mbs.solution.status import STATUSES, code_of
 
 RUNS = "runs"
 _OF_REFERENCE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
@@ -243,11 +243,29 @@ class TableFile:
         """What the design says of a row."""
         return {name: values[row] for name, (_, values) in self.tables[group].known.items()}
 
-    def is_stored(self, run: str, group: str = RUNS) -> bool:
-        """Whether a row is there as it was written."""
-        place = self.place(run, group)
-        marked = np.fromfile(self.path, np.int8, 1, offset=place.offsets["status"])
-        return bool(place.stored(marked)[0] != MISSING)
+    def missing(self, asked: Sequence[Asked], time_limit_s: float) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
+        """The runs that are to be computed, and those that are stored with their status and message.
+
+        To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
+        these; what is stored of them is taken back.
+
+        Parameters
+        ----------
+        asked : of each scene the reference first.
+        """
+        missing: dict[str, Asked] = {}
+        kept: list[tuple[Asked, str, str]] = []
+        for run in asked:
+            place = self.place(run.run)
+            row = place.read()
+            status = STATUSES[row["status"][0]] if place.is_stored else ""
+            is_over = status == "timed_out" and not run.is_read and not row["time_limit_s"][0] >= time_limit_s
+            if status and not is_over and f"{run.scene.name}/{REFERENCE}" not in missing:
+                kept.append((run, status, text_of(row["message"][0])))
+            else:
+                missing[run.run] = run
+                place.mark_missing([0])
+        return list(missing.values()), kept
 
 
 def fit(
@@ -286,7 +304,7 @@ def fit(
         for group, made in merged.items()
     )
     if not is_same or len(kept) < sum(len(stored.runs) for stored in _with_status(old)):
-        rows = [(group, run, old.place(run, group).read()) for group, run in kept if old.is_stored(run, group)]
+        rows = [(group, run, old.place(run, group).read()) for group, run in kept if old.place(run, group).is_stored]
         _write_tables(path, list(merged.values()), rows)
         return TableFile(path)
     return old

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 
@@ -17,25 +17,38 @@ from rotor_mbs.runs.table import Place, Rows
 _REPORTED = ("status", "message", "run_time_s")
 
 
-class Task(Protocol):
-    """Consecutive rows of a table, computed at once by one process."""
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """Consecutive rows of a table, computed at once by one process.
 
-    @property
-    def place(self) -> Place: ...
+    Attributes
+    ----------
+    label, method : in a line of progress.
+    place : where the rows are.
+    reference : where the row is that must be stored before; None where there is none.
+    limit_s : after which its process is ended, where it has not ended itself.
+    work : roughly how much there is to compute.
+    """
+
+    label: str
+    method: str
+    place: Place
+    reference: Place | None = None
+    limit_s: float = float("inf")
+    work: float = 1.0
 
     @property
     def first(self) -> int:
         """Number of the first row, with which its checksum begins."""
+        return self.place.first
 
-    @property
-    def limit_s(self) -> float:
-        """After which its process is ended, where it has not ended itself."""
-
-    def split(self) -> Sequence[Any]:
+    def split(self) -> Sequence[Self]:
         """Its rows one by one; an empty sequence where it is one row, or cannot be split."""
+        return ()
 
-    def failed(self, status: str, message: str) -> Rows | None:
-        """The rows of a task that was ended or raised; None where nothing is to be stored and it is tried again."""
+    def failed(self, status: str, message: str) -> Rows | None:  # noqa: ARG002
+        """The rows of a task that was ended or raised; None where nothing is stored, so that it is tried again."""
+        return None
 
 
 T = TypeVar("T", bound=Task)

@@ -151,6 +151,12 @@ class Place:
             statuses[start : start + step] = np.where(is_right & (status < len(STATUSES)), status, MISSING)
         return statuses
 
+    @property
+    def is_stored(self) -> bool:
+        """Whether the first row is there as it was written."""
+        row = self.read()
+        return bool(row["status"][0] != MISSING and checksums(self.first, row, self.row)[0] == row["crc32"][0])
+
     def clear(self) -> None:
         """Write a blank row, which a reader of an unfinished file sees; its status stays as it is."""
         with saving(self.path), self.path.open("r+b") as file:

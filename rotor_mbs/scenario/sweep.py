@@ -84,8 +84,8 @@ class AxisTable:
 
     key: str = file_key("key", Kind(_read_key, "the path of a number of the scene"))
     values: tuple[float, ...] | None = file_key("values", list_of(keys.NUMBER, "a list of numbers", 1), default=None)
-    linear: RangeTable | None = file_key("linear", _LINEAR, default=None)  # noqa: RUF009
-    log: RangeTable | None = file_key("log", _LOG, default=None)  # noqa: RUF009
+    linear: RangeTable | None = file_key("linear", _LINEAR, default=None)
+    log: RangeTable | None = file_key("log", _LOG, default=None)
     uniform: tuple[float, float] | None = file_key("uniform", _RANGE, default=None)
     normal: tuple[float, float] | None = file_key("normal", _NORMAL, default=None)
     sobol: tuple[float, float] | None = file_key("sobol", _RANGE, default=None)

@@ -89,7 +89,7 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
         for name, balance in balances.items():
             if balance is not None:
                 metrics[f"{name}_impulse_error_max"] = balance.largest
-    return metrics | _rotor_extremes(run) | _quantity_errors(scene, run, reference) | _peaks(scene, run)
+    return metrics | _rotor_extremes(run) | _quantity_metrics(scene, run, reference) | _peaks(scene, run)
 
 
 def _rotor_extremes(run: Trajectory) -> Metrics:
@@ -107,7 +107,7 @@ def _rotor_extremes(run: Trajectory) -> Metrics:
     }
 
 
-def _quantity_errors(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
+def _quantity_metrics(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
     """The metric of every quantity that is judged by a rule of its declaration."""
     metrics: Metrics = {}
     for quantity in known_quantities(scene.outputs):

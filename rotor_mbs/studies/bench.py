@@ -33,7 +33,7 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.bench_timing import Timings, conduct, statistics
 from rotor_mbs.studies.bench_worker import ERRORS, Point, PointScenes, ask, prepared_scene, start_timer, thinned
-from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, is_stored, run_scenes
+from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, run_scenes
 
 BENCH = "bench"
 
@@ -108,7 +108,7 @@ def replaced_points(output: Path, curves: Sequence[Curve]) -> list[tuple[str, st
 
 def is_measured(file: TableFile, curve: Curve) -> bool:
     """Whether every point of the curve is stored."""
-    return all(is_stored(file.place(str(row["run"]), BENCH)) for row in curve.rows)
+    return all(file.place(str(row["run"]), BENCH).is_stored for row in curve.rows)
 
 
 def run_bench(

@@ -18,7 +18,6 @@ from rotor_mbs.runs.files import replace_file
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution import quantities
-from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.stored_references import frozen_solution, shipped_reference
 
 
@@ -58,20 +57,17 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
     return [output]
 
 
-def reference_of(scene: Scene) -> Trajectory:
-    """The scene's reference: the shipped one, else computed. Raises StoreError where it does not reach the end."""
+def reference_csv(scene: Scene) -> str:
+    """The scene's reference, the shipped one or else a computed one, as comma-separated values.
+
+    The header has "time [s]", "rotor [rad]", "pitch 1 [rad]", ..., a column per component; numbers have all their
+    digits. Raises StoreError where the reference does not begin.
+    """
     is_shipped = shipped_reference(scene_hash(scene)) is not None
     solution = frozen_solution(scene) if is_shipped else solve(REFERENCE, scene, {})
-    if not len(solution.trajectory.time):
+    trajectory = solution.trajectory
+    if not len(trajectory.time):
         raise StoreError(f"{scene.name}: no reference: {solution.integration.message or 'no motion from its start'}")
-    return solution.trajectory
-
-
-def trajectory_csv(scene: Scene, trajectory: Trajectory) -> str:
-    """Comma-separated values with a header: "time [s]", "rotor [rad]", "pitch 1 [rad]", ..., a column per component.
-
-    Numbers have all their digits.
-    """
     blades = [f"{blade}" for blade in range(1, 1 + len(scene.blades))]
     labels = {"coordinate": scene.coordinate_labels, "blade": blades, "axis": "xyz"}
     columns = {"time [s]": trajectory.time}
@@ -100,5 +96,5 @@ def trajectory_csv(scene: Scene, trajectory: Trajectory) -> str:
 FORMATS: dict[str, tuple[str, Callable[[Scene], str]]] = {
     "mjcf": (".xml", mjcf_file),
     "exudyn": ("-exudyn.py", exudyn_script),
-    "csv": (".csv", lambda scene: trajectory_csv(scene, reference_of(scene))),
+    "csv": (".csv", reference_csv),
 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,11 +18,12 @@ from rotor_mbs.analysis.claim_study import claim_study
 from rotor_mbs.analysis.claims import claims, finding
 from rotor_mbs.analysis.run_tables import finding_lines, method_table
 from rotor_mbs.errors import RotorError
-from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, find_method, ladders
+from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, ladders
 from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import Asked, TableFile
-from rotor_mbs.runs.table import Place, Rows
+from rotor_mbs.runs.results import TableFile
+from rotor_mbs.runs.runner import Task
+from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
@@ -38,7 +39,16 @@ from rotor_mbs.studies.bench import (
     rows_of_curve,
 )
 from rotor_mbs.studies.bench_worker import PointTimer, prepared
-from rotor_mbs.studies.run import OnProgress, RunReport, RunTask, able_methods, ignore_progress, perform_run, run_scenes
+from rotor_mbs.studies.run import (
+    OnProgress,
+    RunReport,
+    RunTask,
+    able_methods,
+    ignore_progress,
+    perform_run,
+    run_scenes,
+    work_of,
+)
 from rotor_mbs.studies.stored_references import reference_at
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
@@ -46,37 +56,11 @@ BENCHED = "paper/fig11"
 _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next one takes up to eight times as long
 
 
-@dataclass(frozen=True)
-class CurveTask:
+@dataclass(frozen=True, kw_only=True)
+class CurveTask(Task):
     """A short curve on its way to a worker process: consecutive rows of the table /bench."""
 
     curve: Curve
-    place: Place
-    reference: Place
-    limit_s: float
-
-    @property
-    def asked(self) -> Asked:
-        """What is reported of it."""
-        return Asked(self.curve.scene, self.curve.ladder.method)
-
-    @property
-    def first(self) -> int:
-        return self.place.first
-
-    @property
-    def label(self) -> str:
-        return self.curve.label
-
-    @property
-    def work(self) -> float:
-        return 3.0 + find_method(self.curve.ladder.method).relative_cost * self.curve.scene.duration / 10.0
-
-    def split(self) -> Sequence[CurveTask]:
-        return ()
-
-    def failed(self, _status: str, _message: str) -> None:
-        """Nothing is stored of a curve whose process died: it is measured again."""
 
 
 def reproduce(
@@ -91,7 +75,15 @@ def reproduce(
     def curve_tasks(file: TableFile, missing: Collection[str]) -> list[CurveTask]:
         reference = f"{benched.name}/{REFERENCE}"
         return [
-            CurveTask(curve, file.place(curve.first_run, BENCH), file.place(reference), 1.2 * timeout_s + 10.0)
+            CurveTask(
+                label=curve.label,
+                method=curve.ladder.method,
+                place=file.place(curve.first_run, BENCH),
+                reference=file.place(reference),
+                limit_s=1.2 * timeout_s + 10.0,
+                work=work_of(benched, curve.ladder.method),
+                curve=curve,
+            )
             for curve in curves
             if reference in missing or not is_measured(file, curve)
         ]
@@ -139,6 +131,7 @@ def short_curves(scene: Scene) -> list[Curve]:
 def perform_curve(task: CurveTask) -> Rows:
     """Run and judge the points of one curve, in a worker process; their rows."""
     curve = task.curve
+    assert task.reference is not None  # every curve has one
     short, reference = prepared(curve.scene, reference_at(task.reference, curve.scene))
     points = points_of(curve.ladder, short.duration / (short.samples - 1))
     timer = PointTimer(dict.fromkeys(points, (short, reference)))

@@ -25,16 +25,24 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import pool_of
 from rotor_mbs.runs.records import points_table, row_of_point
-from rotor_mbs.runs.results import Asked, TableFile, fit
-from rotor_mbs.runs.runner import compute
-from rotor_mbs.runs.table import Place, Rows
+from rotor_mbs.runs.results import TableFile, fit
+from rotor_mbs.runs.runner import Task, compute
+from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.impulse import angular_momentum
 from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Trajectory
-from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, is_stored, outcomes, run_scenes
+from rotor_mbs.studies.run import (
+    OnProgress,
+    Outcome,
+    able_methods,
+    ignore_progress,
+    outcomes,
+    run_scenes,
+    work_of,
+)
 from rotor_mbs.studies.stored_references import reference_at
 
 SUITE = ("stiff", "extreme")
@@ -60,46 +68,12 @@ _INTERVALS = 10
 _SYMMETRY_LIMIT_S = 30.0
 
 
-@dataclass(frozen=True)
-class StudyTask:
-    """Numbers of some runs of a scene by a method, on their way to a worker process: consecutive rows of a table.
-
-    Attributes
-    ----------
-    table, scene, method : STEPS, LIMIT or SYMMETRY, and of what.
-    place : where the first row is.
-    reference : where the row of the scene's reference is.
-    """
+@dataclass(frozen=True, kw_only=True)
+class StudyTask(Task):
+    """Numbers of some runs of a scene by a method, on their way to a worker process: rows of STEPS, LIMIT, SYMMETRY."""
 
     table: str
     scene: Scene
-    method: str
-    place: Place
-    reference: Place | None
-    limit_s: float = _TASK_LIMIT_S
-
-    @property
-    def asked(self) -> Asked:
-        """What is reported of it."""
-        return Asked(self.scene, self.method)
-
-    @property
-    def first(self) -> int:
-        return self.place.first
-
-    @property
-    def label(self) -> str:
-        return f"{self.scene.name} {self.method} {self.table}"
-
-    @property
-    def work(self) -> float:
-        return 3.0 + find_method(self.method).relative_cost * self.scene.duration / 10.0
-
-    def split(self) -> Sequence[StudyTask]:
-        return ()
-
-    def failed(self, _status: str, _message: str) -> None:
-        """Nothing is stored: the same call tries again."""
 
 
 def run_suite(
@@ -159,9 +133,20 @@ def complete_studies(
         tasks = []
         for table, scene, method in wanted:
             own = [file.place(str(point["run"]), table) for point in points[table, scene.name, method]]
-            if not all(map(is_stored, own)):
+            if not all(place.is_stored for place in own):
                 reference = None if table == SYMMETRY else file.place(f"{scene.name}/{REFERENCE}")
-                tasks.append(StudyTask(table, scene, method, own[0], reference))
+                tasks.append(
+                    StudyTask(
+                        label=f"{scene.name} {method} {table}",
+                        method=method,
+                        place=own[0],
+                        reference=reference,
+                        limit_s=_TASK_LIMIT_S,
+                        work=work_of(scene, method),
+                        table=table,
+                        scene=scene,
+                    )
+                )
         made: list[Outcome] = []
         if tasks:
             with pool_of(workers) as pool:

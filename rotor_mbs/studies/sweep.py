@@ -24,7 +24,7 @@ from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.toml_file import of_file, shown_path
 from rotor_mbs.solution.status import STATUSES, code_of
-from rotor_mbs.studies.sweep_work import Chunk, perform
+from rotor_mbs.studies.sweep_work import Chunk, limit_of, perform
 
 # Runs handed to a worker at once where the method computes many side by side: by the fastest one an eighth of a second
 # of work, fewer towards the end, so that all workers end together. The least fills the lanes of any processor.
@@ -80,7 +80,18 @@ class SweepPlan:
                 end = min(first + size, last, (number + 1) * self.rows)
                 values, settings = design.rows(first, end), self.settings[method.name]
                 code = code_of_method(method.name)
-                yield Chunk(variants, method.name, settings, place, first, values, self.time_limit_s, code)
+                yield Chunk(
+                    label=f"runs {first} to {end - 1}",
+                    method=method.name,
+                    place=place,
+                    limit_s=limit_of(end - first, self.time_limit_s),
+                    start=first,
+                    values=values,
+                    variants=variants,
+                    settings=settings,
+                    time_limit_s=self.time_limit_s,
+                    code=code,
+                )
                 first, left = end, left - (end - first)
 
     def _identity(self) -> str:

@@ -15,8 +15,9 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import error_growth
+from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.sweeps import AMPLIFICATION, METRICS
-from rotor_mbs.runs.table import Place, Rows, blank_rows, characters
+from rotor_mbs.runs.table import Rows, blank_rows, characters
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError
 from rotor_mbs.scenario.variants import Variants
@@ -31,31 +32,27 @@ _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 
-@dataclass(frozen=True)
-class Chunk:
-    """Runs first ... first + len(values) - 1 by one method.
+@dataclass(frozen=True, kw_only=True)
+class Chunk(Task):
+    """Runs by one method, the first of them number `start`.
 
     Attributes
     ----------
     values : (runs, keys) the varied numbers.
-    place : where the rows of the table are.
     code : of the versions that compute them, stored with each.
     time_limit_s : of one run.
     """
 
-    variants: Variants
-    method: str
-    settings: Mapping[str, object]
-    place: Place
-    first: int
+    start: int
     values: NDArray[np.float64]
+    variants: Variants
+    settings: Mapping[str, object]
     time_limit_s: float
     code: int
 
     @property
-    def limit_s(self) -> float:
-        """When its worker is ended: a method that computes many runs side by side may do so one after the other."""
-        return self.time_limit_s * len(self.values) + _GRACE_S
+    def first(self) -> int:
+        return self.start
 
     def split(self) -> list[Chunk]:
         """Its runs one by one; [] where it is one run."""
@@ -63,7 +60,8 @@ class Chunk:
 
     def part(self, start: int, end: int) -> Chunk:
         """Some of its runs."""
-        return replace(self, first=self.first + start, values=self.values[start:end])
+        values = self.values[start:end]
+        return replace(self, start=self.start + start, values=values, limit_s=limit_of(len(values), self.time_limit_s))
 
     def failed(self, status: str, message: str) -> Rows:
         """The rows of runs whose process was ended, or that raised."""
@@ -72,6 +70,11 @@ class Chunk:
         rows["time_reached"][:], rows["code"][:] = 0.0, self.code
         rows["time_limit_s"][:] = self.time_limit_s if status == "timed_out" else np.nan
         return rows
+
+
+def limit_of(runs: int, time_limit_s: float) -> float:
+    """When the worker of so many runs is ended: a method may compute them one after the other."""
+    return time_limit_s * runs + _GRACE_S
 
 
 def prepare() -> None:

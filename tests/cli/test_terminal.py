@@ -9,15 +9,11 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import pytest
-from rotor_mbs.runs.case import Case
 from support.commands import rotor_mbs
 
 from rotor_mbs.cli.terminal import ProgressLine, coloured
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.runs.runner import Outcome, Result
-from rotor_mbs.scenario.catalogue import find_scenes
-
-SCENE = find_scenes(["paper/fig05"])[0]
+from rotor_mbs.studies.run import Outcome
 
 
 class Terminal(io.StringIO):
@@ -26,7 +22,7 @@ class Terminal(io.StringIO):
 
 
 def outcome(method: str = "lagrange/dop853", share: float = 0.5, **result: object) -> Outcome:
-    return Outcome(Case(SCENE, method), Result(**{"status": "ok", **result}), share)  # type: ignore[arg-type]
+    return Outcome(f"paper/fig05 {method}", method, **{"status": "ok", **result}, share=share)  # type: ignore[arg-type]
 
 
 def test_a_log_has_a_plain_line_for_each_case() -> None:

@@ -122,7 +122,7 @@ def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None
 
 def test_results_of_this_program_are_data_too(tmp_path: Path) -> None:
     scene = rm.scene("paper/fig03")
-    rm.compare(scene, ["lagrange/dop853", "exudyn_tree/rk67"]).save(tmp_path / "r.h5")
+    rm.run(scene, ["lagrange/dop853", "exudyn_tree/rk67"]).save(tmp_path / "r.h5")
     with pytest.raises(RotorError, match=r"several groups; .*paper/fig03/exudyn_tree/rk67"):
         load_data(tmp_path / "r.h5", scene)
     stored = rm.open(tmp_path / "r.h5")["paper/fig03/exudyn_tree/rk67"]

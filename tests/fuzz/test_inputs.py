@@ -10,20 +10,19 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from rotor_mbs.runs.case import Case
 from support.fuzzing import answers, damaged, scene_text, sweep_text, tried, write
 from support.scenes import paper
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.cluster import open_task_pool
-from rotor_mbs.runs.runner import Job
+from rotor_mbs.runs.results import Asked, fit, results_tables
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING
+from rotor_mbs.runs.table import MISSING, text_of
 from rotor_mbs.scenario.scene_file import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.status import STATUSES
-from rotor_mbs.studies.run import able_methods, perform_run, selected_methods
+from rotor_mbs.studies.run import RunTask, able_methods, perform_run, selected_methods
 from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 
 pytestmark = pytest.mark.full
@@ -57,10 +56,15 @@ def _run_fault(scene: object, method: str, folder: Path, statuses: Counter[objec
     try:
         selected_methods([scene])
         if able_methods(scene, [method])[0]:
-            result = perform_run(Job(Case(scene, method), folder / "part.h5", None, _LIMIT_S))
-            statuses[result.status] += 1
-            if "Error: " in result.message.partition(" ")[0] + " ":
-                return f"{method}: {result.message}"
+            (folder / "r.h5").unlink(missing_ok=True)
+            asked = Asked(scene, method)
+            place = fit(folder / "r.h5", results_tables([asked])).place(asked.run)
+            row = perform_run(RunTask(label="", method=method, place=place, asked=asked, time_limit_s=_LIMIT_S))
+            place.write(place.first, row)
+            statuses[STATUSES[int(row["status"][0])]] += 1
+            message = text_of(row["message"][0])
+            if "Error: " in message.partition(" ")[0] + " ":
+                return f"{method}: {message}"
     except InputError as exc:
         return f"{method}: {exc}" if not str(exc) else ""
     except Exception as exc:

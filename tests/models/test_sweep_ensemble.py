@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from rotor_mbs.runs.sweep_columns import row_type
 from support.scenes import general, paper
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
+from rotor_mbs.runs.sweeps import sweep_table
+from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import sweep_of
 from rotor_mbs.scenario.variants import Variants
@@ -166,7 +168,11 @@ def test_any_chunks_give_the_same_bytes(changes: dict[str, object], keys: list[s
     }
     variants = Variants("t", tables, keys)
     sweep = sweep_of(variants.scene(values[0]), {"gravity": [9.8]}, outputs=["angles", "rates", "tip", "energy"])
-    whole = Chunk(variants, "lagrange/taylor", {}, row_type(sweep), 0, np.array(values), 60.0)
+    row = sweep_table(sweep, ["lagrange/taylor"], range(len(values))).row_type
+    whole = Chunk(
+        label="", method="lagrange/taylor", place=Place(Path(), 0, 0, {}, row), start=0, values=np.array(values),
+        variants=variants, settings={}, time_limit_s=60.0, code=0,
+    )  # fmt: skip
     expected = rows_of(whole)
     for size in (1, LANES - 1, LANES):
         for start in range(0, len(values), size):

@@ -23,11 +23,11 @@ def paper_runs() -> list[Made]:
     failed = {"status": "solver_failed", "message": "the step became <too> small"}
     return [
         Made(FIG11, REFERENCE, RIGHT),
-        Made(FIG11, PRINTED, WRONG, gain=1e6, refined=True),
+        Made(FIG11, PRINTED, WRONG, gain=1e6),
         Made(FIG11, TAYLOR, lambda t: RIGHT(t) + 1e-12 * t[:, None]),
         Made(FIG11, TREE, lambda t: RIGHT(t) + 1e-9, attributes={"status": "inaccurate"}),
         Made(FIG05, REFERENCE, rotor(lambda t: 0.52 + 0.0 * t)),
-        Made(FIG05, PRINTED, rotor(lambda t: 0.52 + 0.0073 * np.sin(2.0 * t)), refined=True),
+        Made(FIG05, PRINTED, rotor(lambda t: 0.52 + 0.0073 * np.sin(2.0 * t))),
         Made(FIG12, REFERENCE, RIGHT),
         Made(FIG12, PRINTED, RIGHT, gain=1e12, until=0.4, attributes=failed),
         Made(FIG12, TREE, RIGHT, until=0.0, attributes={"status": "timed_out", "message": "60 s"}),

@@ -53,7 +53,7 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
         table = model_table(opened.scenes)
     row, same = (dict(zip(table.head, row, strict=True)) for row in table.rows)
-    assert row["As printed: 0.05 rad off from (s)"] == "2.5"
+    assert row["As printed: 0.05 rad off from (s)"] == "2.50"
     assert row["largest difference (rad)"] == "0.20"
     assert str(row["largest energy gain"]).replace("\N{NO-BREAK SPACE}", " ") == "2.00 kJ"
     assert (row["Exudyn: difference (rad)"], row["up to (s)"]) == ("1.0×10⁻⁸", "10.0")
@@ -109,7 +109,7 @@ def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path, capsy
     assert float(width[1]) / 72 * 25.4 == pytest.approx(174.0, abs=0.01)  # two columns of a journal
 
 
-@pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("png", b"\x89PNG"), ("svg", b"<?xml")])
+@pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF"), ("png", b"\x89PNG")])
 def test_formats_have_the_same_bytes_every_time(drawn: Path, tmp_path: Path, kind: str, start: bytes) -> None:
     for folder in ("a", "b"):
         assert main(["figures", str(drawn), "--format", kind, "--figure", "13", "-o", str(tmp_path / folder)]) == 0

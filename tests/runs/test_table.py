@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -191,7 +191,7 @@ def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
             subprocess.Popen([sys.executable, "-c", program, str(path), str(first)], env=environment)
             for first in (0, 1)
         ]
-        with contextlib.suppress(subprocess.TimeoutExpired):
+        with suppress(subprocess.TimeoutExpired):
             writers[0].wait(timeout=0.5 + 0.03 * round_)
         for writer in writers:
             writer.send_signal(signal.SIGKILL)
@@ -224,7 +224,7 @@ def _write(file: TableFile, run: str, value: float) -> None:
 
 def _stored(path: Path) -> list[str]:
     file = TableFile(path)
-    return [run for run in file.tables["runs"].runs.tolist() if file.is_stored(run)]
+    return [run for run in file.tables["runs"].runs.tolist() if file.place(run).is_stored]
 
 
 def test_what_is_asked_again_changes_nothing(tmp_path: Path) -> None:
@@ -278,7 +278,7 @@ def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     place = file.place("a", "stability")
     place.write(place.first, row_of_point(place, "ok", "", {"angle_error_max": 0.25}))
     file = fit(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
-    assert file.is_stored("a", "stability")
+    assert file.place("a", "stability").is_stored
     assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
     file = fit(path, [], dropped=[("stability", "a")])
     assert "stability" not in file.tables

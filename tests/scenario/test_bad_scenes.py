@@ -115,10 +115,7 @@ WRONG = {
     "one of two blade tables": ("[blade]", "[[blade]]", 8, "blade", r"1 \[\[blade\]\] table for 2 blades"),
     "mass too large": ("mass = 2", "mass = 1e200", 9, r"blade\.mass", "allowed: sizes from 1e-25"),
     "offset too small": ("[0.5, 0, 3]", "[-1e-80, 0, 3]", 10, r"blade\.centre_of_mass\[0\]", "allowed: 0, or sizes"),
-    "torque too large": ("rotor = 5", "rotor = 1e150", 23, r"torque\.rotor", "allowed: 0, or sizes"),
-    "time too small": ("rotor = 5", "rotor = [[0, 0], [1e-299, 1]]", 23, r"torque\.rotor\[1\]\[0\]", "allowed: 0"),
     "stiffness too large": ("stiffness = 1", "stiffness = 1e120", 19, r"bearing\.stiffness", "allowed: 0, or sizes"),
-    "gravity too large": ("gravity = 9.8", "gravity = 1e30", 3, "gravity", "allowed: 0, or sizes"),
     "duration too small": ("duration = 10", "duration = 1e-300", 4, "duration", "allowed: sizes from"),
     "second blade table": (BLADE,
      BLADE.replace("[blade]", "[[blade]]") + BLADE.replace("[blade]", "[[blade]]").replace("= 2", "= 0"), 14,
@@ -175,12 +172,8 @@ def test_a_pitch_without_inertia_takes_no_rate_and_no_bearing(tmp_path: Path) ->
     )
     assert stiffness.startswith(":18: bearing.stiffness: acts on blades 1, 2, whose pitch has no inertia")
     assert damping.startswith(":19: bearing.damping: acts on blades 1, 2")
-
-
-def test_a_bearing_may_leave_out_the_blade_without_pitch_inertia(tmp_path: Path) -> None:
     tables = (BLADE + ON_THE_AXIS).replace("[blade]", "[[blade]]")
-    text = SCENE.replace(BLADE, tables).replace("stiffness = 1", "stiffness = [1, 0]")
-    (problem,) = _problems(tmp_path, text)
+    (problem,) = _problems(tmp_path, SCENE.replace(BLADE, tables).replace("stiffness = 1", "stiffness = [1, 0]"))
     assert problem.startswith(":24: bearing.damping: acts on blade 2, whose pitch has no inertia")
 
 

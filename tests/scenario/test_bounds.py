@@ -11,20 +11,18 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.accuracy_bounds import Bound, load_bounds, read_bounds, shipped_bounds
 
 BAD = {
-    "an unknown key": ('check = "tip"\nmethod = "*"\nvalue = 1\nreason = "x"\nunit = "m"', 6,
-     r"bound\[0\].unit: .* not a key"),
-    "a negative bound": ('check = "tip"\nmethod = "*"\nvalue = -1e-9\nreason = "x"', 4, "-1e-09 is out of range"),
-    "no value": ('check = "tip"\nmethod = "*"\nreason = "x"', 1, "value: is missing; allowed: a number from 0"),
-    "no reason": ('check = "tip"\nmethod = "*"\nvalue = 1\nreason = " "', 5, "reason: is empty; allowed: a sentence"),
-    "an unknown check": ('check = "tipp"\nmethod = "*"\nvalue = 1\nreason = "x"', 2, "perhaps tip; allowed: one of"),
-}  # fmt: skip
+    'value = 1\nreason = "x"\nunit = "m"': (6, "unit: .* not a key"),
+    'value = -1e-9\nreason = "x"': (4, "value: -1e-09 is out of range"),
+    'reason = "x"': (1, "value: is missing; allowed: a number from 0"),
+    'value = 1\nreason = " "': (5, "reason: is empty; allowed: a sentence"),
+}
 
 
-@pytest.mark.parametrize(("text", "line", "message"), BAD.values(), ids=BAD)
-def test_an_error_is_one_line(tmp_path: Path, text: str, line: int, message: str) -> None:
-    own = tmp_path / "own.toml"
-    own.write_text(f"[[bound]]\n{text}\n")
-    with pytest.raises(InputError, match=message) as caught:
+@pytest.mark.parametrize("text", BAD)
+def test_an_error_is_one_line(tmp_path: Path, text: str) -> None:
+    own, (line, message) = tmp_path / "own.toml", BAD[text]
+    own.write_text(f'[[bound]]\ncheck = "tip"\nmethod = "*"\n{text}\n')
+    with pytest.raises(InputError, match=rf"bound\[0\]\.{message}") as caught:
         read_bounds(own)
     (problem,) = caught.value.problems
     assert problem.startswith(f"{own}:{line}: bound[0].")

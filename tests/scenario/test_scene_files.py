@@ -58,8 +58,6 @@ PAPER = {
     "paper/fig15-100kNm": (("15", "16b"), REST, REST, 100e3),
 }
 
-REST_OF_TWO = {"initial.rates": [0] * 3}
-
 SCENE = """
 title = "A scene"
 blades = 2
@@ -117,16 +115,13 @@ def test_shipped_scene_has_the_numbers_of_its_caption(paper: dict[str, Scene], n
     assert scene.bearing_stiffness == ()
 
 
-def test_only_the_scene_with_its_mass_on_the_axis_has_no_pitch_inertia(paper: dict[str, Scene]) -> None:
+def test_what_single_scenes_of_the_paper_are_for(paper: dict[str, Scene]) -> None:
     bare = [name for name, scene in paper.items() if not all(blade.has_pitch_inertia for blade in scene.blades)]
     assert bare == ["paper/fig04b"]
-
-
-@pytest.mark.parametrize("torque", ["10", "50"])
-def test_torques_that_the_paper_does_not_print_say_so(paper: dict[str, Scene], torque: str) -> None:
-    scene = paper[f"paper/fig15-{torque}kNm"]
-    assert "not printed" in scene.title
-    assert f"does not print {torque} kN m" in scene.text
+    for torque in ("10", "50"):
+        scene = paper[f"paper/fig15-{torque}kNm"]
+        assert "not printed" in scene.title
+        assert f"does not print {torque} kN m" in scene.text
 
 
 @pytest.mark.parametrize("field", fields(Scene), ids=lambda field: field.name)
@@ -157,9 +152,9 @@ def test_what_a_run_can_show_is_not_refused(tmp_path: Path, old: str, new: str) 
 @pytest.mark.parametrize("small", [1e-25, 1e25])
 def test_what_follows_from_extreme_sizes_is_a_normal_double(paper: dict[str, Scene], big: float, small: float) -> None:
     """Inertias, moments, energies and accelerations: the closed form neither overflows nor underflows with them."""
-    blade = {"blade.mass": big, "blade.centre_of_mass": [small, 0, big]}
-    loads = {"bearing.stiffness": big, "torque.rotor": big, "gravity": big}
-    scene = paper["paper/fig11"].replace(**blade, **loads, blades=2, **{"initial.angles": [0] * 3}, **REST_OF_TWO)
+    rotor = {"blades": 2, "blade.mass": big, "blade.centre_of_mass": [small, 0, big], "bearing.stiffness": big}
+    start = {"initial.angles": [0, 0, 0], "initial.rates": [0, 0, 0]}
+    scene = paper["paper/fig11"].replace(**rotor, **start, **{"torque.rotor": big, "gravity": big})
     form, values = rotor_form(scene), load_values([big, big, big, small, small])
     state = [0.1, 0.2, 0.3], [1.0, 1.0, 1.0]
     kinetic, potential = energies(*state, form, values, math.sin, math.cos)
@@ -263,13 +258,9 @@ def test_the_line_of_every_key(newline: str) -> None:
     assert len(leaves) == 22
     lines = find_lines(NUMBERED.replace("\n", newline))
     assert [(path, line_of(lines, path)) for path, _ in leaves] == leaves
-
-
-def test_a_key_that_is_not_there_has_the_line_of_what_encloses_it() -> None:
-    lines = find_lines(NUMBERED)
-    assert line_of(lines, ("many", 1, "missing")) == 26
-    assert line_of(lines, ("t", "x", 3)) == 18
-    assert line_of(lines, ("missing",)) == 1
+    # A key that is not there has the line of what encloses it.
+    absent = [("many", 1, "missing"), ("t", "x", 3), ("missing",)]
+    assert [line_of(lines, path) for path in absent] == [26, 18, 1]
 
 
 @given(st.text(alphabet="ab=.,[]{}\"'#\n 1\\", max_size=60))
@@ -288,7 +279,7 @@ def test_arguments_keep_their_order_and_name_a_scene_once(tmp_path: Path) -> Non
 
 
 def test_list_needs_neither_pydantic_nor_numpy() -> None:
-    # Each costs more than half of the 0.3 s that `rotor-mbs list` may take.
+    # Either takes longer than `rotor-mbs list` may.
     code = (
         "import sys; from rotor_mbs.scenario.catalogue import list_scenes; assert list_scenes(); "
         "assert not {'pydantic', 'numpy'} & set(sys.modules)"

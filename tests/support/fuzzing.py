@@ -2,46 +2,34 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import random
 import traceback
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from rotor_mbs.cli import main
 from rotor_mbs.scenario.scene import OUTPUTS
+from support.commands import rotor_mbs
 
 # Where a number is drawn from: usual ones, ones of the usual size, and whatever the schema takes.
 _USUAL = (0.0, 0.1, 1.0, 2.5, 9.8, 1000.0)
 # What a text or a value may be replaced by.
 _ODD = (
-    "nan",
-    "inf",
-    "-1",
-    "1e400",
-    '"pi"',
-    '"1/0"',
-    "true",
-    "[]",
-    "{}",
-    '"\\u001b[2J"',
-    "1979-05-27",
+    "nan", "inf", "-1", "1e400", '"pi"', '"1/0"', "true", "[]", "{}", '"\\u001b[2J"', "1979-05-27",
     '"' + "x" * 300 + '"',
-)
+)  # fmt: skip
 
 
 class Numbers:
-    """Numbers of a scene; `wild`: the share that may have any magnitude."""
+    """Numbers of a scene, of which a share may have any magnitude."""
 
     def __init__(self, random_: random.Random) -> None:
         self.random = random_
-        self.wild = random_.choice([0.0, 0.0, 0.03, 0.3])
+        self.extreme_share = random_.choice([0.0, 0.0, 0.03, 0.3])
 
     def __call__(self, *, positive: bool = False) -> str:
         draw = self.random.random()
-        if draw < self.wild:
+        if draw < self.extreme_share:
             value = 10.0 ** self.random.uniform(-300.0, 300.0)
         elif draw < 0.6:
             value = self.random.choice(_USUAL)
@@ -93,15 +81,10 @@ def sweep_text(seed: int, scene: str) -> str:
     """A sweep of a few runs of `scene`."""
     chance = random.Random(seed)
     number = Numbers(chance)
-    keys = ["gravity", "blade.mass", "initial.angles[0]", "initial.angles[1]", "initial.rates[0]", "bearing.stiffness"]
-    keys += [
-        "blade.centre_of_mass[0]",
-        "torque.rotor",
-        "hub.inertia",
-        "blade.inertia[2]",
-        "initial.angles[9]",
-        "no.such",
-    ]
+    keys = [
+        "gravity", "blade.mass", "blade.centre_of_mass[0]", "blade.inertia[2]", "hub.inertia", "initial.angles[0]",
+        "initial.angles[1]", "initial.angles[9]", "initial.rates[0]", "bearing.stiffness", "torque.rotor", "no.such",
+    ]  # fmt: skip
     lines = ['title = "fuzz"', f'scene = "{scene}"', f"samples = {chance.choice([2, 5, 11])}"]
     lines.append(f"outputs = {chance.sample(OUTPUTS, chance.randint(0, 3))}".replace("'", '"'))
     lines.append(f'methods = ["{chance.choice(["lagrange/taylor", "lagrange/dop853", "exudyn_tree/rk44"])}"]')
@@ -151,19 +134,15 @@ def damaged(content: bytes, seed: int) -> bytes:
 
 def answers(command: Sequence[str], allowed: Iterable[int] = (0, 1, 2)) -> tuple[int | None, str]:
     """(exit status, fault) of a command in this process; fault: "" where its answer is in order, lines and all."""
-    out, err = io.StringIO(), io.StringIO()
+    words = " ".join(command)
     try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            status = main(list(command))
-    except SystemExit as exc:  # of the argument parser
-        status = int(exc.code or 0)
+        status, out, err = rotor_mbs(*command)
     except BaseException:
-        return None, f"{' '.join(command)}: {traceback.format_exc()}"
-    text = err.getvalue()
-    if status not in allowed or "Traceback" in text or "Warning:" in text or "\x1b" in text + out.getvalue():
-        return status, f"{' '.join(command)}: status {status}: {text[-500:]}"
-    if status == 2 and not text.strip():
-        return status, f"{' '.join(command)}: status 2 without a reason"
+        return None, f"{words}: {traceback.format_exc()}"
+    if status not in allowed or "Warning:" in err or "\x1b" in err + out:
+        return status, f"{words}: status {status}: {err[-500:]}"
+    if status == 2 and not err.strip():
+        return status, f"{words}: status 2 without a reason"
     return status, ""
 
 

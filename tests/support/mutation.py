@@ -1,4 +1,4 @@
-"""The mutation run: one change to the source at a time, and `check`'s own verdicts must notice.
+"""The mutation run: one change to the source at a time, and a check of `rotor-mbs check` or a test must notice.
 
     python tests/support/mutation.py [GROUP...] [--only PATTERN] [--every N] [--jobs N]
 
@@ -88,15 +88,9 @@ _TARGETS = (
     Target(
         "lagrange",
         f"{_L}.parameters",
-        (
-            "rotor_form",
-            "_inertia_about_hub",
-            "_rotor_inertia",
-            "_coefficients",
-            "_cosine_of_turn",
-        ),
+        ("rotor_form", "_inertia_about_hub", "_rotor_inertia", "_coefficients", "_cosine_of_turn"),
     ),
-    # What all but the printed equations share: every group's verdicts see it.
+    # What all but the printed equations share: every group's checks see it.
     Target(
         "lagrange",
         "rotor_mbs.scenario.time_table",
@@ -152,17 +146,7 @@ _TARGETS = (
     Target(
         "mujoco", f"{_J}.mjcf", ("loads_of", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
     ),
-    Target(
-        "mujoco",
-        f"{_J}.solver",
-        (
-            "_advance",
-            "observe",
-            "_work",
-            "_springs",
-        ),
-        1e-3,
-    ),
+    Target("mujoco", f"{_J}.solver", ("_advance", "observe", "_work", "_springs"), 1e-3),
     Target(
         "rules",
         "rotor_mbs.solution.judgement",
@@ -228,7 +212,7 @@ _TARGETS = (
 TARGETS = tuple(one for one in _TARGETS if one.group != "mujoco" or importlib.util.find_spec("mujoco"))
 
 
-# What sees the mutants of a module that no verdict can see.
+# What sees the mutants of a module that no check can see.
 _PARTS = "models/test_exudyn_parts.py::test_"
 _MUJOCO = "models/test_mujoco.py::test_"
 _PITCH = "models/test_pitch_loads.py::test_"
@@ -240,7 +224,7 @@ _RULES = (
 )
 _CHECK = "studies/test_check.py::test_"
 _REFERENCE = "models/test_reference.py::test_"
-_PRINTED = ("models/test_printed.py",)
+_PRINTED = ("models/test_printed.py", "analysis/test_errata.py")
 _DEFAULTS = "analysis/test_run_integrity.py::test_defaults_are_the_settings_that_the_bounds_were_found_with"
 _TESTS = {
     f"{_L}.closed_form": _PRINTED,
@@ -594,7 +578,7 @@ def _good_file() -> Path:
 
 
 def _make_good_file() -> None:
-    """Runs of every kind of verdict."""
+    """Runs of every kind of check."""
     from support.checking import results_file
 
     path = _good_file()
@@ -672,7 +656,7 @@ def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
 
 
 def _outcome(mutant: Mutant) -> str:
-    """Which verdict failed first, or which test; "" where none did. Of verdicts themselves the tests are quicker."""
+    """Which check failed first, or which test; "" where none did. Of the checks themselves the tests are quicker."""
     _put_in_place(mutant)
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
@@ -754,7 +738,7 @@ def _in_order(act: Callable[[], Any]) -> bool:
 
 
 def run(chosen: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
-    """Every mutant with the verdict that noticed it ("survived": none); as many at a time as there are jobs."""
+    """Every mutant with the check that noticed it ("survived": none); as many at a time as there are jobs."""
     waiting, going = list(chosen)[::-1], {}
     while waiting or going:
         while waiting and len(going) < jobs:
@@ -789,7 +773,7 @@ def warm_up(modules: Sequence[str]) -> None:
     for name in ("support.checking", *dict.fromkeys(target.module for target in TARGETS)):
         importlib.import_module(name)
     sys.modules["rotor_mbs.runs.versions"].versions()
-    sys.modules["rotor_mbs.studies.stored_references"].frozen_file("")
+    sys.modules["rotor_mbs.studies.stored_references"].shipped_reference("")
     tests = [str(ROOT / "tests" / test) for module in modules for test in _TESTS.get(module, ())]
     with contextlib.redirect_stdout(io.StringIO()):
         if tests and pytest.main([*_PYTEST, "--collect-only", *tests]):
@@ -808,7 +792,9 @@ def _fail_without_a_mutant(tests: set[str]) -> bool:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Mutants of the models and rules, and which verdict notices each.")
+    parser = argparse.ArgumentParser(
+        description="Mutants of the models and rules, and which check or test notices each."
+    )
     parser.add_argument("groups", nargs="*", metavar="GROUP", help="such as lagrange, rules, ode45")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="each N-th mutant alone")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="at a time (default: %(default)s)")
@@ -827,10 +813,10 @@ def main() -> None:
         tests |= {str(ROOT / noticed[6:])} if noticed.startswith("test: tests/") else set()
     if tests and not _in_order(lambda: _fail_without_a_mutant(tests)):
         raise SystemExit("a test that noticed a mutant fails without one")
-    by_verdict = len(chosen) - sum(ways[way] for way in ("test", "survived", "raised", "did"))
+    by_check = len(chosen) - sum(ways[way] for way in ("test", "survived", "raised", "did"))
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     print(
-        f"{len(chosen)} mutants: {by_verdict} made a verdict fail, {ways['raised']} raised, {ways['did']} did not end, "
+        f"{len(chosen)} mutants: {by_check} made a check fail, {ways['raised']} raised, {ways['did']} did not end, "
         f"{ways['test']} made a test alone fail, {ways['survived']} survived; "
         f"{time.monotonic() - start:.0f} s, {cpu:.0f} s of processor time",
         file=sys.stderr,

@@ -32,7 +32,9 @@ class Mistakes:
 NONE = Mistakes()
 
 
-def trajectory(scene: Scene, times: Array, mistakes: Mistakes = NONE) -> tuple[Array, Array]:
+def trajectory(
+    scene: Scene, times: Array, mistakes: Mistakes = NONE, rtol: float = 1e-11, atol: float = 1e-12
+) -> tuple[Array, Array]:
     """(n, 1 + blades) angles and rates at `times`, from 0 on."""
     count = 1 + len(scene.blades)
     accelerations = _equations(scene, mistakes)
@@ -46,20 +48,27 @@ def trajectory(scene: Scene, times: Array, mistakes: Mistakes = NONE) -> tuple[A
 
         def derivative(t: float, y: Array, start: float = start, end: float = end) -> Array:
             shift = 1e-9 * (end - start)  # a jump of the torque belongs to the interval that it begins
-            loads = [_value(table, min(max(t, start + shift), end - shift)) for table in tables]
+            loads = [value_at(table, min(max(t, start + shift), end - shift)) for table in tables]
             return np.concatenate([y[count:], accelerations(loads, y[:count], y[count:])])
 
-        run = solve_ivp(derivative, (start, end), state, "DOP853", asked, rtol=1e-11, atol=1e-12)
+        run = solve_ivp(derivative, (start, end), state, "DOP853", asked, rtol=rtol, atol=atol)
         rows.append(run.y.T[: len(inside)])
         state = run.y[:, -1]
     found = np.concatenate(rows)[1:] if times[0] > 0.0 else np.concatenate(rows)
     return found[:, :count], found[:, count:]
 
 
-def _value(table: Array, t: float) -> float:
-    """Of rows of (time, value), linear between."""
+def acceleration(scene: Scene, t: float, state: Array) -> Array:
+    """(2 (1 + blades),) time derivative of angles and rates."""
+    count = 1 + len(scene.blades)
+    loads = [value_at(table, t) for table in (scene.rotor_torque, *scene.pitch_torque, *scene.bearing_rest)]
+    return np.concatenate([state[count:], _equations(scene, NONE)(loads, state[:count], state[count:])])
+
+
+def value_at(table: Array, t: Array) -> Array:
+    """Of rows of (time, value), linear between; of two rows with one time the last counts there."""
     times, values = zip(*table, strict=True) if table else ((0.0,), (0.0,))
-    return float(np.interp(t, times, values))
+    return np.interp(t, times, values)
 
 
 def _equations(scene: Scene, mistakes: Mistakes) -> Callable[[list[float], Array, Array], Array]:

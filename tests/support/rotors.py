@@ -1,20 +1,20 @@
-"""The closed form of the rotor, written here once more from its kinetic energy, as an oracle.
+"""Rotors for tests, their motion and energies as an oracle that shares nothing with the package but the scene.
 
 T = J_hub q'²/2 + Σ ω·J ω/2 with ω = (q' sin θ, q' cos θ, θ') in the blade frame and J about the hub centre;
-V = Σ m g z + Σ k (θ - rest)²/2. Shares nothing with the package but the scene.
+V = Σ m g z + Σ k (θ - rest)²/2.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import pairwise
 from math import hypot, pi
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.special import ellipj
 
 from rotor_mbs.scenario.scene import Blade, Scene
+from support import other_code
+from support.other_code import acceleration as acceleration
+from support.other_code import value_at
 
 C, D = hypot(0.08, 0.03), 15.42
 PAPER = Blade(15000.0, (C, 0.0, D), (0.0,) * 6, (C, 0.0, 33.38))
@@ -66,84 +66,11 @@ def about_hub(blade: Blade):
     return com + blade.mass * (r @ r * np.eye(3) - np.outer(r, r))
 
 
-def acceleration(scene: Scene, t: float, y):
-    """(2 (1 + blades),) time derivative of angles and rates."""
-    n = 1 + len(scene.blades)
-    q, theta, w, rate = y[0], y[1:n], y[n], y[n + 1 :]
-    M, f = np.zeros((n, n)), np.zeros(n)
-    M[0, 0] = scene.hub_inertia
-    f[0] = scene.torque_at(t) - scene.shaft_damping * w
-    for i, blade in enumerate(scene.blades, start=1):
-        J, (x, yy, z) = about_hub(blade), blade.centre_of_mass
-        s, c, v = np.sin(theta[i - 1]), np.cos(theta[i - 1]), rate[i - 1]
-        sp, cp = np.sin(q + scene.phases[i - 1]), np.cos(q + scene.phases[i - 1])
-        a, da = np.array([s, c, 0.0]), np.array([c, -s, 0.0])
-        M[0, 0] += a @ J @ a
-        M[0, i] = M[i, 0] = a @ J[2]
-        M[i, i] = J[2, 2]
-        weight = blade.mass * scene.gravity
-        f[0] += weight * (cp * (c * x - s * yy) + sp * z) - 2 * w * v * (da @ J @ a) - v * v * (da @ J[2])
-        f[i] = w * w * (da @ J @ a) - weight * sp * (s * x + c * yy)
-        f[i] += over_time(scene.pitch_torque, i - 1, t)
-        if scene.bearing_stiffness:
-            f[i] -= scene.bearing_stiffness[i - 1] * (theta[i - 1] - over_time(scene.bearing_rest, i - 1, t))
-        f[i] -= scene.bearing_damping[i - 1] * v if scene.bearing_damping else 0.0
-    return np.concatenate([y[n:], np.linalg.solve(M, f)])
-
-
-def over_time(tables, blade: int, t: float) -> float:
-    """Value of the blade's table at t; 0 where there is none. The last of two rows with one time counts."""
-    rows = tables[blade] if tables else ()
-    before, after = [row for row in rows if row[0] <= t], [row for row in rows if row[0] > t]
-    if not before or not after:
-        return (before[-1:] + after[:1] + [(0.0, 0.0)])[0][1]
-    (t0, v0), (t1, v1) = before[-1], after[0]
-    return v0 + (v1 - v0) * (t - t0) / (t1 - t0)
-
-
-def load_times(scene: Scene):
-    """Every time at which a load may have a kink or a jump."""
-    return {row[0] for table in (scene.rotor_torque, *scene.pitch_torque, *scene.bearing_rest) for row in table}
-
-
 def closed_form(scene: Scene, duration: float | None = None):
-    """(n, 2 (1 + blades)) angles and rates at the samples up to `duration`, jumps of loads taken one by one."""
+    """(n, 2 (1 + blades)) angles and rates at the samples up to `duration`, by `other_code`."""
     times = np.linspace(0.0, scene.duration, scene.samples)
-    end = duration or scene.duration
-    knots = sorted({0.0, end, *(t for t in load_times(scene) if 0.0 < t < end)})
-    y = np.array(scene.initial_angles + scene.initial_rates)
-    rows = [y]
-    for start, stop in pairwise(knots):
-        held = _loads_until(scene, stop)
-        wanted = times[(times > start + 1e-12) & (times <= stop + 1e-12)].clip(max=stop)
-        last = wanted if len(wanted) and wanted[-1] == stop else np.append(wanted, stop)
-        run = solve_ivp(
-            lambda t, y, held=held: acceleration(held, t, y),
-            (start, stop),
-            y,
-            "DOP853",
-            last,
-            rtol=1e-13,
-            atol=1e-14,
-        )
-        rows += list(run.y.T[: len(wanted)])
-        y = run.y[:, -1]
-    return np.array(rows)
-
-
-def _loads_until(scene: Scene, stop: float) -> Scene:
-    """The scene with each load's value before a jump at `stop` kept there."""
-
-    def until(rows):
-        early = [row for row in rows if row[0] < stop] + [next((r for r in rows if r[0] == stop), None)]
-        return tuple(r for r in early if r) if any(r[0] == stop for r in rows) else rows
-
-    return replace(
-        scene,
-        rotor_torque=until(scene.rotor_torque),
-        pitch_torque=tuple(map(until, scene.pitch_torque)),
-        bearing_rest=tuple(map(until, scene.bearing_rest)),
-    )
+    times = times[times <= (duration or scene.duration) + 1e-12]
+    return np.hstack(other_code.trajectory(scene, times, rtol=1e-13, atol=1e-14))
 
 
 def energies(scene: Scene, y):
@@ -157,10 +84,9 @@ def energies(scene: Scene, y):
         kinetic += 0.5 * np.einsum("ni,ij,nj->n", omega, about_hub(blade), omega)
         potential += blade.mass * scene.gravity * (blade_points(scene, y, i, blade.centre_of_mass)[:, 2])
         if scene.bearing_stiffness:
-            rest = [
-                over_time(scene.bearing_rest, i, t) for t in np.linspace(0.0, scene.duration, scene.samples)[: len(y)]
-            ]
-            potential += 0.5 * scene.bearing_stiffness[i] * (theta - np.array(rest)) ** 2
+            times = np.linspace(0.0, scene.duration, scene.samples)[: len(y)]
+            rest = value_at(scene.bearing_rest[i] if scene.bearing_rest else (), times)
+            potential += 0.5 * scene.bearing_stiffness[i] * (theta - rest) ** 2
     return kinetic, potential
 
 

@@ -62,9 +62,11 @@ class Moment:
         return sum(factor * self.loads.segment.at(load, time) for load, factor in self.terms)
 
     def scalar(self, _system: object, time: float, _load: float) -> float:
+        """Load function of a coordinate."""
         return self.at(time)
 
     def about_y(self, _system: object, time: float, _load: object) -> list[float]:
+        """Load function of a torque vector along the shaft."""
         return [0.0, self.at(time), 0.0]
 
 

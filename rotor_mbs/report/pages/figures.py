@@ -139,10 +139,25 @@ def legend(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple
 
 
 def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
-    """`folder`/figNN.`kind` for each figure of `numbers`, or for all that the file has where `numbers` is empty.
+    """Write figures of the paper for a manuscript.
 
-    `kind` is "pdf", "svg" or "png". Returns the files written. Raises InputError for a figure that the file does not
-    have, StoreError where the file cannot be read or the folder cannot be written.
+    Parameters
+    ----------
+    results, folder : the results file; where figNN.pdf and so on are written.
+    kind : "pdf", "svg" or "png".
+    numbers : of the figures, such as "11"; all that the file has where none is given.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        For a figure that the file does not have.
+    StoreError
+        Where the file cannot be read or the folder cannot be written.
     """
     with open_results(results) as opened:
         have = {figure.number: figure for figure in available(opened.scenes)}
@@ -233,7 +248,7 @@ def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
         row = [name]
         if printed is not None and corrected is not None:
             parted, largest = parting(printed, corrected)
-            row += ["never" if parted is None else number(parted), number(largest)]
+            row += ["never" if parted is None else number(parted, 3), number(largest)]
         else:
             row += ["", ""]
         if printed is not None:

@@ -12,7 +12,7 @@ from rotor_mbs.analysis.campbell import FloquetTable, LinearModes, SceneModes, S
 from rotor_mbs.analysis.modes import GROWTH, multiblade
 from rotor_mbs.report.core.canvas import Panels, curve, growth_map, log_axis, panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
-from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
+from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
 
@@ -54,7 +54,8 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
         "models": [f"{linear.label} ({linear.source})" for linear in sources],
         "agrees": modes.agrees,
         "difference": modes.disagreement,
-        "notes": ([floquet_sentence(modes.floquet)] if modes.floquet is not None else []) + list(modes.notes),
+        "notes": ([with_capital(floquet_sentence(modes.floquet))] if modes.floquet is not None else [])
+        + list(modes.notes),
         "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
         "campbell": Section(pictures, legend),
         "fastest": fastest,
