@@ -326,9 +326,7 @@ class StoredTable:
 def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
-    changed = [part for part in digests.damages_of(item) if part != files.DIGESTS]
-    if changed:
-        raise StoreError(f"{path}: {group or 'file'}: {', '.join(changed)} changed after the file was laid out")
+    _refuse_changes(item, group)
     filled_names = digests.unfilled_in(digests.stored_digests(item.attrs))
     known: dict[str, tuple[Column, NDArray[Any]]] = {}
     scales: dict[str, tuple[Column, NDArray[Any]]] = {}
@@ -343,6 +341,8 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
         dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
         column = Column(dimensions, str(dataset.attrs["units"]), str(dataset.attrs["long_name"]), dataset.dtype.str)
         if name in filled_names:
+            if dataset.shape is None or dataset.dtype.kind not in "fiuS":
+                raise StoreError(f"{path}: {dataset.name} is no array of numbers or characters")
             offset = dataset.id.get_offset()
             if offset is None and dataset.size:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
@@ -358,6 +358,13 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     return StoredTable(path, path.stat().st_ino, group, runs, known, scales, labels, filled, attributes)
 
 
+def _refuse_changes(item: Any, group: str) -> None:
+    changed = digests.damages_of(item)
+    if changed:
+        place = f"{item.file.filename}: {group or 'file'}"
+        raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")
+
+
 def _values(dataset: Any) -> NDArray[Any]:
     return files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
 
@@ -365,12 +372,16 @@ def _values(dataset: Any) -> NDArray[Any]:
 def stored_tables(path: Path) -> dict[str, StoredTable]:
     """All tables of a file by their group. Raises StoreError where it is damaged or another program's."""
     with files.open_file(path) as file, files.reading(path):
-        return {group: stored_table(file, group) for group in _groups_with_runs(file, "")}
+        _refuse_changes(file, "")
+        return {group: stored_table(file, group) for group in _groups_with_runs(file, "", set())}
 
 
-def _groups_with_runs(group: Any, path: str) -> Iterator[str]:
+def _groups_with_runs(group: Any, path: str, seen: set[Any]) -> Iterator[str]:
+    if group in seen:
+        raise StoreError(f"{group.file.filename}: {path} is another name of a group; allowed: one name of each")
+    seen.add(group)
     if "run" in group:
         yield path
     for name, item in files.members(group):
         if files.is_group(item):
-            yield from _groups_with_runs(item, f"{path}/{name}" if path else name)
+            yield from _groups_with_runs(item, f"{path}/{name}" if path else name, seen)
