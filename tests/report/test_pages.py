@@ -12,16 +12,14 @@ import h5py
 import numpy as np
 import pytest
 from markupsafe import escape
-from rotor_mbs.analysis.claim_records import stored_claims
-from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares
-from rotor_mbs.models.printed.errata import CheckedEntry
 from support.checking import add_run, results_file
 from support.scenes import paper
 from support.stored import Arrays, Made, rotor, store
 from support.sweeps import made_sweep
 
+from rotor_mbs.analysis.claim_study import ClaimShare, ClaimShares, claim_study
 from rotor_mbs.analysis.claims import Claim, ClaimResult
-from rotor_mbs.analysis.published import errata, published
+from rotor_mbs.analysis.published import CheckedEntry, errata, published
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.solve import solve
@@ -222,7 +220,7 @@ def test_the_page_of_the_check_has_every_verdict_that_fails_and_is_made_where_it
     assert failed  # the motion is no solution: it does not start where the scene does
     section = text[text.index('<section id="failures">') : text.index('<section id="all"')]
     assert section.count('class="bad"') == len(failed)
-    looked_at = {str(escape(verdict.look_at)) for verdict in failed}
+    looked_at = {str(escape(verdict.hint)) for verdict in failed}
     assert looked_at == set(re.findall(r"fail</span><small>(.*?)</small>", section))
     assert 'href="check.html"' in (folder / "paper-fig11.html").read_text(encoding="utf-8")
 
@@ -267,13 +265,11 @@ def test_verdicts_of_claims_are_those_of_the_shares() -> None:
 
 
 def test_the_numbers_stand_in_tables_by_duration_tolerances_and_way_of_writing() -> None:
-    study = stored_claims()
-    assert study is not None
 
     def reproduced(table: PageTable) -> list[bool]:
         return [all(not isinstance(cell, str) and cell.tone == "good" for cell in row[-4:]) for row in table.rows]
 
-    by_duration, by_tolerance, by_row = map(reproduced, claim_tables.trial_tables(study.numbers))
+    by_duration, by_tolerance, by_row = map(reproduced, claim_tables.trial_tables(claim_study().numbers))
     assert by_duration == [False, False, False, False, True, False]
     assert (sum(by_tolerance), sum(by_row), len(by_row)) == (1, 8, 12)
 
