@@ -22,6 +22,7 @@ from rotor_mbs.analysis.claims import Claim, ClaimResult
 from rotor_mbs.analysis.published import CheckedEntry, errata, published
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core import numbers
@@ -33,6 +34,7 @@ from rotor_mbs.report.pages.errata import matrices
 from rotor_mbs.report.pages.index import heat_map
 from rotor_mbs.report.pages.quantities import parting
 from rotor_mbs.report.pages.scene import range_table
+from rotor_mbs.runs import results as results_module
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -369,10 +371,12 @@ def test_the_page_of_a_driven_scene_shows_power_pitch_and_command_and_no_other_d
 # Safety
 
 
-def test_texts_from_the_file_are_escaped(tmp_path: Path) -> None:
+def test_texts_from_the_file_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a method that is not installed, too."""
+    monkeypatch.setattr(results_module, "find_method", lambda name: look_up(name) or find_method(TAYLOR))
     evil = "<script>alert(1)</script>"
     scene = replace(FIG11, name="a b/<i>", title=f"{evil}\x1b[2J", text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
-    failed = {"status": evil, "message": evil}
+    failed = {"status": "singular", "message": evil}
     runs = [Made(scene, REFERENCE, SWING), Made(scene, f"lagrange/{evil[:8]}>x", SWING, attributes=failed)]
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "o")
     for path in folder.parent.glob("*.html"):
