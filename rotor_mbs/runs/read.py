@@ -174,7 +174,7 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
     for _ in range(_ATTEMPTS):
         with path.open("rb") as file:
             stored = TableFile(path)
-            if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
+            if stored.groups and stored.table(stored.groups[0]).inode != os.fstat(file.fileno()).st_ino:
                 continue
             with files.reading(path):
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify)}
@@ -205,23 +205,23 @@ def damages(path: Path) -> dict[str, list[str]]:
 
 
 def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[StoredScene]:
-    if RUNS not in stored.tables:
+    if RUNS not in stored.groups:
         return
-    runs = stored.tables[RUNS]
+    runs = stored.table(RUNS)
     file.seek(runs.filled["status"].offset)
     statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
-    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"][1]}
+    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"]}
     for i, run in enumerate(runs.runs.tolist()):
         if statuses[i] == MISSING:
             continue
         known = stored.known(RUNS, i)
         scene = str(known["scene"])
-        arrays = stored.tables[scene]
-        scales = {name: values for name, (_, values) in arrays.scales.items()}
+        arrays = stored.table(scene)
+        scales = arrays.known
         labels = tuple(map(str, arrays.labels.get("coordinate", ())))
         by_scene[scene].append(
             StoredRun(scene, str(known["method_name"]), known, scales, labels, stored.place(run), file, verify)
         )
     for scene, found in by_scene.items():
         if found:
-            yield StoredScene(scene, dict(stored.tables[scene].attributes), {run.method: run for run in found})
+            yield StoredScene(scene, dict(stored.table(scene).attributes), {run.method: run for run in found})

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 from rotor_mbs.runs.timing import conduct, statistics
-from support.cost_scaling import with_blades
+from support.cost_scaling import SETTINGS, with_blades
 from support.references import reference
 from support.scenes import paper
 
@@ -330,7 +330,7 @@ def test_cost_of_the_chain_grows_no_faster_than_a_power_of_1_25_from_12_to_96_bl
     method = find_method("exudyn_chain/generalized_alpha")
     for count in sizes:
         scene = replace(with_blades(paper("fig08"), count), duration=0.5, samples=6)
-        solver, found = method.build(scene, method.settings.of(method.name, method.cost_scaling or {})), []
+        solver, found = method.build(scene, method.settings.of(method.name, SETTINGS.get(method.name, {}))), []
         for _ in range(3):
             start = time.process_time()
             assert solver.integrate().success

@@ -16,8 +16,6 @@ from rotor_mbs.methods.base import Solver
 from rotor_mbs.solution.quantities import BUILT_IN
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
-NONE, RICHARDSON = "none", "richardson"
-
 REFINEMENTS = (1, 2, 4)
 
 # The uncertainty is this many times the sum of three: the distance of two extrapolations, from (h, h/2) and from

@@ -200,7 +200,7 @@ METHODS = (
         "exudyn_tree", "rk44", "RK44",
         settings=schemes.Rk44Settings, order=4, fixed_step=True,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
-        ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
+        ladders=(step_ladder(10),),
     ),
     _method(
         "exudyn_tree", "rk67", "RK67",
@@ -208,7 +208,7 @@ METHODS = (
         # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
         # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
-        ladders=(step_ladder(8),), cost_scaling={"step": 1e-2}, linearize=late(f"{_LINEARIZATION}:linearize_tree"),
+        ladders=(step_ladder(8),), linearize=late(f"{_LINEARIZATION}:linearize_tree"),
     ),
     _method(
         "exudyn_tree", "dopri5", "DOPRI5",
@@ -219,22 +219,22 @@ METHODS = (
                 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14,
             ),
         ),
-        cost_scaling={"relative_tolerance": 0.0, "absolute_tolerance": 1e-7},
+
     ),
     _method(
         "exudyn_tree", "generalized_alpha", "generalized-α",
         settings=schemes.AlphaSettings, order=2, fixed_step=True,
-        ladders=_TREE_ALPHA_LADDERS, cost_scaling={"step": 1e-2},
+        ladders=_TREE_ALPHA_LADDERS,
     ),
     _method(
         "exudyn_chain", "generalized_alpha", "generalized-α",
         settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
-        ladders=_CHAIN_ALPHA_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
+        ladders=_CHAIN_ALPHA_LADDERS,
         linearize=late(f"{_LINEARIZATION}:linearize_chain"),
     ),
     _method(
         "exudyn_chain", "newmark_index2", "Newmark index 2",
         settings=ChainNewmarkSettings, order=2, fixed_step=True,
-        ladders=_NEWMARK_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
+        ladders=_NEWMARK_LADDERS,
     ),
 )  # fmt: skip
