@@ -11,26 +11,15 @@ STEP, TOLERANCE = "step", "tolerance"
 
 @dataclass(frozen=True)
 class Ladder:
-    """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance.
+    """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance."""
 
-    Attributes
-    ----------
-    kind : STEP or TOLERANCE.
-    values : steps as shares of the sample interval, or tolerances; coarse to fine.
-    fill : the settings that go with one value.
-    choices : settings that stay the same along the ladder.
-    variant : what follows the method's name in the curve's name; "" where the choices are the default ones.
-    label : of the variant; the method's where it is left out.
-    method, order : name and expected order (None: adaptive step) of the method; filled in by the `Method`.
-    """
-
-    kind: str
-    values: tuple[float, ...]
-    fill: Callable[[float], Mapping[str, float]]
-    choices: Mapping[str, object] = field(default_factory=dict)
-    variant: str = ""
-    label: str = ""
-    method: str = ""
+    kind: str  # STEP or TOLERANCE
+    values: tuple[float, ...]  # steps as shares of the sample interval, or tolerances; coarse to fine
+    fill: Callable[[float], Mapping[str, float]]  # the settings that go with one value
+    choices: Mapping[str, object] = field(default_factory=dict)  # settings that stay the same along the ladder
+    variant: str = ""  # what follows the method's name in the curve's name; "" where the choices are the default ones
+    label: str = ""  # of the variant; the method's where it is left out
+    method: str = ""  # name and expected order (None: adaptive step) of the method; filled in by the `Method`
     order: float | None = None
 
     @property

@@ -62,22 +62,14 @@ _INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INT
 
 @dataclass(frozen=True, slots=True)
 class Ode45Result:
-    """Every accepted step with its stages, so that the solution can be read off at any time it reached.
+    """Every accepted step with its stages, so that the solution can be read off at any time it reached."""
 
-    Attributes
-    ----------
-    time, state : (k + 1,), (k + 1, n)
-    stages : (k, 7, n) derivatives
-    success, message : whether the end was reached, and why not
-    evaluations : of the right-hand side
-    """
-
-    time: Array
+    time: Array  # (k + 1,), (k + 1, n)
     state: Array
-    stages: Array
-    success: bool
+    stages: Array  # (k, 7, n) derivatives
+    success: bool  # whether the end was reached, and why not
     message: str
-    evaluations: int
+    evaluations: int  # of the right-hand side
 
     @property
     def steps(self) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs import digests, files
+from rotor_mbs.runs import files
 from rotor_mbs.runs.results import OF_METHODS, RUNS, TableFile
 from rotor_mbs.runs.table import MISSING, Place, Rows, checksums, text_of
 from rotor_mbs.scenario.catalogue import natural_order
@@ -60,7 +60,8 @@ class StoredRun:
     @functools.cached_property
     def is_damaged(self) -> bool:
         """Whether its row is not what was written."""
-        row = self._place.read(file=self._file)
+        with files.reading(f"{self._place.path}: {self.scene}/{self.method}"):
+            row = self._place.read(file=self._file)
         return bool((checksums(self._place.first, row, self._place.row) != row["crc32"]).any())
 
     @functools.cached_property
@@ -174,7 +175,7 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
     for _ in range(_ATTEMPTS):
         with path.open("rb") as file:
             stored = TableFile(path)
-            if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
+            if stored.groups and stored.table(stored.groups[0]).inode != os.fstat(file.fileno()).st_ino:
                 continue
             with files.reading(path):
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify)}
@@ -197,31 +198,24 @@ def is_sweep(path: Path) -> bool:
         return "run" in file
 
 
-def damages(path: Path) -> dict[str, list[str]]:
-    """Parts of a results file's groups that are not what was laid out, by group; the root is "file"."""
-    with files.open_file(path) as file, files.reading(path):
-        places = {(str(group.name).strip("/") or "file"): digests.damages_of(group) for group in files.groups_in(file)}
-    return {place: parts for place, parts in places.items() if parts}
-
-
 def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[StoredScene]:
-    if RUNS not in stored.tables:
+    if RUNS not in stored.groups:
         return
-    runs = stored.tables[RUNS]
+    runs = stored.table(RUNS)
     file.seek(runs.filled["status"].offset)
     statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
-    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"][1]}
+    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"]}
     for i, run in enumerate(runs.runs.tolist()):
         if statuses[i] == MISSING:
             continue
         known = stored.known(RUNS, i)
         scene = str(known["scene"])
-        arrays = stored.tables[scene]
-        scales = {name: values for name, (_, values) in arrays.scales.items()}
+        arrays = stored.table(scene)
+        scales = arrays.known
         labels = tuple(map(str, arrays.labels.get("coordinate", ())))
         by_scene[scene].append(
             StoredRun(scene, str(known["method_name"]), known, scales, labels, stored.place(run), file, verify)
         )
     for scene, found in by_scene.items():
         if found:
-            yield StoredScene(scene, dict(stored.tables[scene].attributes), {run.method: run for run in found})
+            yield StoredScene(scene, dict(stored.table(scene).attributes), {run.method: run for run in found})

@@ -33,19 +33,17 @@ _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest value that passes, in the check's own unit, for methods that `method` (a pattern with *) fits.
-
-    scenes   the shipped scenes it is for, patterns with | between them; "*" for any scene, a user's own too
-    fault, known_fault   the value that a known fault gives, and which one: what the bound must stay below; a user's
-                         bound may leave them out (infinity, "")
-    """
+    """The largest value that passes, in the check's own unit, for methods that `method` (a pattern with *) fits."""
 
     check: str = file_key("check", keys.choice(CHECKS))
     method: str = file_key("method", _PATTERN)
     value: float = file_key("value", _BOUND)
     reason: str = file_key("reason", _SENTENCE)
+    # the value that a known fault gives, and which one: what the bound must stay below; a user's bound may leave them
+    # out (infinity, "")
     fault: float = file_key("fault", _BOUND, default=math.inf)
     known_fault: str = file_key("known_fault", _SENTENCE, default="")
+    # the shipped scenes it is for, patterns with | between them; "*" for any scene, a user's own too
     scenes: str = file_key("scenes", _PATTERN, default="*")
 
 

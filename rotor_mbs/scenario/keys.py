@@ -26,19 +26,14 @@ _UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")  # Unicode categories: controls, d
 
 @dataclass(frozen=True)
 class Kind:
-    """What a value of a file may be.
+    """What a value of a file may be."""
 
-    read         from the value; where `in_context`, from the value and the values of the keys before it, by field
-    allowed      what a message says is allowed; {unit} stands for the key's unit
-    per_blade    the file may have one value for all blades
-    over_time    a value may be a table over time
-    """
-
+    # from the value; where `in_context`, from the value and the values of the keys before it, by field
     read: Callable[..., Any]
-    allowed: str
+    allowed: str  # what a message says is allowed; {unit} stands for the key's unit
     in_context: bool = False
-    per_blade: bool = False
-    over_time: bool = False
+    per_blade: bool = False  # the file may have one value for all blades
+    over_time: bool = False  # a value may be a table over time
 
 
 def file_key(path: str, kind: Kind, unit: str = "1", note: str = "", *, default: Any = MISSING, **more: Any) -> Any:

@@ -156,17 +156,12 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A base scene and how it is varied.
+    """A base scene and how it is varied."""
 
-    table   what the sweep's file says
-    base    the scene with the sweep's own changes, before any axis
-    text    the TOML text it was read from
-    """
-
-    table: SweepTable
-    base: Scene
+    table: SweepTable  # what the sweep's file says
+    base: Scene  # the scene with the sweep's own changes, before any axis
     design: Design
-    text: str
+    text: str  # the TOML text it was read from
     path: Path
 
     @property

@@ -22,17 +22,12 @@ DRAWN = ("uniform", "normal", "sobol")
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter.
-
-    kind     values, linear, log, uniform, normal or sobol
-    numbers  the values; start and end; low and high; or mean and standard deviation
-    count    how many values; of a random axis, how many draws
-    """
+    """One parameter."""
 
     key: str
-    kind: str
-    numbers: tuple[float, ...]
-    count: int
+    kind: str  # values, linear, log, uniform, normal or sobol
+    numbers: tuple[float, ...]  # the values; start and end; low and high; or mean and standard deviation
+    count: int  # how many values; of a random axis, how many draws
 
     @property
     def is_drawn(self) -> bool:

@@ -137,16 +137,12 @@ def values_before(parts: Sequence[Segment], times: Array) -> Array:
 
 @dataclass(frozen=True)
 class Interval:
-    """From one stop of an engine to the next, s, within one segment.
-
-    sample_intervals   how many intervals between samples it covers; 1 where it is a part of one
-    ends_at_sample     whether a sample is at its end
-    """
+    """From one stop of an engine to the next, s, within one segment."""
 
     start: float
     end: float
-    sample_intervals: int
-    ends_at_sample: bool
+    sample_intervals: int  # how many intervals between samples it covers; 1 where it is a part of one
+    ends_at_sample: bool  # whether a sample is at its end
     segment: Segment
 
 

@@ -39,18 +39,12 @@ _TOKEN = re.compile(
 
 
 class KeyProblem(NamedTuple):
-    """One error of the tables of a file.
+    """One error of the tables of a file."""
 
-    path        where it is, in the tables as they were read
-    wrong       what is wrong
-    allowed     what is allowed; "" for what the key allows
-    is_of_key   whether it is the key that is wrong, whatever the value is
-    """
-
-    path: KeyPath
-    wrong: str
-    allowed: str = ""
-    is_of_key: bool = False
+    path: KeyPath  # where it is, in the tables as they were read
+    wrong: str  # what is wrong
+    allowed: str = ""  # what is allowed; "" for what the key allows
+    is_of_key: bool = False  # whether it is the key that is wrong, whatever the value is
 
     @property
     def message(self) -> str:

@@ -25,16 +25,10 @@ _MAX_TURN_PER_SAMPLE = 1.0
 
 
 class Balance(NamedTuple):
-    """Residual of a balance of momentum.
+    """Residual of a balance of momentum."""
 
-    Attributes
-    ----------
-    error : (n,) kg m²/s or kg m/s, beyond what the samples leave open
-    scale : what it is relative to
-    """
-
-    error: Array
-    scale: float
+    error: Array  # (n,) kg m²/s or kg m/s, beyond what the samples leave open
+    scale: float  # what it is relative to
 
     @property
     def largest(self) -> float:

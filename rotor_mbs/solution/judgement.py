@@ -51,20 +51,12 @@ _CLEAR_SHARE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a run is judged to be.
+    """What a run is judged to be."""
 
-    Attributes
-    ----------
-    status : one of `status.STATUSES`.
-    message : one line; "" for ok.
-    false_success : the engine reported success of a run that is wrong.
-    metrics : see `metrics.metrics_of`.
-    """
-
-    status: str
-    message: str
-    false_success: bool
-    metrics: Metrics
+    status: str  # one of `status.STATUSES`
+    message: str  # one line; "" for ok
+    false_success: bool  # the engine reported success of a run that is wrong
+    metrics: Metrics  # see `metrics.metrics_of`
 
 
 @functools.cache

@@ -12,18 +12,11 @@ from rotor_mbs.solution.trajectory import Array
 
 @dataclass(frozen=True)
 class Linearization:
-    """δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided out.
+    """δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided out."""
 
-    Attributes
-    ----------
-    stiffness : (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
-    damping : (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
-    residual : (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not known
-    """
-
-    stiffness: Array
-    damping: Array
-    residual: Array
+    stiffness: Array  # (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
+    damping: Array  # (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
+    residual: Array  # (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not known
 
 
 def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:

@@ -78,41 +78,24 @@ _FIELDS = ("time", "angles", "rates")
 
 @dataclass(slots=True)
 class Integration:
-    """One integration as the engine reports it: a claim, which `judgement` checks against the samples.
+    """One integration as the engine reports it: a claim, which `judgement` checks against the samples."""
 
-    Attributes
-    ----------
-    success : whether the engine says that it reached the end.
-    message : why it did not; "" where it did.
-    time_reached : s
-    steps, rhs_evaluations : how many; None where they are not counted.
-    out_of_time : it was ended by its time limit; what it reached is kept.
-    """
-
-    success: bool
-    message: str = ""
-    time_reached: float = 0.0
-    steps: int | None = None
+    success: bool  # whether the engine says that it reached the end
+    message: str = ""  # why it did not; "" where it did
+    time_reached: float = 0.0  # s
+    steps: int | None = None  # how many; None where they are not counted
     rhs_evaluations: int | None = None
-    out_of_time: bool = False
+    out_of_time: bool = False  # it was ended by its time limit; what it reached is kept
 
 
 @dataclass
 class RunBlock:
-    """Many runs at once, of scenes with the same number of blades and samples and the same outputs.
+    """Many runs at once, of scenes with the same number of blades and samples and the same outputs."""
 
-    Attributes
-    ----------
-    time : (runs, samples) s
-    quantities : by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
-    integrations : the engine's report of each run
-    samples : how many rows of each are finite
-    """
-
-    time: Array
-    quantities: dict[str, Array]
-    integrations: list[Integration]
-    samples: list[int]
+    time: Array  # (runs, samples) s
+    quantities: dict[str, Array]  # by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
+    integrations: list[Integration]  # the engine's report of each run
+    samples: list[int]  # how many rows of each are finite
 
     def trajectory(self, i: int) -> Trajectory:
         """Run i alone, cut where it broke off."""

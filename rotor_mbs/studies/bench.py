@@ -98,11 +98,12 @@ def replaced_points(output: Path, curves: Sequence[Curve]) -> list[tuple[str, st
     """(group, run) of stored points of these curves that are no longer among them."""
     if not output.exists():
         return []
-    stored = TableFile(output).tables.get(BENCH)
-    if stored is None:
+    file = TableFile(output)
+    if BENCH not in file.groups:
         return []
+    stored = file.table(BENCH)
     labels = {(curve.scene.name, curve.ladder.curve): [row["run"] for row in curve.rows] for curve in curves}
-    owners = zip(stored.runs, stored.known["scene"][1], stored.known["curve"][1], strict=True)
+    owners = zip(stored.runs, stored.known["scene"], stored.known["curve"], strict=True)
     return [(BENCH, run) for run, scene, name in owners if run not in labels.get((scene, name), [run])]
 
 

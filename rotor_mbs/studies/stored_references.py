@@ -53,7 +53,7 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
     by_hash: dict[str, ShippedReference] = {}
     for path in files:
         file = TableFile(path)
-        for row in range(len(file.tables[RUNS].runs)):
+        for row in range(len(file.table(RUNS).runs)):
             known = file.known(RUNS, row)
             frozen_with = json.loads(known["versions"])["frozen_with"]
             by_hash[known["scene_hash"]] = ShippedReference(path, known["scene"], frozen_with)

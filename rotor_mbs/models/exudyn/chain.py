@@ -38,21 +38,14 @@ NODES = ("euler_parameters", "rotation_vector")
 
 @dataclass(frozen=True)
 class Placed:
-    """A body at the start.
-
-    Attributes
-    ----------
-    about_shaft, pitch : rad, of its orientation
-    axis : (3,) in the base frame, that it turns about in its bearing
-    omega : (3,) rad/s in the base frame, angular velocity
-    """
+    """A body at the start."""
 
     name: str
     body: Body
-    about_shaft: float
+    about_shaft: float  # rad, of its orientation
     pitch: float
-    axis: Array
-    omega: Array
+    axis: Array  # (3,) in the base frame, that it turns about in its bearing
+    omega: Array  # (3,) rad/s in the base frame, angular velocity
 
     @property
     def rotation(self) -> Array:

@@ -21,18 +21,11 @@ ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body in its own frame, whose origin is the hub centre.
+    """A rigid body in its own frame, whose origin is the hub centre."""
 
-    Attributes
-    ----------
-    mass : kg
-    com : (3,) m, centre of mass
-    inertia : (3, 3) kg m² about the centre of mass
-    """
-
-    mass: float
-    com: Array
-    inertia: Array
+    mass: float  # kg
+    com: Array  # (3,) m, centre of mass
+    inertia: Array  # (3, 3) kg m² about the centre of mass
 
 
 def rotation_y(cosine: float, sine: float) -> Array:

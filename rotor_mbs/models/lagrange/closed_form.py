@@ -23,18 +23,11 @@ Function = Callable[[Any], Any]
 
 @dataclass(frozen=True, slots=True)
 class LoadValues:
-    """Loads at one time, or over time as arrays.
+    """Loads at one time, or over time as arrays."""
 
-    Attributes
-    ----------
-    rotor : N m on the rotor
-    pitches : (form.blades,) N m between hub and blade; () for none
-    rests : (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
-    """
-
-    rotor: Number
-    pitches: Sequence[Number] = ()
-    rests: Sequence[Number] = ()
+    rotor: Number  # N m on the rotor
+    pitches: Sequence[Number] = ()  # (form.blades,) N m between hub and blade; () for none
+    rests: Sequence[Number] = ()  # (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
 
 
 def load_values(values: Sequence[Any]) -> LoadValues:

@@ -46,32 +46,21 @@ _LOST = 20.0
 
 @dataclass(frozen=True)
 class Turn:
-    """A motion that repeats itself after a turn, and how small departures from it grow over that turn.
+    """A motion that repeats itself after a turn, and how small departures from it grow over that turn."""
 
-    Attributes
-    ----------
-    speed : rad/s, of the rotor, averaged over the turn
-    start : (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
-    torque : N m on the rotor, constant: what the dampers take in a turn is put in by it
-    transition : (2n, 2n) state transition matrix over the turn
-    gradient : (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where dampers
-        take energy
-    flow : (2n,) time derivative of the state at the start
-    trace_integral : ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the
-        determinant of `transition`, computed without it
-    mismatch : largest difference between end and start: rad, and rates as shares of the speed
-    message : why no periodic motion was found; "" where it was
-    """
-
-    speed: float
-    start: Array
-    torque: float
-    transition: Array
+    speed: float  # rad/s, of the rotor, averaged over the turn
+    start: Array  # (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
+    torque: float  # N m on the rotor, constant: what the dampers take in a turn is put in by it
+    transition: Array  # (2n, 2n) state transition matrix over the turn
+    # (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where dampers take
+    # energy
     gradient: Array
-    flow: Array
+    flow: Array  # (2n,) time derivative of the state at the start
+    # ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the determinant of
+    # `transition`, computed without it
     trace_integral: float
-    mismatch: float
-    message: str = ""
+    mismatch: float  # largest difference between end and start: rad, and rates as shares of the speed
+    message: str = ""  # why no periodic motion was found; "" where it was
 
 
 def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:

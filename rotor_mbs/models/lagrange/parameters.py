@@ -29,63 +29,42 @@ PI = Fraction("3.141592653589793238462643383279502884197169399375105820974944592
 
 @dataclass(frozen=True, slots=True)
 class BladeForm:
-    """Coefficients of one blade; s, c are sine and cosine of its pitch θ.
+    """Coefficients of one blade; s, c are sine and cosine of its pitch θ."""
 
-    Attributes
-    ----------
-    cos_phase, sin_phase : of its mounting angle about the shaft
-    schur_ss, schur_cc, schur_sc : kg m², its share of the Schur complement, a quadratic form in (s, c)
-    half_slope_sc, half_slope_cs : kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
-    coupling_s, coupling_c : kg m², b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
-    ratio_s, ratio_c : b / Jzz
-    pitch_inertia : kg m², Jzz
-    weight_x, weight_y, weight_z : N m, m g (x, y, z) of the centre of mass
-    lever_ss, lever_cc, lever_sc : N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
-    stiffness, damping : N m/rad, N m s/rad
-    inertia_ss, inertia_cc, inertia_sc : kg m², a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
-    """
-
-    cos_phase: Number
+    cos_phase: Number  # of its mounting angle about the shaft
     sin_phase: Number
-    schur_ss: Number
+    schur_ss: Number  # kg m², its share of the Schur complement, a quadratic form in (s, c)
     schur_cc: Number
     schur_sc: Number
-    half_slope_sc: Number
+    half_slope_sc: Number  # kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
     half_slope_cs: Number
-    coupling_s: Number
+    coupling_s: Number  # kg m², b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
     coupling_c: Number
-    ratio_s: Number
+    ratio_s: Number  # b / Jzz
     ratio_c: Number
-    pitch_inertia: Number
-    weight_x: Number
+    pitch_inertia: Number  # kg m², Jzz
+    weight_x: Number  # N m, m g (x, y, z) of the centre of mass
     weight_y: Number
     weight_z: Number
-    lever_ss: Number
+    lever_ss: Number  # N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
     lever_cc: Number
     lever_sc: Number
-    stiffness: Number
+    stiffness: Number  # N m/rad, N m s/rad
     damping: Number
-    inertia_ss: Number
+    inertia_ss: Number  # kg m², a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
     inertia_cc: Number
     inertia_sc: Number
 
 
 @dataclass(frozen=True, slots=True)
 class RotorForm:
-    """Coefficients of the whole rotor.
+    """Coefficients of the whole rotor."""
 
-    Attributes
-    ----------
-    blades : the blades whose pitch moves, in order
-    fixed : (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
-    inertia : kg m², hub and the blades that are fixed
-    shaft_damping : N m s/rad
-    """
-
-    blades: tuple[BladeForm, ...]
+    blades: tuple[BladeForm, ...]  # the blades whose pitch moves, in order
+    # (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
     fixed: tuple[tuple[Number, Number, Number], ...]
-    inertia: Number
-    shaft_damping: Number
+    inertia: Number  # kg m², hub and the blades that are fixed
+    shaft_damping: Number  # N m s/rad
 
 
 def rotor_form(

@@ -168,19 +168,13 @@ _QUAD_TOLERANCE = 1e-30  # its error, grown 1e10-fold, is still below what a dou
 
 @dataclass(frozen=True)
 class TimedReference:
-    """The reference of a scene at chosen times.
+    """The reference of a scene at chosen times."""
 
-    Attributes
-    ----------
-    trajectory : as far as it got: time, angles, rates, error_growth
-    growth : (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs
-        may be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
-    units : (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
-    """
-
-    trajectory: Trajectory
+    trajectory: Trajectory  # as far as it got: time, angles, rates, error_growth
+    # (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs may
+    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
     growth: Array
-    units: Array
+    units: Array  # (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
 
 
 def reference_at(scene: Scene, times: Array) -> TimedReference:

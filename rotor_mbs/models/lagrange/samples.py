@@ -18,21 +18,13 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_co
 
 
 class Advance(NamedTuple):
-    """What an integrator made of one segment.
+    """What an integrator made of one segment."""
 
-    Attributes
-    ----------
-    states : (samples reached, variables)
-    end : (variables,) state at the end of the segment
-    evaluations : of the right-hand side; None where they are not counted
-    message : why the end was not reached; "" where it was
-    """
-
-    states: Any
-    end: Any
+    states: Any  # (samples reached, variables)
+    end: Any  # (variables,) state at the end of the segment
     steps: int
-    evaluations: int | None
-    message: str
+    evaluations: int | None  # of the right-hand side; None where they are not counted
+    message: str  # why the end was not reached; "" where it was
 
 
 def over_segments(

@@ -30,25 +30,15 @@ _PORTION = 10_000
 
 @dataclass
 class Poses:
-    """Every body and site at n states, world frame; world body left out.
+    """Every body and site at n states, world frame; world body left out."""
 
-    Attributes
-    ----------
-    centre : (n, bodies, 3) m, centres of mass
-    velocity : (n, bodies, 3) m/s, of the centres of mass
-    spin : (n, bodies, 3) rad/s, along the principal axes
-    site : (n, sites, 3) m
-    acceleration : (n, coordinates) rad/s²
-    frame : (n, bodies, 3, 3) body's frame to world frame
-    wrench : (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
-    """
-
-    centre: Array
-    velocity: Array
-    spin: Array
-    site: Array
-    acceleration: Array
-    frame: Array
+    centre: Array  # (n, bodies, 3) m, centres of mass
+    velocity: Array  # (n, bodies, 3) m/s, of the centres of mass
+    spin: Array  # (n, bodies, 3) rad/s, along the principal axes
+    site: Array  # (n, sites, 3) m
+    acceleration: Array  # (n, coordinates) rad/s²
+    frame: Array  # (n, bodies, 3, 3) body's frame to world frame
+    # (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
     wrench: Array
 
 

@@ -39,16 +39,11 @@ _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco
 
 @dataclass(frozen=True)
 class Load:
-    """A moment `gain` times a table over time, on a coordinate (0 = rotor).
-
-    Attributes
-    ----------
-    gain : 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
-    """
+    """A moment `gain` times a table over time, on a coordinate (0 = rotor)."""
 
     name: str
     coordinate: int
-    gain: float
+    gain: float  # 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
     table: Table
 
 

@@ -25,17 +25,14 @@ _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @dataclass(frozen=True, slots=True)
 class PointMassRotor:
-    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²).
-
-    phases   (blades,) rad
-    tip      (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame
-    """
+    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²)."""
 
     m: float
     c: float
     d: float
     g: float
-    phases: tuple[float, ...]
+    phases: tuple[float, ...]  # (blades,) rad
+    # (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame
     tip: tuple[float, float, float]
 
     @property
