@@ -33,24 +33,15 @@ class Ladder:
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def rungs(self, interval: float) -> dict[float, dict[str, object]]:
-        """All that the method is given at each rung, by the number it is plotted by (step in s, or the tolerance).
-
-        Parameters
-        ----------
-        interval : s, between samples of the scene
-        """
+        """All that the method is given at each rung, by the number it is plotted by (step in s, or the tolerance);
+        interval: s, between samples."""
         numbers = [value * interval if self.kind == STEP else value for value in self.values]
         return {number: {**self.choices, **self.fill(number)} for number in numbers}
 
 
 def step_ladder(count: int, first: int = 0, **facts: Any) -> Ladder:
-    """A ladder of the setting `step`.
-
-    Parameters
-    ----------
-    count, first : the steps are 0.5**first, ..., 0.5**(first + count - 1) of the sample interval
-    facts : further attributes of the `Ladder`
-    """
+    """Of the setting `step`: 0.5**first, ..., 0.5**(first + count - 1) of the sample interval; facts: of the
+    `Ladder`."""
     shares = tuple(0.5**k for k in range(first, first + count))
     return Ladder(STEP, shares, lambda step: {"step": step}, **facts)
 

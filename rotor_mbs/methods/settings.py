@@ -89,14 +89,8 @@ class Settings:
 
     @classmethod
     def of(cls, method: str, given: Mapping[str, object]) -> Self:
-        """The settings of `method` with the `given` values in place of defaults.
-
-        Raises
-        ------
-        InputError
-            In one line that lists all settings, for an unknown name, a wrong type, a number that is not finite, or one
-            out of range.
-        """
+        """The settings of `method` with the `given` values in place of defaults. Raises InputError, one line that lists
+        all settings, for an unknown name or a value that is not allowed."""
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
             if name not in known:

@@ -1,8 +1,6 @@
-"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped.
-
-A grid runs through its axes like the digits of a number, the last axis fastest; all random axes together are one
-digit, the draw. Every row follows from its number alone, so that any part of a sweep can be computed on any computer.
-"""
+"""The rows of a sweep: lists, ranges and random draws, as a grid (the last axis fastest; all random axes together are
+one digit, the draw) or zipped. Every row follows from its number alone, so that any part of a sweep can be computed on
+any computer."""
 
 from __future__ import annotations
 

@@ -15,24 +15,9 @@ from rotor_mbs.solution.quantities import sample_times as sample_times
 
 
 class Trajectory:
-    """Samples at equally spaced times, as far as the run got (n rows; every row finite).
-
-    Angles are unwrapped. A pitch without inertia stays at its initial value. Further quantities are in `quantities` by
-    name; the built-in ones are attributes, too, None where the scene does not ask for them or the model lacks them.
-
-    Attributes
-    ----------
-    time : (n,) s
-    angles, rates : (n, 1 + blades) rad, rad/s: rotor, then the pitch of each blade
-    quantities : the other arrays by name; dimensions and units are declared in `solution.quantities`
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> run = Trajectory(np.zeros(1), np.zeros((1, 4)), np.zeros((1, 4)), work=np.zeros(1))
-    >>> run.work, run.tip
-    (array([0.]), None)
-    """
+    """Samples at equally spaced times, as far as the run got (n rows; every row finite); angles are unwrapped.
+    Quantities beside angles and rates (n, 1 + blades) are in `quantities` by name; the built-in ones are attributes,
+    too, None where the scene does not ask for them or the model lacks them."""
 
     time: Array
     angles: Array

@@ -1,9 +1,5 @@
-"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates.
-
-Every node stands at its body's centre of mass, so masses and inertias go in as the scene has them. A hub without mass
-or inertia is a body with none: its joints fix it, the constrained system is regular, and no inertia has to be invented
-for it.
-"""
+"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates. Nodes stand at
+centres of mass. A hub without mass or inertia is a body with none: its joints fix it."""
 
 from __future__ import annotations
 
@@ -124,7 +120,6 @@ def _gravity(placed: Placed, gravity: float) -> list[Part]:
 
 
 def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
-    """A marker at the hub centre, fixed on the body."""
     return _marker(placed.name, where, rotation, -placed.body.com)
 
 

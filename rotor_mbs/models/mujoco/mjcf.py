@@ -106,7 +106,6 @@ def text(root: ET.Element) -> str:
 
 
 def items(scene: Scene) -> list[BuiltItem]:
-    """What is built for the scene, in order."""
     kinds = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
     built = []
     for element in model(scene, "rk4", 1.0).iter():
@@ -161,10 +160,7 @@ def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: S
 
 
 def _possible(moments: list[float]) -> list[float]:
-    """Three principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others.
-
-    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.scene`).
-    """
+    """Principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others by rounding."""
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)
     return [min(moment, total - moment) for moment in least]
