@@ -350,10 +350,14 @@ def _from_records(scene: str, records: Mapping[str, Record]) -> SceneModes:
     if "lagrange/floquet" in records:
         arrays = records["lagrange/floquet"].arrays
         floquet = FloquetTable(
-            arrays["speed"],
-            np.asarray(arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]),
-            *(arrays[key] for key in ("largest_multiplier", "stable", "product_error", "torque", "mismatch")),
-            tuple(map(str, records["lagrange/floquet"].attributes["messages"])),
+            speeds=arrays["speed"],
+            multipliers=np.asarray(arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]),
+            largest=arrays["largest_multiplier"],
+            stable=arrays["stable"],
+            product_error=arrays["product_error"],
+            torque=arrays["torque"],
+            mismatch=arrays["mismatch"],
+            messages=tuple(map(str, records["lagrange/floquet"].attributes["messages"])),
         )
     if "lagrange/chart" in records:
         arrays = records["lagrange/chart"].arrays
