@@ -345,7 +345,7 @@ def _merged(
         made = new.get(group)
         rows = {run: old.known(group, i) for i, run in enumerate(stored.runs.tolist()) if (group, run) not in dropped}
         asked = {} if made is None else {run: _known_of(made, i) for i, run in enumerate(made.runs)}
-        kept += [(group, run) for run in rows if run not in asked or (rows[run] == asked[run] and not fresh)]
+        kept += [(group, run) for run in rows if run not in asked or (_is_same(rows[run], asked[run]) and not fresh)]
         rows |= asked
         runs = sorted(rows, key=_order) if group == RUNS else list(rows)
         if not runs:
@@ -370,6 +370,13 @@ def _same_scene(stored: StoredTable, made: Table | None) -> bool:
 
 def _scene_of(runs: Table, run: str) -> str:
     return str(runs.known["scene"][1][list(runs.runs).index(run)])
+
+
+def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
+    """Whether a row is as it is asked for; a number that it does not have is NaN in both."""
+    return stored.keys() == asked.keys() and all(
+        value == asked[name] or (value != value and asked[name] != asked[name]) for name, value in stored.items()
+    )
 
 
 def _known_of(made: Table, row: int) -> dict[str, Any]:
