@@ -213,12 +213,12 @@ class TableFile:
     Attributes
     ----------
     path : of the file.
-    tables : by group.
+    tables : by group, all of the file or those that were asked for.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, groups: Collection[str] | None = None) -> None:
         self.path = path
-        self.tables = table.stored_tables(path)
+        self.tables = table.stored_tables(path, groups)
 
     def place(self, run: str, group: str = RUNS) -> Place:
         """Where a row is; of a run, together with its arrays."""

@@ -369,11 +369,21 @@ def _values(dataset: Any) -> NDArray[Any]:
     return files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
 
 
-def stored_tables(path: Path) -> dict[str, StoredTable]:
-    """All tables of a file by their group. Raises StoreError where it is damaged or another program's."""
+def stored_tables(path: Path, groups: Collection[str] | None = None) -> dict[str, StoredTable]:
+    """The tables of a file by their group, all or those of `groups`.
+
+    Raises
+    ------
+    StoreError
+        Where the file, or one of these tables, is damaged or another program's.
+    """
     with files.open_file(path) as file, files.reading(path):
         _refuse_changes(file, "")
-        return {group: stored_table(file, group) for group in _groups_with_runs(file, "", set())}
+        return {
+            group: stored_table(file, group)
+            for group in _groups_with_runs(file, "", set())
+            if groups is None or group in groups
+        }
 
 
 def _groups_with_runs(group: Any, path: str, seen: set[Any]) -> Iterator[str]:

@@ -215,9 +215,7 @@ def outcomes(ends: Iterable[Ended], tasks: Sequence[Task]) -> Iterator[Outcome]:
             status, message = STATUSES[int(end.rows["status"][0])], text_of(end.rows["message"][0])
             seconds = float("nan") if task.asked.is_read else float(end.rows["run_time_s"][0])
             is_read = task.asked.is_read
-            outcome = replace(
-                outcome, status=status, message=message, seconds=seconds, is_stored=True, is_read=is_read
-            )
+            outcome = replace(outcome, status=status, message=message, seconds=seconds, is_stored=True, is_read=is_read)
         elif end.rows is not None:
             outcome = replace(outcome, status="ok", message=f"{len(end.rows['status'])} points", is_stored=True)
         yield outcome
