@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -59,27 +60,36 @@ def test_lines_fit_an_editor(path: Path) -> None:
     assert not long
 
 
-def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """First the API, then the data example on a results file with the scene that it reads."""
-    first, second = re.findall(r"```python\n(.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
+@pytest.fixture
+def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
+    return tmp_path
+
+
+def test_the_readmes_python_runs(empty_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """First the API, then what reads a results file, on a file with the scene and the methods that it names."""
+    first, *reading = re.findall(r"```python\n(.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
     shorter = first.replace("duration=5.0, samples=501", "duration=0.5, samples=51")  # the references of 5 s take 6 s
     assert shorter != first
     exec(shorter, {})
-    rm.compare(rm.scene("paper/fig11"), ["lagrange/taylor"]).save("rotor-mbs-out/results.h5")
-    exec(second, {})
+    results = empty_folder / "rotor-mbs-out" / "results.h5"
+    rm.run("paper/fig11", ["lagrange/taylor", "exudyn_tree/rk67"]).save(results)
+    assert len(reading) == 2
+    for code in reading:
+        names: dict[str, Any] = {}
+        exec(code, names)
+    assert float(names["error"].sel(run="exudyn_tree/rk67").max()) < 1.0
+    assert names["overview"].loc["paper/fig11/lagrange/taylor", "angle_error_max"] < 1e-9
+    assert "exudyn_tree/rk67" in capsys.readouterr().out
 
 
-def test_the_tour_prints_what_it_says(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_tour_prints_what_it_says(empty_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("heyoka")
     tour = (ROOT / "docs" / "tour.md").read_text()
     (scene,) = re.findall(r"```toml\n(title.*?)```", DOCUMENTS[0].read_text(), re.DOTALL)
     (code,) = re.findall(r"```python\n(.*?)```", tour, re.DOTALL)
-    monkeypatch.chdir(tmp_path)
-    Path("my.toml").write_text(scene)
+    (empty_folder / "my.toml").write_text(scene)
     exec(code, {})
     printed = capsys.readouterr().out
     assert printed

@@ -46,9 +46,9 @@ class Where(NamedTuple):
 class Check:
     """A number against its bound, both in `unit`; `hint` says where a failure would come from.
 
-    >>> check = Check("energy", Where("paper/fig08", "exudyn_tree/rk67", "balance"), 1e-12, 1e-9, "", "of scale")
+    >>> check = Check("energy", Where("paper/fig08", "exudyn_tree/rk67", "balance"), 2.5e-10, 1e-9, "", "of scale")
     >>> check.passed, check.margin
-    (True, 1000.0)
+    (True, 4.0)
     """
 
     name: str

@@ -130,12 +130,3 @@ def relabelling_error(angles: Array, other: Array) -> float:
     turn = 2.0 * math.pi / (angles.shape[1] - 1)
     rotor = np.abs(angles[:, 0] - (other[:, 0] + turn)).max()
     return float(max(rotor, np.abs(angles[:, 1:] - np.roll(other[:, 1:], -1, axis=1)).max()))
-
-
-def drift_exponent(time: Array, drift: Array) -> float:
-    """p of drift ~ t^p over the last hundredfold of time: 1/2 for a random walk of round-off, 1 for a steady loss."""
-    used = time >= 0.01 * time[-1]
-    # Equally spaced in log t: else the last decade alone would decide.
-    at = np.geomspace(time[used][0], time[-1], 40)
-    values = np.interp(at, time[used], drift[used])
-    return float(np.polyfit(np.log(at), np.log(values), 1)[0])

@@ -114,14 +114,6 @@ def _reaches_floor(steps: Array, errors: Array) -> bool:
     return int(np.argmin(errors)) < len(errors) - 1 or bool(slopes[-1] < 0.75 * np.median(slopes))
 
 
-def cost_exponent(sizes: Array, seconds: Array) -> float | None:
-    """p of seconds ∝ size^p over the larger half of the sizes, where what is constant has faded; None below two."""
-    start = min(len(sizes) // 2, max(len(sizes) - 3, 0))
-    if len(sizes) < 2:
-        return None
-    return float(np.polyfit(np.log(sizes[start:]), np.log(seconds[start:]), 1)[0])
-
-
 def own_points(scene: StoredScene) -> list[Record]:
     """The scene's runs of corrected models that reached the end, each as a curve of one point."""
     found = []

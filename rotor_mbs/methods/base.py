@@ -61,7 +61,6 @@ class Method:
     fixed_step : whether the step is the setting `step`.
     stability_function : R(z) of one step for y' = λy, z = hλ; None for adaptive and implicit methods.
     ladders : settings it is benched with.
-    cost_scaling : settings of the cost scaling study; None: not part of it.
     relative_cost : run time as a multiple of the fastest method's, roughly: expensive methods are started first.
     bounds : accuracy bounds of a method from outside; those of built-in ones are in reference/accuracy.toml.
     solve_many : (scenes, settings) -> RunBlock: a vectorized path for sweeps that ask for angles, rates, tips and
@@ -89,7 +88,6 @@ class Method:
     fixed_step: bool = False
     stability_function: Callable[[complex], complex] | None = None
     ladders: tuple[Ladder, ...] = ()
-    cost_scaling: Mapping[str, object] | None = None
     relative_cost: float = 1.0
     bounds: tuple[Bound, ...] = ()
     solve_many: Callable[[Sequence[Scene], Any], RunBlock] | None = None
@@ -99,7 +97,6 @@ class Method:
     load: Callable[[], object] = lambda: None
 
     def __post_init__(self) -> None:
-        """Gives the ladders the name, the label and the order of their method."""
         ladders = []
         for ladder in self.ladders:
             if not ladder.method:
@@ -125,13 +122,8 @@ class Method:
         return self.settings().as_dict()
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
-        """The settings of the next finer rung of its ladder; {} where it is as fine as the ladder goes.
-
-        Parameters
-        ----------
-        settings : of the run that is to be refined
-        interval : s, between samples
-        """
+        """The settings of the next finer rung of its ladder; {} where it is as fine as that goes; interval: s, of
+        samples."""
         for ladder in self.ladders:
             if ladder.variant:
                 continue

@@ -152,15 +152,6 @@ def member(group: Any, name: str) -> Any:
     return group[name]
 
 
-def mapped(dataset: Any) -> NDArray[Any]:
-    """A contiguous array as it lies in the file, read where it is indexed: for reading across its first dimension."""
-    offset = dataset.id.get_offset()
-    if offset is None:
-        raise StoreError(f"{dataset.file.filename}: {dataset.name} is not contiguous")
-    values: NDArray[Any] = np.memmap(dataset.file.filename, dataset.dtype, "r", offset, dataset.shape)
-    return values
-
-
 def is_text(dataset: Any) -> bool:
     """Whether a dataset has texts of any length."""
     return h5py.check_string_dtype(dataset.dtype) is not None and dataset.dtype.kind == "O"
@@ -179,7 +170,7 @@ def values_of(dataset: Any) -> NDArray[Any]:
         raise StoreError(f"{place} is no array")
     _refuse_outside(dataset)
     kept = dataset.id.get_storage_size()
-    if kept > Path(dataset.file.filename).stat().st_size or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
+    if kept > dataset.file.id.get_filesize() or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
         raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
     values: NDArray[Any] = dataset[()]
     return values

@@ -7,7 +7,6 @@ import hashlib
 import importlib.metadata
 import platform
 import re
-from collections.abc import Iterable
 from pathlib import Path
 
 import rotor_mbs
@@ -79,12 +78,3 @@ def code_digest(sources: tuple[Path, ...]) -> str:
         text = _WITHOUT_EFFECT.sub(lambda match: match[1] or "", path.read_text(encoding="utf-8", errors="replace"))
         digest.update("\n".join(line.rstrip() for line in text.splitlines() if line.strip()).encode())
     return digest.hexdigest()[:12]
-
-
-@functools.cache
-def files_digest(files: Iterable[Path]) -> str:
-    """SHA-256 over the bytes of files."""
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()

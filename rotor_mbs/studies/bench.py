@@ -33,7 +33,7 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.bench_timing import Timings, conduct, statistics
 from rotor_mbs.studies.bench_worker import ERRORS, Point, PointScenes, ask, prepared_scene, start_timer, thinned
-from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, is_stored, run_scenes
+from rotor_mbs.studies.run import OnProgress, Outcome, able_methods, ignore_progress, run_scenes
 
 BENCH = "bench"
 
@@ -98,17 +98,18 @@ def replaced_points(output: Path, curves: Sequence[Curve]) -> list[tuple[str, st
     """(group, run) of stored points of these curves that are no longer among them."""
     if not output.exists():
         return []
-    stored = TableFile(output).tables.get(BENCH)
-    if stored is None:
+    file = TableFile(output)
+    if BENCH not in file.groups:
         return []
+    stored = file.table(BENCH)
     labels = {(curve.scene.name, curve.ladder.curve): [row["run"] for row in curve.rows] for curve in curves}
-    owners = zip(stored.runs, stored.known["scene"][1], stored.known["curve"][1], strict=True)
+    owners = zip(stored.runs, stored.known["scene"], stored.known["curve"], strict=True)
     return [(BENCH, run) for run, scene, name in owners if run not in labels.get((scene, name), [run])]
 
 
 def is_measured(file: TableFile, curve: Curve) -> bool:
     """Whether every point of the curve is stored."""
-    return all(is_stored(file.place(str(row["run"]), BENCH)) for row in curve.rows)
+    return all(file.place(str(row["run"]), BENCH).is_stored for row in curve.rows)
 
 
 def run_bench(

@@ -27,13 +27,13 @@ from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import OF_THE_MACHINE, TaskPool, Workers, one_line, pool_of
 from rotor_mbs.runs.results import Asked, TableFile, fit, results_tables, row_of_run
 from rotor_mbs.runs.runner import Ended, Task, compute
-from rotor_mbs.runs.table import MISSING, Place, Rows, Table, text_of
+from rotor_mbs.runs.table import Rows, Table, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.toml_file import of_file
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.status import STATUSES, code_of
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies.stored_references import digest, frozen_solution, reference_at, shipped_reference
 
@@ -161,11 +161,9 @@ def run_scenes(
         asked += [Asked(scene, name, own_settings(scene, name, settings or {})) for name in methods[scene.name]]
     with writing(output):
         file = fit(output, [*results_tables(asked), *beside_tables], dropped)
-        missing = missing_runs(file, asked, timeout_s)
+        missing, kept = file.missing(asked, timeout_s)
         others = list(beside(file, {run.run for run in missing})) if beside is not None else []
         tasks = [_task(file, run, timeout_s) for run in missing]
-        for task in tasks:
-            task.place.mark_missing([0])
         made: list[Outcome] = []
         if tasks or others:
             with pool_of(workers) as pool:
@@ -175,9 +173,12 @@ def run_scenes(
                     on_progress(done, len(tasks) + len(others), outcome)
         labels = {task.label for task in tasks}
         made = [outcome for outcome in made if outcome.label in labels]
-        new = {run.run for run in missing}
-        kept = [run for run in asked if run.run not in new]
-        return RunReport(made, len(kept), _stored_failures(file, kept))
+        failures = [
+            f"{run.scene.name} {run.method} {status}: {message}"
+            for run, status, message in kept
+            if status != "ok" and is_corrected(run.method)
+        ]
+        return RunReport(made, len(kept), failures)
 
 
 def compute_in_order(
@@ -186,7 +187,7 @@ def compute_in_order(
     """References first; then, if their references are there, the other runs, the slowest first."""
     yield from compute(pool, perform, [task for task in tasks if task.reference is None])
     waiting = [task for task in (*tasks, *others) if task.reference is not None]
-    ready = [task for task in waiting if task.reference is not None and is_stored(task.reference)]
+    ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
     # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
     # fastest, which are those that are compiled, so that two processes seldom compile the same code at once.
     ready.sort(key=lambda task: -task.work)
@@ -196,12 +197,6 @@ def compute_in_order(
     for task in waiting:
         if task not in ready:
             yield Ended(task, None, "no_reference", "its reference was not computed")
-
-
-def is_stored(place: Place) -> bool:
-    """Whether the row is there as it was written."""
-    marked = np.fromfile(place.path, np.int8, 1, offset=place.offsets["status"])
-    return bool(place.stored(marked)[0] != MISSING)
 
 
 def outcomes(ends: Iterable[Ended], tasks: Sequence[Task]) -> Iterator[Outcome]:
@@ -221,21 +216,6 @@ def outcomes(ends: Iterable[Ended], tasks: Sequence[Task]) -> Iterator[Outcome]:
         yield outcome
 
 
-def missing_runs(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list[Asked]:
-    """Those that the file lacks, that a shorter time limit ended, or whose reference is one of these."""
-    lacking: dict[str, Asked] = {}
-    for run in asked:  # the reference of a scene comes first
-        place = file.place(run.run)
-        reference = f"{run.scene.name}/{REFERENCE}"
-        is_missing = not is_stored(place) or reference in lacking
-        if not is_missing and not run.is_read:
-            row = place.read()
-            is_missing = int(row["status"][0]) == code_of("timed_out") and not row["time_limit_s"][0] >= timeout_s
-        if is_missing:
-            lacking[run.run] = run
-    return list(lacking.values())
-
-
 def _task(file: TableFile, run: Asked, timeout_s: float) -> RunTask:
     return RunTask(
         label=f"{run.scene.name} {run.method}",
@@ -248,17 +228,6 @@ def _task(file: TableFile, run: Asked, timeout_s: float) -> RunTask:
         asked=run,
         time_limit_s=timeout_s,
     )
-
-
-def _stored_failures(file: TableFile, kept: Sequence[Asked]) -> list[str]:
-    """Runs that this call found in the file, and that are no success."""
-    lines = []
-    for run in kept:
-        row = file.place(run.run).read()
-        status = STATUSES[int(row["status"][0])]
-        if status != "ok" and is_corrected(run.method):
-            lines.append(f"{run.scene.name} {run.method} {status}: {text_of(row['message'][0])}")
-    return lines
 
 
 def solve_judged(

@@ -39,7 +39,6 @@ from rotor_mbs.studies.run import (
     Outcome,
     able_methods,
     ignore_progress,
-    is_stored,
     outcomes,
     run_scenes,
     work_of,
@@ -134,7 +133,7 @@ def complete_studies(
         tasks = []
         for table, scene, method in wanted:
             own = [file.place(str(point["run"]), table) for point in points[table, scene.name, method]]
-            if not all(map(is_stored, own)):
+            if not all(place.is_stored for place in own):
                 reference = None if table == SYMMETRY else file.place(f"{scene.name}/{REFERENCE}")
                 tasks.append(
                     StudyTask(
@@ -186,9 +185,11 @@ def _stale(
     if not output.exists():
         return []
     stale = []
-    for table, stored in TableFile(output).tables.items():
-        if table in (STEPS, LIMIT, SYMMETRY):
-            owners = zip(stored.runs, stored.known["scene"][1], stored.known["method_name"][1], strict=True)
+    file = TableFile(output)
+    for table in (STEPS, LIMIT, SYMMETRY):
+        if table in file.groups:
+            stored = file.table(table)
+            owners = zip(stored.runs, stored.known["scene"], stored.known["method_name"], strict=True)
             stale += [
                 (table, run)
                 for run, scene, method in owners

@@ -15,7 +15,7 @@ from support.stored import Arrays, Made, rotor, store
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import STATISTICS, claims, finding, measure, rounds_to
 from rotor_mbs.analysis.exact import escape_rate
-from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, errata, published
+from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import natural_order
 
@@ -220,18 +220,6 @@ def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
     assert agreement.angle_error == pytest.approx(1e-9)
     assert (agreement.runs.count, agreement.runs.of) == (1, 2)
     assert facts.numbers is None
-
-
-def test_every_published_test_is_one_that_can_be_carried_out() -> None:
-    items = published()
-    asked = [item.of for item in items if item.of] + [
-        side for item in items for test in item.tests for side in (test.of, test.than) if side
-    ]
-    assert {one.statistic for one in asked} <= set(STATISTICS)
-    assert {one.quantity for one in asked} <= {"angle", "rate"}
-    assert {test.relation for item in items for test in item.tests} <= {"<", ">", "opposite"}
-    assert sum(item.is_number for item in items) == 4  # 2.7315, 0.5127, 0.5273, 0.0458
-    assert [one.id for one in errata()] == ["E1", "E2", "E3"]
 
 
 def test_escape_rate_of_a_pendulum_upside_down() -> None:

@@ -91,7 +91,7 @@ def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
     assert len({method.name for method in methods()}) == len(methods())
     for method in methods():
         assert (method.order is not None) == method.fixed_step == ("step" in method.defaults)
-        assert method.is_corrected == bool(method.ladders) == (method.cost_scaling is not None)
+        assert method.is_corrected == bool(method.ladders)
         assert not (method.erratum and (method.is_corrected or method.is_default))
         assert not method.fallback or find_method(method.fallback).is_corrected
         if method.stability_function and method.order:

@@ -1,7 +1,4 @@
-"""The six methods of this package: two models, each with its integrators.
-
-Listing what a method builds needs no engine; the engine is loaded when a system is built.
-"""
+"""The six methods of Exudyn: two models, each with its integrators. The engine is loaded when a system is built."""
 
 from __future__ import annotations
 
@@ -53,18 +50,8 @@ class ChainNewmarkSettings(schemes.NewtonSettings):
 
 
 class MultibodySolver:
-    """See `rotor_mbs.methods.base.Solver`.
-
-    Parameters
-    ----------
-    reading : from the recorded rows to the trajectory
-    rows_between : whether the reading needs rows between samples too
-
-    Raises
-    ------
-    MethodRefusal
-        With the engine's reason, where the engine does not take the parts.
-    """
+    """See `methods.base.Solver`; `reading` makes the trajectory from recorded rows, for which it may need
+    `rows_between` samples. Raises MethodRefusal, with the engine's reason, where the engine does not take the parts."""
 
     def __init__(
         self,
@@ -130,7 +117,6 @@ def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettin
 
 
 def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
-    """Raises InputError for too short a step, MethodRefusal for a scene the engine cannot sample."""
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
         raise MethodRefusal(f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart")
     scheme = settings.scheme()
@@ -140,13 +126,11 @@ def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
 
 
 def _chain_arrays(settings: ChainAlphaSettings | ChainNewmarkSettings) -> tuple[str, ...]:
-    """The error that joints make, and where the run is extrapolated a bound on its own error."""
     own = ("angle_uncertainty",) if settings.extrapolation == "richardson" else ()
     return ("constraint_error", *own)
 
 
 def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
-    """What all six have in common."""
     in_tree = model == "exudyn_tree"
 
     def items(scene: Scene) -> list[BuiltItem]:
@@ -200,7 +184,7 @@ METHODS = (
         "exudyn_tree", "rk44", "RK44",
         settings=schemes.Rk44Settings, order=4, fixed_step=True,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
-        ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
+        ladders=(step_ladder(10),),
     ),
     _method(
         "exudyn_tree", "rk67", "RK67",
@@ -208,7 +192,7 @@ METHODS = (
         # To order 6 the exponential's; of the seventh stage b7 a76 a65 a54 a43 a32 a21 = -1/2160
         # (J. C. Butcher, J. Austral. Math. Soc. 4 (1964), 179-194).
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, -1 / 2160),
-        ladders=(step_ladder(8),), cost_scaling={"step": 1e-2}, linearize=late(f"{_LINEARIZATION}:linearize_tree"),
+        ladders=(step_ladder(8),), linearize=late(f"{_LINEARIZATION}:linearize_tree"),
     ),
     _method(
         "exudyn_tree", "dopri5", "DOPRI5",
@@ -219,22 +203,22 @@ METHODS = (
                 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14,
             ),
         ),
-        cost_scaling={"relative_tolerance": 0.0, "absolute_tolerance": 1e-7},
+
     ),
     _method(
         "exudyn_tree", "generalized_alpha", "generalized-α",
         settings=schemes.AlphaSettings, order=2, fixed_step=True,
-        ladders=_TREE_ALPHA_LADDERS, cost_scaling={"step": 1e-2},
+        ladders=_TREE_ALPHA_LADDERS,
     ),
     _method(
         "exudyn_chain", "generalized_alpha", "generalized-α",
         settings=ChainAlphaSettings, order=2, fixed_step=True, is_default=True,
-        ladders=_CHAIN_ALPHA_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
+        ladders=_CHAIN_ALPHA_LADDERS,
         linearize=late(f"{_LINEARIZATION}:linearize_chain"),
     ),
     _method(
         "exudyn_chain", "newmark_index2", "Newmark index 2",
         settings=ChainNewmarkSettings, order=2, fixed_step=True,
-        ladders=_NEWMARK_LADDERS, cost_scaling={"step": 1e-2, "node": "rotation_vector"},
+        ladders=_NEWMARK_LADDERS,
     ),
 )  # fmt: skip

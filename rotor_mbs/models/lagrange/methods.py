@@ -79,8 +79,8 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
     return linearize(scene, angles, [speed, *(0.0 for _ in scene.blades)], torque)
 
 
-def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, medium: float, relative_cost: float) -> Method:
-    """SciPy's solver of that name; medium: relative tolerance of the cost scaling study."""
+def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float) -> Method:
+    """SciPy's method of that name."""
 
     def build(scene: Scene, chosen: Any) -> Solver:
         from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
@@ -95,7 +95,6 @@ def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, medium:
         items=equation_items,
         distributions=("scipy",),
         ladders=(ladder,),
-        cost_scaling={"relative_tolerance": medium, "absolute_tolerance": 0.01 * medium},
         load=lambda: import_module("scipy.integrate"),
         relative_cost=relative_cost,
     )
@@ -119,7 +118,7 @@ METHODS = (
                 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11, 1e-13, 2.0**-52,
             ),
         ),
-        cost_scaling={"tolerance": 1e-9},
+
     ),
     Method(
         name="lagrange/ode45",
@@ -128,17 +127,17 @@ METHODS = (
         build=_build_ode45,
         items=equation_items,
         ladders=(tolerance_ladder(tolerance_pair, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 3e-14),),
-        cost_scaling={"relative_tolerance": 1e-6, "absolute_tolerance": 1e-8},
+
         relative_cost=10.0,
         linearize=_linearize,
     ),
     _scipy_method(
         "DOP853", Dop853Settings,
-        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14), 1e-9, 20.0,
+        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 3e-14), 20.0,
     ),
     _scipy_method(
         "Radau", RadauSettings,
-        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13), 1e-5, 80.0,
+        tolerance_ladder(tolerance_pair, 1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13), 80.0,
     ),
     Method(
         name="reference",

@@ -72,13 +72,13 @@ METHODS = (
     _method(
         "rk4", "RK4", settings=Rk4Settings, order=4,
         stability_function=stability_polynomial(1, 1, 1 / 2, 1 / 6, 1 / 24),
-        ladders=(step_ladder(10),), cost_scaling={"step": 5e-3},
+        ladders=(step_ladder(10),),
         linearize=late("rotor_mbs.models.mujoco.solver:linearize"),
     ),
     # First the new rates, with forces at the start of the step and dampers at its end; then angles with these rates.
     # The ladder of this first-order method begins where something is left of a motion.
     _method(
         "implicitfast", "implicit fast", settings=ImplicitFastSettings, order=1,
-        ladders=(step_ladder(10, first=5),), cost_scaling={"step": 1e-3},
+        ladders=(step_ladder(10, first=5),),
     ),
 )  # fmt: skip
