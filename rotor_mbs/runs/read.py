@@ -178,13 +178,8 @@ def open_results(path: Path, *, verify: bool = True, only: Collection[str] | Non
         attributes = files.attributes_of(h5)
     for _ in range(_ATTEMPTS):
         with path.open("rb") as file:
-<<<<<<< HEAD
-            stored = TableFile(path)
-            if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
-=======
             stored = TableFile(path)
             if stored.groups and stored.table(stored.groups[0]).inode != os.fstat(file.fileno()).st_ino:
->>>>>>> 6d6fda8d6929f10345424efb96acdfa73d104d2e
                 continue
             with files.reading(path):
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
@@ -207,13 +202,8 @@ def is_sweep(path: Path) -> bool:
         return "run" in file
 
 
-<<<<<<< HEAD
 def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None) -> Iterator[StoredScene]:
-    if RUNS not in stored.tables:
-=======
-def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[StoredScene]:
     if RUNS not in stored.groups:
->>>>>>> 6d6fda8d6929f10345424efb96acdfa73d104d2e
         return
     runs = stored.table(RUNS)
     file.seek(runs.filled["status"].offset)
@@ -224,15 +214,10 @@ def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[Stored
             continue
         known = stored.known(RUNS, i)
         scene = str(known["scene"])
-<<<<<<< HEAD
         if only is not None and scene not in only:
             continue
-        arrays = stored.tables[scene]
-        scales = {name: values for name, (_, values) in arrays.scales.items()}
-=======
         arrays = stored.table(scene)
         scales = arrays.known
->>>>>>> 6d6fda8d6929f10345424efb96acdfa73d104d2e
         labels = tuple(map(str, arrays.labels.get("coordinate", ())))
         by_scene[scene].append(
             StoredRun(scene, str(known["method_name"]), known, scales, labels, stored.place(run), file, verify)
