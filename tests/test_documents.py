@@ -71,7 +71,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @pytest.fixture(scope="module")
-def results(folder: Path) -> None:
+def paper_results(folder: Path) -> None:
     rm.run("paper/fig11", ["lagrange/taylor", "exudyn_tree/rk67"]).save(folder / "rotor-mbs-out" / "results.h5")
 
 
@@ -91,21 +91,8 @@ def dataset(folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def bench(folder: Path) -> None:
-    main(
-        [
-            "bench",
-            "check/general",
-            "-m",
-            "lagrange/dop853",
-            "-o",
-            str(folder / "bench.h5"),
-            "--budget",
-            "1",
-            "--repeats",
-            "1",
-        ]
-    )
+def bench() -> None:
+    main("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1".split())
 
 
 def test_the_readmes_own_scene_is_one() -> None:
@@ -115,7 +102,7 @@ def test_the_readmes_own_scene_is_one() -> None:
     assert scene.has_damping
 
 
-@pytest.mark.usefixtures("results")
+@pytest.mark.usefixtures("paper_results")
 def test_the_readmes_python_runs(capsys: pytest.CaptureFixture[str]) -> None:
     """First the API, then what reads a results file."""
     first, *reading = python_of("README.md")
