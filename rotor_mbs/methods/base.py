@@ -97,7 +97,6 @@ class Method:
     load: Callable[[], object] = lambda: None
 
     def __post_init__(self) -> None:
-        """Gives the ladders the name, the label and the order of their method."""
         ladders = []
         for ladder in self.ladders:
             if not ladder.method:
@@ -123,13 +122,8 @@ class Method:
         return self.settings().as_dict()
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
-        """The settings of the next finer rung of its ladder; {} where it is as fine as the ladder goes.
-
-        Parameters
-        ----------
-        settings : of the run that is to be refined
-        interval : s, between samples
-        """
+        """The settings of the next finer rung of its ladder; {} where it is as fine as that goes; interval: s, of
+        samples."""
         for ladder in self.ladders:
             if ladder.variant:
                 continue

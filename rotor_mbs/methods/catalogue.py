@@ -72,10 +72,8 @@ def _unknown(name: str) -> str:
 
 
 def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """By method, those of the `given` settings that it has.
-
-    Raises InputError for a setting that none of them has, and for a value that one of them does not allow.
-    """
+    """By method, those of the `given` settings that it has. Raises InputError for a setting that none of them has, and
+    for a value that one of them does not allow."""
     if len(names) == 1:
         find_method(names[0]).settings.of(names[0], given)
     own = {name: find_method(name).settings.allowed() for name in names}
@@ -142,7 +140,6 @@ def _load(place: str) -> tuple[Method, ...]:
 
 
 def _as_methods(loaded: object) -> tuple[Method, ...]:
-    """A Method or several of them as a tuple. Raises TypeError for anything else."""
     several = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
     if not several or not all(isinstance(method, Method) for method in several):
         raise TypeError(f"{loaded!r:.60} is no Method and no sequence of them")

@@ -11,26 +11,15 @@ STEP, TOLERANCE = "step", "tolerance"
 
 @dataclass(frozen=True)
 class Ladder:
-    """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance.
+    """A curve of the diagram: one method with its fixed choices, over a falling step or tolerance."""
 
-    Attributes
-    ----------
-    kind : STEP or TOLERANCE.
-    values : steps as shares of the sample interval, or tolerances; coarse to fine.
-    fill : the settings that go with one value.
-    choices : settings that stay the same along the ladder.
-    variant : what follows the method's name in the curve's name; "" where the choices are the default ones.
-    label : of the variant; the method's where it is left out.
-    method, order : name and expected order (None: adaptive step) of the method; filled in by the `Method`.
-    """
-
-    kind: str
-    values: tuple[float, ...]
-    fill: Callable[[float], Mapping[str, float]]
-    choices: Mapping[str, object] = field(default_factory=dict)
-    variant: str = ""
-    label: str = ""
-    method: str = ""
+    kind: str  # STEP or TOLERANCE
+    values: tuple[float, ...]  # steps as shares of the sample interval, or tolerances; coarse to fine
+    fill: Callable[[float], Mapping[str, float]]  # the settings that go with one value
+    choices: Mapping[str, object] = field(default_factory=dict)  # settings that stay the same along the ladder
+    variant: str = ""  # what follows the method's name in the curve's name; "" where the choices are the default ones
+    label: str = ""  # of the variant; the method's where it is left out
+    method: str = ""  # name and expected order (None: adaptive step) of the method; filled in by the `Method`
     order: float | None = None
 
     @property
@@ -44,24 +33,15 @@ class Ladder:
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def rungs(self, interval: float) -> dict[float, dict[str, object]]:
-        """All that the method is given at each rung, by the number it is plotted by (step in s, or the tolerance).
-
-        Parameters
-        ----------
-        interval : s, between samples of the scene
-        """
+        """All that the method is given at each rung, by the number it is plotted by (step in s, or the tolerance);
+        interval: s, between samples."""
         numbers = [value * interval if self.kind == STEP else value for value in self.values]
         return {number: {**self.choices, **self.fill(number)} for number in numbers}
 
 
 def step_ladder(count: int, first: int = 0, **facts: Any) -> Ladder:
-    """A ladder of the setting `step`.
-
-    Parameters
-    ----------
-    count, first : the steps are 0.5**first, ..., 0.5**(first + count - 1) of the sample interval
-    facts : further attributes of the `Ladder`
-    """
+    """Of the setting `step`: 0.5**first, ..., 0.5**(first + count - 1) of the sample interval; facts: of the
+    `Ladder`."""
     shares = tuple(0.5**k for k in range(first, first + count))
     return Ladder(STEP, shares, lambda step: {"step": step}, **facts)
 

@@ -13,25 +13,15 @@ from rotor_mbs.errors import InputError, nearest
 
 @dataclass(frozen=True)
 class Allowed:
-    """What a setting may be: one of `options`, or a finite number within the limits.
+    """What a setting may be: one of `options`, or a finite number within the limits."""
 
-    Attributes
-    ----------
-    unit : SI unit of a number, "" where it has none.
-    above : exclusive lower limit.
-    at_least, at_most : inclusive limits.
-    whole : whole numbers only.
-    options : the allowed values of a choice; () for a number.
-    doc : one line on what the setting does.
-    """
-
-    unit: str = ""
-    above: float = -math.inf
-    at_least: float = -math.inf
+    unit: str = ""  # SI unit of a number, "" where it has none
+    above: float = -math.inf  # exclusive lower limit
+    at_least: float = -math.inf  # inclusive limits
     at_most: float = math.inf
-    whole: bool = False
-    options: tuple[object, ...] = ()
-    doc: str = ""
+    whole: bool = False  # whole numbers only
+    options: tuple[object, ...] = ()  # the allowed values of a choice; () for a number
+    doc: str = ""  # one line on what the setting does
 
     def convert(self, value: object) -> object:
         """The value as it is stored. Raises ValueError where it is not allowed."""
@@ -99,14 +89,8 @@ class Settings:
 
     @classmethod
     def of(cls, method: str, given: Mapping[str, object]) -> Self:
-        """The settings of `method` with the `given` values in place of defaults.
-
-        Raises
-        ------
-        InputError
-            In one line that lists all settings, for an unknown name, a wrong type, a number that is not finite, or one
-            out of range.
-        """
+        """The settings of `method` with the `given` values in place of defaults. Raises InputError, one line that lists
+        all settings, for an unknown name or a value that is not allowed."""
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
             if name not in known:

@@ -9,8 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.analysis.campbell import LinearModes, SceneModes, mode_rows
-from rotor_mbs.analysis.mode_records import linear_dataset, to_records
+from rotor_mbs.analysis.campbell import LinearModes, SceneModes, linear_dataset, mode_rows, to_records
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels

@@ -170,7 +170,7 @@ def values_of(dataset: Any) -> NDArray[Any]:
         raise StoreError(f"{place} is no array")
     _refuse_outside(dataset)
     kept = dataset.id.get_storage_size()
-    if kept > Path(dataset.file.filename).stat().st_size or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
+    if kept > dataset.file.id.get_filesize() or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
         raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
     values: NDArray[Any] = dataset[()]
     return values

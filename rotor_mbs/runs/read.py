@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs import digests, files
+from rotor_mbs.runs import files
 from rotor_mbs.runs.results import OF_METHODS, RUNS, TableFile
 from rotor_mbs.runs.table import MISSING, Place, Rows, checksums, text_of
 from rotor_mbs.scenario.catalogue import natural_order
@@ -60,7 +60,8 @@ class StoredRun:
     @functools.cached_property
     def is_damaged(self) -> bool:
         """Whether its row is not what was written."""
-        row = self._place.read(file=self._file)
+        with files.reading(f"{self._place.path}: {self.scene}/{self.method}"):
+            row = self._place.read(file=self._file)
         return bool((checksums(self._place.first, row, self._place.row) != row["crc32"]).any())
 
     @functools.cached_property
@@ -195,13 +196,6 @@ def is_sweep(path: Path) -> bool:
     """Whether a file of this program is the dataset of a sweep. Raises StoreError where it cannot be read."""
     with files.open_file(path) as file, files.reading(path):
         return "run" in file
-
-
-def damages(path: Path) -> dict[str, list[str]]:
-    """Parts of a results file's groups that are not what was laid out, by group; the root is "file"."""
-    with files.open_file(path) as file, files.reading(path):
-        places = {(str(group.name).strip("/") or "file"): digests.damages_of(group) for group in files.groups_in(file)}
-    return {place: parts for place, parts in places.items() if parts}
 
 
 def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[StoredScene]:

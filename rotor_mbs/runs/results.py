@@ -298,6 +298,8 @@ def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]
     StoreError
         Where the file cannot be read or written, or is a sweep's.
     """
+    if path.is_symlink():  # a link stays one
+        path = path.resolve()
     if not path.exists():
         _write_tables(path, wanted, [])
         return TableFile(path)

@@ -329,9 +329,7 @@ class StoredTable:
 def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
-    changed = [part for part in digests.damages_of(item, with_columns=False) if part != files.DIGESTS]
-    if changed:
-        raise StoreError(f"{path}: {group or 'file'}: {', '.join(changed)} changed after the file was laid out")
+    _refuse_changes(item, group)
     filled_names = digests.unfilled_in(digests.stored_digests(item.attrs))
     attributes = files.attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
@@ -342,6 +340,8 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
         if files.is_group(dataset):
             continue
         if name in filled_names:
+            if dataset.shape is None or dataset.dtype.kind not in "fiuS":
+                raise StoreError(f"{path}: {dataset.name} is no array of numbers or characters")
             offset = dataset.id.get_offset()
             if offset is None and dataset.size:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
@@ -352,6 +352,13 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
                 labels[name] = files.plain(dataset.attrs["labels"])
     runs = known.pop("run")
     return StoredTable(path, path.stat().st_ino, group, runs, known, labels, filled, attributes)
+
+
+def _refuse_changes(item: Any, group: str) -> None:
+    changed = digests.damages_of(item, with_columns=False)
+    if changed:
+        place = f"{item.file.filename}: {group or 'file'}"
+        raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")
 
 
 def as_table(file: Any, group: str) -> Table:
@@ -383,13 +390,17 @@ def columns_of(group: Any) -> dict[str, Column]:
 def table_groups(path: Path) -> list[str]:
     """The groups of a file that are tables. Raises StoreError where it is another program's."""
     with files.open_file(path) as file, files.reading(path):
-        return list(_groups_with_runs(file, ""))
+        _refuse_changes(file, "")
+        return list(_groups_with_runs(file, "", set()))
 
 
-def _groups_with_runs(group: Any, path: str) -> Iterator[str]:
+def _groups_with_runs(group: Any, path: str, seen: set[Any]) -> Iterator[str]:
+    if group in seen:
+        raise StoreError(f"{group.file.filename}: {path} is another name of a group; allowed: one name of each")
+    seen.add(group)
     if "run" in group:
         yield path
         return
     for name, item in files.members(group):
         if files.is_group(item):
-            yield from _groups_with_runs(item, f"{path}/{name}" if path else name)
+            yield from _groups_with_runs(item, f"{path}/{name}" if path else name, seen)

@@ -1,7 +1,4 @@
-"""Numbers of a scene that are allowed and yet look like a slip: degrees for radians, millimetres for metres, tonnes.
-
-Limits are far outside what rotors of turbines, models of them and toys have.
-"""
+"""Numbers of a scene that are allowed and yet look like a slip: degrees for radians, millimetres for metres, tonnes."""
 
 from __future__ import annotations
 

@@ -15,11 +15,8 @@ __all__ = ["load_scene", "new_scene_text", "parse_scene", "scene_toml"]
 
 
 def load_scene(path: Path | str, name: str | None = None) -> Scene:
-    """The scene in the TOML file `path`, under `name`, by default the file's name without its ending.
-
-    Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`;
-    entries are counted from 0, as by `Scene.replace`.
-    """
+    """The scene in the TOML file `path`, under `name` or the file's own. Raises InputError with all errors of the file,
+    a line each: `file:line: key: what is wrong; allowed: ...`; entries are counted from 0."""
     path = Path(path)
     text, tables = read_toml(path)
     if "axis" in tables and "scene" in tables:

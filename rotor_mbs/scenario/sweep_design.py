@@ -1,8 +1,6 @@
-"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped.
-
-A grid runs through its axes like the digits of a number, the last axis fastest; all random axes together are one
-digit, the draw. Every row follows from its number alone, so that any part of a sweep can be computed on any computer.
-"""
+"""The rows of a sweep: lists, ranges and random draws, as a grid (the last axis fastest; all random axes together are
+one digit, the draw) or zipped. Every row follows from its number alone, so that any part of a sweep can be computed on
+any computer."""
 
 from __future__ import annotations
 
@@ -22,17 +20,12 @@ DRAWN = ("uniform", "normal", "sobol")
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter.
-
-    kind     values, linear, log, uniform, normal or sobol
-    numbers  the values; start and end; low and high; or mean and standard deviation
-    count    how many values; of a random axis, how many draws
-    """
+    """One parameter."""
 
     key: str
-    kind: str
-    numbers: tuple[float, ...]
-    count: int
+    kind: str  # values, linear, log, uniform, normal or sobol
+    numbers: tuple[float, ...]  # the values; start and end; low and high; or mean and standard deviation
+    count: int  # how many values; of a random axis, how many draws
 
     @property
     def is_drawn(self) -> bool:

@@ -1,9 +1,5 @@
 """Loads over time as tables ((t, value), ...), t in s: linear between the rows, constant before the first and after the
-last; two rows with equal t are a jump; () where there is no such load.
-
-A step over a kink of a load loses its order: tables are cut into segments on which they are linear, and a run into the
-intervals that an engine integrates one by one.
-"""
+last; two rows with equal t are a jump. A step over a kink loses its order: a run is cut into intervals without."""
 
 from __future__ import annotations
 
@@ -34,11 +30,7 @@ MIN_ROWS, MAX_ROWS = 10, 100
 
 
 def value_at(table: Table, time: float) -> float:
-    """Value at `time` in s; at a jump, the value after it; 0 where there is no load.
-
-    >>> value_at(((0.0, 1.0), (2.0, 5.0), (2.0, 7.0)), 2.0)
-    7.0
-    """
+    """Value at `time` in s; at a jump, the value after it; 0 where there is no load."""
     following = bisect_right(table, time, key=itemgetter(0))
     if following in (0, len(table)):
         return table[max(following - 1, 0)][1] if table else 0.0
@@ -137,16 +129,12 @@ def values_before(parts: Sequence[Segment], times: Array) -> Array:
 
 @dataclass(frozen=True)
 class Interval:
-    """From one stop of an engine to the next, s, within one segment.
-
-    sample_intervals   how many intervals between samples it covers; 1 where it is a part of one
-    ends_at_sample     whether a sample is at its end
-    """
+    """From one stop of an engine to the next, s, within one segment."""
 
     start: float
     end: float
-    sample_intervals: int
-    ends_at_sample: bool
+    sample_intervals: int  # how many intervals between samples it covers; 1 where it is a part of one
+    ends_at_sample: bool  # whether a sample is at its end
     segment: Segment
 
 

@@ -1,7 +1,4 @@
-"""TOML text: read from a file with limits, written, and the line on which each key stands.
-
-Every error is a line of an InputError: `file:line: key: what is wrong; allowed: ...`.
-"""
+"""TOML text: read from a file with limits, written, and the line on which each key stands."""
 
 from __future__ import annotations
 
@@ -39,18 +36,12 @@ _TOKEN = re.compile(
 
 
 class KeyProblem(NamedTuple):
-    """One error of the tables of a file.
+    """One error of the tables of a file."""
 
-    path        where it is, in the tables as they were read
-    wrong       what is wrong
-    allowed     what is allowed; "" for what the key allows
-    is_of_key   whether it is the key that is wrong, whatever the value is
-    """
-
-    path: KeyPath
-    wrong: str
-    allowed: str = ""
-    is_of_key: bool = False
+    path: KeyPath  # where it is, in the tables as they were read
+    wrong: str  # what is wrong
+    allowed: str = ""  # what is allowed; "" for what the key allows
+    is_of_key: bool = False  # whether it is the key that is wrong, whatever the value is
 
     @property
     def message(self) -> str:
@@ -89,11 +80,7 @@ def shown_path(path: Path) -> str:
 
 
 def shown_key(path: KeyPath) -> str:
-    """The path as `Scene.replace` and sweeps take it, entries counted from 0; odd names in quotes.
-
-    >>> shown_key(("blade", 1, "centre_of_mass", 2))
-    'blade[1].centre_of_mass[2]'
-    """
+    """The path as `Scene.replace` and sweeps take it, entries counted from 0: blade[1].mass; odd names in quotes."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{_shown_name(part)}" for part in path)[1:]
 
 
@@ -137,11 +124,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
 
 
 def toml_value(value: object) -> str:
-    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables.
-
-    >>> toml_value({"start": 0.1, "names": ["a"], "log": True})
-    '{"start" = 0.1, "names" = ["a"], "log" = true}'
-    """
+    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables."""
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
     if isinstance(value, list | tuple):
@@ -193,11 +176,8 @@ def _syntax_error(message: str, text: str) -> str:
 
 
 def find_lines(text: str) -> dict[KeyPath, int]:
-    """Line number, counted from 1, of every key and array entry of a text that is valid TOML.
-
-    ("blade", 1, "mass") is in the second [[blade]] table. Left out are the keys of inline tables, which TOML has on one
-    line. In a text that is not TOML some lines are missing or wrong.
-    """
+    """Line number, from 1, of every key and array entry of a text that is valid TOML, but for the keys of inline
+    tables; ("blade", 1, "mass") is in the second [[blade]] table. Without valid TOML some are missing or wrong."""
     lines: dict[KeyPath, int] = {}
     table_counts: dict[KeyPath, int] = {}  # of every array of tables
     table: KeyPath = ()

@@ -18,10 +18,8 @@ MAX_ROTORS = 512
 
 
 class Variants:
-    """The scenes of a sweep: `tables` of the base, with a number put in at each of `keys`.
-
-    Most sweeps vary the initial state of few rotors: a scene is read for each rotor, then initial states are put in.
-    """
+    """The scenes of a sweep: `tables` of the base, with a number put in at each of `keys`. A scene is read for each
+    rotor, of which most sweeps have few, then initial states are put in."""
 
     def __init__(self, name: str, tables: dict[str, Any], keys: Sequence[str]) -> None:
         self.keys = tuple(keys)

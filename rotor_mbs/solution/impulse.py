@@ -25,16 +25,10 @@ _MAX_TURN_PER_SAMPLE = 1.0
 
 
 class Balance(NamedTuple):
-    """Residual of a balance of momentum.
+    """Residual of a balance of momentum."""
 
-    Attributes
-    ----------
-    error : (n,) kg m²/s or kg m/s, beyond what the samples leave open
-    scale : what it is relative to
-    """
-
-    error: Array
-    scale: float
+    error: Array  # (n,) kg m²/s or kg m/s, beyond what the samples leave open
+    scale: float  # what it is relative to
 
     @property
     def largest(self) -> float:
@@ -63,12 +57,9 @@ def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
 
 
 def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
-    """In space, relative to the largest momentum and what the weights give in a fall.
-
-    Returns None where the run has no force of the bearing, where a load has a kink (the force jumps there), or where
-    the samples do not resolve the motion or the oscillations of a stiff bearing, or are too few to show what they leave
-    open.
-    """
+    """In space, relative to the largest momentum and what the weights give in a fall. None where the run has no force
+    of the bearing, where a load has a kink (the force jumps there), or as for `angular_balance`, oscillations of a
+    stiff bearing among the motion."""
     force = run.get("shaft_force")
     if (
         force is None
@@ -120,11 +111,8 @@ def _torque_impulse(scene: Scene, times: Array) -> Array:
 
 
 def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:
-    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s; constant where neither gravity nor torque acts.
-
-    Summed over hub and blades as L = J_hub Ω + Σ e·(J ω), e the shaft's direction and ω the blade's angular velocity,
-    both in the blade's own frame.
-    """
+    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s: L = J_hub Ω + Σ e·(J ω), e the shaft's
+    direction and ω the blade's angular velocity, both in the blade's own frame."""
     spin = rates[:, 0]
     total = scene.hub_inertia * spin
     for i, blade in enumerate(scene.blades):
@@ -157,10 +145,8 @@ def _centre(scene: Scene, angles: Array, rates: Array, blade: int) -> tuple[Arra
 
 @functools.cache
 def _interval_weights(points: int, interval: int, *, with_slopes: bool) -> tuple[Array, Array]:
-    """Weights of values and slopes at the nodes 0 ... points - 1 in the integral from `interval` to the next node.
-
-    Of the polynomial through all values (and slopes), integrated exactly by Gauss's points.
-    """
+    """Weights of values and slopes at the nodes 0 ... points - 1 in the integral from `interval` to the next node, of
+    the polynomial through all of them; exact by Gauss's points."""
     nodes = np.arange(points, dtype=float)
     abscissae, gauss = np.polynomial.legendre.leggauss(points)
     at, gauss = interval + 0.5 + 0.5 * abscissae, 0.5 * gauss

@@ -1,8 +1,4 @@
-"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks.
-
-Angles and energies have rules of their own here; every other quantity is measured as its declaration says. Bounds are
-in `judgement`.
-"""
+"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks."""
 
 from __future__ import annotations
 
@@ -56,10 +52,7 @@ def angle_error(run: Trajectory, reference: Trajectory) -> Array:
 
 
 def energy_scale(scene: Scene, run: Trajectory) -> float:
-    """J: what an energy error is relative to: the weights at their arms, the energy at the start, the work done.
-
-    Σ m g |r| + kinetic energy and spring energy at the start + largest |work|. Zero only where nothing moves.
-    """
+    """J: Σ m g |r| + kinetic and spring energy at the start + largest |work|; zero only where nothing moves."""
     weights = sum(blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass)) for blade in scene.blades)
     springs = sum(
         0.5 * stiffness * float(np.square(angle - value_at(scene.pitch_load(i)[1], 0.0)))
@@ -93,10 +86,7 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
 
 
 def _rotor_extremes(run: Trajectory) -> Metrics:
-    """Smallest and largest rotor angle (rad) and largest rotor speed (rad/s).
-
-    Over the integrator's own output points where the run has them, else over its samples.
-    """
+    """Rotor angle (rad) and speed (rad/s) over the integrator's own output points where the run has them."""
     refined_angles, refined_rates = run.get("refined_angles"), run.get("refined_rates")
     angles = run.angles if refined_angles is None else refined_angles
     rates = run.rates if refined_rates is None else refined_rates
@@ -204,17 +194,8 @@ def largest(values: Array) -> Array:
 
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
-    """Return the largest energy error of each of k runs, of its scale (J where that is zero).
-
-    Parameters
-    ----------
-    scenes : of each run
-    kinetic, work, errors : (k, n) J, over the samples; NaN samples do not count
-
-    Returns
-    -------
-    ndarray, shape (k,)
-    """
+    """(k,) the largest energy error of each of k runs, of its scale (J where that is zero); from (k, n) J over the
+    samples, NaN samples not counted."""
     nothing = np.zeros((1, 1))
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])

@@ -234,14 +234,8 @@ LOADS = (
 def named_loads(
     roots: Iterable[tuple[Array, Array]], shaft_force: Array, shaft_moment: Array, actuators: Array
 ) -> dict[str, Array]:
-    """The arrays of `LOADS` by name.
-
-    Parameters
-    ----------
-    roots : of each blade, (n, 3) force in N and (n, 3) moment in N m at its root, in its frame
-    shaft_force, shaft_moment : (n, 3) N and N m, in the base frame
-    actuators : (n, blades) N m
-    """
+    """The arrays of `LOADS` by name, from each blade's (n, 3) force (N) and moment (N m) at its root in its frame, the
+    shaft's in the base frame, and the (n, blades) moments of the actuators."""
     forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
     arrays = forces, moments, shaft_force, shaft_moment, actuators
     return {load.name: np.asarray(values, dtype=float) for load, values in zip(LOADS, arrays, strict=True)}
@@ -305,21 +299,14 @@ NAMES = frozenset({*(quantity.name for quantity in BUILT_IN), "refined_time"})
 
 
 def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
-    """The built-in quantities, and those that installed packages bring for `outputs`.
-
-    Raises
-    ------
-    InputError
-        Where an output is neither built in nor brought by an installed package.
-    """
+    """The built-in quantities, and those that installed packages bring for `outputs`. Raises InputError where an output
+    is neither."""
     return BUILT_IN + tuple(quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output))
 
 
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
-    """The quantities that a scene's `outputs` ask for, and those that are stored whenever a model has them.
-
-    Raises InputError as `known_quantities` does.
-    """
+    """Those that a scene's `outputs` ask for, and those that are stored whenever a model has them; raises
+    InputError."""
     asked = {"", *outputs}
     return tuple(quantity for quantity in known_quantities(asked) if quantity.output in asked)
 
@@ -363,10 +350,8 @@ def installed(output: str) -> tuple[Quantity, ...]:
 
 
 def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None:
-    """The run's array of a quantity: the model's own, or what the quantity's producer makes of the samples.
-
-    Returns None where the run does not have it. Raises InputError where a producer gives an array of another shape.
-    """
+    """The run's array: the model's own, or what the quantity's producer makes of the samples; None where there is none.
+    Raises InputError where a producer gives an array of another shape."""
     values = samples.get(quantity.name)
     if values is not None or quantity.producer is None:
         return values
@@ -393,10 +378,8 @@ def sizes(quantity: Quantity, values: Array) -> Array:
 
 
 def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples | None) -> Array | None:
-    """(common samples,) Size of a quantity, or of its difference from the reference, largest over the other axes.
-
-    Returns None where the quantity is not judged, or where the run or the needed reference does not have it.
-    """
+    """(common samples,) size of a quantity, or of its difference from the reference, largest over the other axes; None
+    where it is not judged, or the run or the needed reference does not have it."""
     rule = quantity.judgement
     if rule is None:
         return None

@@ -1,8 +1,5 @@
-"""How a run ended: the one list of statuses for runs, bench points, step ladders and sweeps, and their integer codes.
-
-Arrays of statuses are stored as integers with the CF attributes `flag_values` and `flag_meanings`, and are read back by
-these attributes, so that the order of the list may differ between files.
-"""
+"""How a run ended: the one list of statuses, and their integer codes. Files have CF's `flag_values` and
+`flag_meanings`, so that the order of the list may differ between files."""
 
 from __future__ import annotations
 

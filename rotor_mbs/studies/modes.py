@@ -16,8 +16,15 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.campbell import REST, ROTATION, FloquetTable, LinearModes, SceneModes, StabilityChart
-from rotor_mbs.analysis.mode_records import to_records
+from rotor_mbs.analysis.campbell import (
+    REST,
+    ROTATION,
+    FloquetTable,
+    LinearModes,
+    SceneModes,
+    StabilityChart,
+    to_records,
+)
 from rotor_mbs.analysis.modes import GROWTH, Complex, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method

@@ -109,7 +109,7 @@ def _plain(values: NDArray[np.float64]) -> Any:
 
 def _croissant(path: Path, stored: StoredSweep) -> dict[str, Any]:
     """The variables with a run in front as fields of one record set, a record a run."""
-    kinds = {"f": "sc:Float", "i": "sc:Integer", "u": "sc:Integer"}
+    kinds = {"f": "sc:Float", "i": "sc:Integer", "u": "sc:Integer", "S": "sc:Text"}
     fields = [
         {
             "@type": "cr:Field",

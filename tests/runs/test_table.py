@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -198,7 +198,7 @@ def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
             subprocess.Popen([sys.executable, "-c", program, str(path), str(first)], env=environment)
             for first in (0, 1)
         ]
-        with suppress(subprocess.TimeoutExpired):
+        with contextlib.suppress(subprocess.TimeoutExpired):
             writers[0].wait(timeout=0.5 + 0.03 * round_)
         for writer in writers:
             writer.send_signal(signal.SIGKILL)

@@ -1,7 +1,4 @@
-"""The one place that imports Exudyn: builds a system from its parts, runs it, returns recorded rows.
-
-The engine runs without window, console output or files, in its fast build (no range checks).
-"""
+"""The one place that imports Exudyn: without window, console output or files, in its fast build (no range checks)."""
 
 from __future__ import annotations
 
@@ -44,10 +41,8 @@ class Linearized(NamedTuple):
 
 
 class System:
-    """An assembled system of the engine. Each `integrate` starts from the initial state the parts were given.
-
-    Raises MethodRefusal, with the engine's reason, where the engine does not take the parts.
-    """
+    """An assembled system of the engine, which each `integrate` starts anew. Raises MethodRefusal, with the engine's
+    reason, where it does not take the parts."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
         self._container = _engine.SystemContainer()
@@ -85,10 +80,8 @@ class System:
         return stored
 
     def linearized(self, step: float) -> Linearized:
-        """The engine's own linearization at the initial state, its difference quotients taken with `step` (rad, m).
-
-        The quotients are one-sided, so that their error is of the first order in `step`.
-        """
+        """The engine's own linearization at the initial state, by one-sided difference quotients with `step` (rad,
+        m)."""
         settings = _engine.SimulationSettings()
         settings.solution.file.write = False
         differences = settings.staticSolver.newton.numericalDifferentiation
@@ -123,19 +116,8 @@ class System:
         rows_between: bool,
         before_interval: Callable[[Interval], None],
     ) -> Integration:
-        """From the initial state to the end of the last interval, or to the first failure, which is in the result.
-
-        Parameters
-        ----------
-        intervals : of constant or linear loads, one after the other
-        rows_between : keep rows between samples too
-        before_interval : called with each interval first
-
-        Raises
-        ------
-        KeyboardInterrupt
-            If interrupted.
-        """
+        """From the initial state through the intervals of linear loads, or to the first failure, which is in the
+        result; `rows_between` keeps rows between samples, too; `before_interval` is called with each interval first."""
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         settings = _settings(scheme, data.ODE2Size(), data.AEsize())
@@ -240,10 +222,8 @@ def _schedule(settings: Any, scheme: Scheme, interval: Interval, rows_between: b
 
 
 def _count(total: Integration, scheme: Scheme, interval: Interval, it: Any, failure: str) -> None:
-    """Add one interval's outcome; an implicit step evaluates its residual once more than it iterates.
-
-    The engine's index is one ahead of the steps it took, and two where the last one failed.
-    """
+    """Adds one interval's outcome. The engine's index is one ahead of the steps it took, and two where the last one
+    failed; an implicit step evaluates its residual once more than it iterates."""
     steps = max(0, it.currentStepIndex - (2 if failure else 1))
     tried = steps + it.rejectedAutomaticStepSizeSteps
     total.steps = (total.steps or 0) + steps

@@ -1,9 +1,5 @@
-"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates.
-
-Every node stands at its body's centre of mass, so masses and inertias go in as the scene has them. A hub without mass
-or inertia is a body with none: its joints fix it, the constrained system is regular, and no inertia has to be invented
-for it.
-"""
+"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates. Nodes stand at
+centres of mass. A hub without mass or inertia is a body with none: its joints fix it."""
 
 from __future__ import annotations
 
@@ -38,21 +34,14 @@ NODES = ("euler_parameters", "rotation_vector")
 
 @dataclass(frozen=True)
 class Placed:
-    """A body at the start.
-
-    Attributes
-    ----------
-    about_shaft, pitch : rad, of its orientation
-    axis : (3,) in the base frame, that it turns about in its bearing
-    omega : (3,) rad/s in the base frame, angular velocity
-    """
+    """A body at the start."""
 
     name: str
     body: Body
-    about_shaft: float
+    about_shaft: float  # rad, of its orientation
     pitch: float
-    axis: Array
-    omega: Array
+    axis: Array  # (3,) in the base frame, that it turns about in its bearing
+    omega: Array  # (3,) rad/s in the base frame, angular velocity
 
     @property
     def rotation(self) -> Array:
@@ -131,7 +120,6 @@ def _gravity(placed: Placed, gravity: float) -> list[Part]:
 
 
 def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
-    """A marker at the hub centre, fixed on the body."""
     return _marker(placed.name, where, rotation, -placed.body.com)
 
 

@@ -17,21 +17,8 @@ _POINTS = 8
 
 
 def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
-    """Return the energy of the springs, and the work of their rest angles that `work` leaves out.
-
-    Parameters
-    ----------
-    angles : (n, 1 + blades) rad, at the first n samples
-
-    Returns
-    -------
-    energy, of_rests : (n,) J
-
-    Notes
-    -----
-    With the spring's energy ½ k (θ - r)², a rest angle r that moves does the work -∫ k (θ - r) dr, jumps included.
-    That is ∫ k r dθ, which `work` has, and the change of ½ k r (r - 2θ).
-    """
+    """(n,) J at the first n samples: energy ½ k (θ - r)² of the springs, and what `work` leaves out of the work -∫ k (θ
+    - r) dr of rest angles r that move, jumps included: the change of ½ k r (r - 2θ); `work` has ∫ k r dθ."""
     energy, of_rests = np.zeros((2, len(angles)))
     for i in pitching(scene):
         stiffness, table = scene.bearing(i)[0], scene.pitch_load(i)[1]
@@ -45,17 +32,8 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
 
 def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
-    """Return the work of the torques less what the dampers took, (n,) J.
-
-    Parameters
-    ----------
-    segments : of the loads
-    time, angles, rates : (n,) s, (n, 1 + blades) rad and rad/s: all rows, samples among them
-
-    Notes
-    -----
-    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`.
-    """
+    """(n,) J of the torques less what the dampers took, from all rows, samples among them: s, rad, rad/s. A spring
+    whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`."""
     if not scene.work_needs_path:
         turned, torques = angles - angles[:1], segments[0].values
         exact: Array = torques[ROTOR] * turned[:, 0]
@@ -79,10 +57,8 @@ def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, 
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:
-    """(n,) integral from the first row to each row, by a local polynomial through the eight nearest rows.
-
-    Rows need not be equally spaced; the polynomial is integrated exactly by Gauss-Legendre points.
-    """
+    """(n,) integral from the first row to each row, by a local polynomial through the eight nearest rows, which need
+    not be equally spaced; exact by Gauss-Legendre points."""
     points = min(_POINTS, len(time))
     first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
     window = first[:, None] + np.arange(points)

@@ -1,9 +1,6 @@
-"""Richardson extrapolation in the time step: three runs of a method of second order, and how far they agree.
-
-With steps h, h/2 and h/4 the terms of h² and h⁴ are eliminated. For the trapezoidal rule (Newmark) the error has even
-powers only, and the result is of sixth order. Generalized-α has a term of h³, too, which remains; it is small: to
-eliminate it in place of h⁴ left errors of 8e-6 rad on paper/fig11 before its horizon, for 3e-7.
-"""
+"""Richardson extrapolation in the time step: steps h, h/2, h/4 eliminate the terms of h² and h⁴. The trapezoidal rule
+becomes of sixth order. Generalized-α keeps its small term of h³: eliminated in place of h⁴, errors on paper/fig11
+before its horizon were 8e-6 rad, for 3e-7."""
 
 from __future__ import annotations
 
@@ -31,13 +28,7 @@ _DISTANCES = {quantity.name for quantity in BUILT_IN if quantity.judgement and n
 
 
 class ExtrapolatedSolver:
-    """See `rotor_mbs.methods.base.Solver`.
-
-    Parameters
-    ----------
-    build : from the number of steps that take the place of each step to the solver of that run
-    tolerance : relative tolerance of Newton's residual
-    """
+    """Three runs; `build` takes how many steps take the place of each, `tolerance` is that of Newton's residual."""
 
     def __init__(self, build: Callable[[int], Solver], tolerance: float) -> None:
         self._runs = [build(refinement) for refinement in REFINEMENTS]
@@ -73,13 +64,8 @@ class ExtrapolatedSolver:
 
 
 def extrapolated(runs: list[Trajectory], tolerance: float) -> Trajectory:
-    """Every quantity extrapolated to step zero, but for distances such as the joints' gaps: those are the finest run's.
-
-    Parameters
-    ----------
-    runs : with steps h, h/2 and h/4; same samples, same quantities
-    tolerance : relative tolerance of Newton's residual
-    """
+    """Every quantity of runs with steps h, h/2, h/4 extrapolated to step zero; distances such as the joints' gaps are
+    the finest run's. `tolerance` is relative, of Newton's residual."""
     coarse, middle, fine = runs
     distance = np.abs(
         _eliminated(middle.angles, fine.angles, 4.0) - _eliminated(coarse.angles, middle.angles, 4.0)

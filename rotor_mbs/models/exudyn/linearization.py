@@ -1,10 +1,6 @@
-"""The engine's models linearized by the engine: the tree in steady rotation or at rest, the chain at rest.
-
-The engine differentiates its forces by one-sided quotients; here they are taken with several steps and extrapolated to
-none. For joints it leaves out the geometric stiffness, by which constraint forces turn with the bodies: it is added
-here, from the engine's own constraint Jacobian beside the state. (Without it the chain's frequencies at a rest under
-gravity are wrong by percents.)
-"""
+"""The engine's models linearized by it, its one-sided quotients extrapolated. For joints it leaves out the geometric
+stiffness, by which constraint forces turn with the bodies: that is added from its constraint Jacobian beside the state.
+(Without it the chain's frequencies under gravity are wrong by percents.)"""
 
 from __future__ import annotations
 
@@ -26,10 +22,8 @@ _STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 
 
 def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """The kinematic tree about `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m.
-
-    Raises MethodRefusal where the engine does not take the scene.
-    """
+    """The tree about `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m. Raises
+    MethodRefusal where the engine does not take the scene."""
     state = scene_at(scene, angles, speed, torque)
     system = System(tree.parts(state, Loads(state)))
     linear = _extrapolated(system.linearized)
@@ -38,12 +32,8 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
 
 
 def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """The chain of bodies and joints at rest at `angles` (1 + blades,) rad, in the rotor's and the pitch angles.
-
-    With N a basis of what the joints allow and λ the joint forces at rest, its stiffness is Nᵀ (K + ∂(C λ)/∂q) N.
-
-    Raises MethodRefusal where the engine does not take the scene, or the state is not at rest.
-    """
+    """The chain at rest at `angles`: with N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K
+    + ∂(C λ)/∂q) N. Raises MethodRefusal, also where the state is not at rest."""
     if speed or torque:
         raise MethodRefusal("exudyn_chain: linearized at rest alone")
     state = scene_at(scene, angles, 0.0, 0.0)
@@ -87,10 +77,8 @@ def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: flo
 
 
 def _joint_angles(scene: Scene) -> Array:
-    """(1 + pitching, n): rates of the joint angles from the velocities of the bodies' coordinates at rest.
-
-    A body's coordinates are its position and its Euler parameters p; its angular velocity is 2 (e0 ė - ė0 e + e × ė).
-    """
+    """(1 + pitching, n): rates of the joint angles from those of the bodies' coordinates, positions and Euler
+    parameters p; the angular velocity is 2 (e0 ė - ė0 e + e × ė)."""
     bodies = chain.placed_bodies(scene)
     by_coordinates = np.zeros((len(bodies), 7 * len(bodies)))
     for k, placed in enumerate(bodies):

@@ -1,7 +1,4 @@
-"""The six methods of this package: two models, each with its integrators.
-
-Listing what a method builds needs no engine; the engine is loaded when a system is built.
-"""
+"""The six methods of Exudyn: two models, each with its integrators. The engine is loaded when a system is built."""
 
 from __future__ import annotations
 
@@ -53,18 +50,8 @@ class ChainNewmarkSettings(schemes.NewtonSettings):
 
 
 class MultibodySolver:
-    """See `rotor_mbs.methods.base.Solver`.
-
-    Parameters
-    ----------
-    reading : from the recorded rows to the trajectory
-    rows_between : whether the reading needs rows between samples too
-
-    Raises
-    ------
-    MethodRefusal
-        With the engine's reason, where the engine does not take the parts.
-    """
+    """See `methods.base.Solver`; `reading` makes the trajectory from recorded rows, for which it may need
+    `rows_between` samples. Raises MethodRefusal, with the engine's reason, where the engine does not take the parts."""
 
     def __init__(
         self,
@@ -130,7 +117,6 @@ def _build_chain(scene: Scene, settings: ChainAlphaSettings | ChainNewmarkSettin
 
 
 def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
-    """Raises InputError for too short a step, MethodRefusal for a scene the engine cannot sample."""
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
         raise MethodRefusal(f"Exudyn cannot resolve samples less than {_SHORTEST_INTERVAL:g} s apart")
     scheme = settings.scheme()
@@ -140,13 +126,11 @@ def _scheme(scene: Scene, settings: schemes.SchemeSettings) -> schemes.Scheme:
 
 
 def _chain_arrays(settings: ChainAlphaSettings | ChainNewmarkSettings) -> tuple[str, ...]:
-    """The error that joints make, and where the run is extrapolated a bound on its own error."""
     own = ("angle_uncertainty",) if settings.extrapolation == "richardson" else ()
     return ("constraint_error", *own)
 
 
 def _method(model: str, integrator: str, label: str, **facts: Any) -> Method:
-    """What all six have in common."""
     in_tree = model == "exudyn_tree"
 
     def items(scene: Scene) -> list[BuiltItem]:

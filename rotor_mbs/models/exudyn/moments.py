@@ -46,15 +46,10 @@ class Loads:
 
 @dataclass(frozen=True)
 class Moment:
-    """A moment as a load function of the engine: the sum of factors times loads.
+    """A moment as a load function of the engine: the sum of factors times loads."""
 
-    Attributes
-    ----------
-    loads : over time
-    terms : (place in `Scene.load_tables`, factor); the factor of a rest angle is the spring's stiffness, N m/rad
-    """
-
-    loads: Loads
+    loads: Loads  # over time
+    # (place in `Scene.load_tables`, factor); the factor of a rest angle is the spring's stiffness, N m/rad
     terms: tuple[tuple[int, float], ...]
 
     def at(self, time: float) -> float:

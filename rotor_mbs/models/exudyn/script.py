@@ -1,7 +1,4 @@
-"""A scene as a Python script for Exudyn that needs nothing of this package: the kinematic tree, the same step.
-
-Its text is `script.py.txt`.
-"""
+"""A scene as a Python script for Exudyn alone, the kinematic tree with the same step; its text is `script.py.txt`."""
 
 from __future__ import annotations
 

@@ -94,7 +94,6 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    """(n,) from two (n, 3)."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
@@ -130,11 +129,8 @@ def _fields(
 
 
 def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
-    """(n,) rad: angles known but for whole turns, made continuous with the help of the measured rates (rad/s).
-
-    The angle is predicted by the mean rate between two rows; the turn nearest to that is taken, so many turns between
-    rows do no harm as long as the prediction is right to half a turn. The first row gets the turns of `start`.
-    """
+    """(n,) rad: angles known but for whole turns, made continuous: the turn nearest to what the mean of the measured
+    rates (rad/s) predicts from row to row; the first row gets the turns of `start`."""
     turn = 2.0 * np.pi
     predicted = 0.5 * np.diff(time) * (rates[1:] + rates[:-1])
     gained = np.round((predicted - np.diff(wrapped)) / turn)

@@ -1,7 +1,4 @@
-"""The rotor as a kinematic tree: hub and blades as links, rotor angle and pitch angles as the only coordinates.
-
-Exact zeros stay exact: no coordinate is ever computed from another.
-"""
+"""The rotor as a kinematic tree, hub and blades as links; its coordinates are the angles: exact zeros stay exact."""
 
 from __future__ import annotations
 
@@ -54,7 +51,6 @@ def bodies(scene: Scene) -> list[Body]:
 
 
 def link_name(link: int) -> str:
-    """The hub, or link k for the k-th blade that pitches."""
     return f"link {link}" if link else "hub"
 
 

@@ -22,13 +22,8 @@ _DOP853 = (1e-12, 1e-14)
 
 
 def motion_at(scene: Scene, times: Array, equations: Accelerations | None = None) -> Trajectory:
-    """The motion at chosen times; fewer rows where it ends early.
-
-    Parameters
-    ----------
-    times : (n,) s, increasing from 0 up to the duration at most
-    equations : in place of the closed form, with its signature; one of `LEFT_OUT`, or of `at_azimuths`
-    """
+    """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early. By
+    `equations` in place of the closed form, one of `LEFT_OUT` or of `at_azimuths`, where they are given."""
     if equations is None and is_available():
         # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
         run = Propagation(scene, times=times, tol=_TAYLOR, compact_mode=True, high_accuracy=True)

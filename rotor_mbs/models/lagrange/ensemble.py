@@ -1,10 +1,6 @@
-"""Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure.
-
-In Hamilton's variables, whose equations take fewer and cheaper steps; what is stored are rates, as of a run alone.
-
-A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a sweep gives the same
-bits. Runs in one process and one thread: processes are the parallelism.
-"""
+"""Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure, in
+Hamilton's variables. A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a
+sweep gives the same bits. One thread: processes are the parallelism."""
 
 from __future__ import annotations
 
@@ -67,18 +63,8 @@ def lanes() -> int:
 
 
 def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
-    """Run all scenes; a run that breaks off is in the result, cut and with its reason.
-
-    Parameters
-    ----------
-    scenes : with the same number of blades and samples and the same outputs, loads not among them
-    tolerance : of the local error, absolute and relative
-
-    Raises
-    ------
-    MethodRefusal
-        Where heyoka is not installed.
-    """
+    """Run all scenes, with the same number of blades and samples and the same outputs, loads not among them; a run that
+    breaks off is in the result, cut and with its reason. Raises MethodRefusal where heyoka is not installed."""
     block = empty_block(scenes)
     rotors: dict[tuple[object, ...], _RotorNumbers] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
@@ -133,10 +119,8 @@ def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
 
 
 def _observables(example: Scene) -> Any:
-    """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta.
-
-    It takes a tenth of the time that NumPy takes for the same formulas, a quarter of a run with 1,001 samples.
-    """
+    """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta: a tenth of
+    NumPy's time for the same formulas."""
     engine, parameters = heyoka(), Parameters()
     form, loads = equation_numbers(example, parameters)
     points = _tip_numbers(example, parameters)
@@ -156,12 +140,8 @@ def _observables(example: Scene) -> Any:
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
-    """(rows, runs, samples): what a compiled function gives, such as x y z in m of each tip, or the energies in J.
-
-    `states` are (variables, runs, samples), of what moves: angles in rad, then rates or momenta; `numbers` are
-    (parameters, runs), of equations and tips, then the pitches that are fixed. The runs must fill the processor's
-    lanes, once or more: what is left over is rounded by other instructions.
-    """
+    """(rows, runs, samples) of compiled code at (variables, runs, samples) states of what moves; `numbers` (parameters,
+    runs) as of `_Group`. The runs must fill the lanes: what is left over is rounded by other instructions."""
     _, runs, samples = states.shape
     parts = []
     for i in range(0, samples, _OBSERVED_PER_CALL):

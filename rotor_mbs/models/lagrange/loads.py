@@ -74,13 +74,8 @@ def root_load(
     turning: tuple[Numbers, Numbers, Numbers, Numbers],
     gravity: float,
 ) -> tuple[Numbers, Numbers]:
-    """(n, 3) force and moment in the blade's frame.
-
-    Parameters
-    ----------
-    azimuth, pitch : (n,) sine and cosine
-    turning : (n,) Ω, θ̇, dΩ/dt, dθ̇/dt
-    """
+    """(n, 3) force and moment in the blade's frame, from (n,) sine and cosine of azimuth and pitch; turning: Ω, θ̇,
+    dΩ/dt, dθ̇/dt."""
     (sin_phi, cos_phi), (s, c) = azimuth, pitch
     spin, rate, spin_rate, rate_rate = turning
     omega = np.stack([spin * s, spin * c, rate], axis=1)

@@ -36,15 +36,9 @@ _PERTURBATION = 1e-9
 
 
 class ReferenceSolver:
-    """Two runs over the scene's sample times, and how errors grow along them.
-
-    The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka a hundredth): their
-    distance is the truncation error of the other, or, where both are at round-off, of the size of that.
-
-    Parameters
-    ----------
-    epsilon : of the runs' arithmetic
-    """
+    """Two runs over the scene's sample times, and how errors grow along them. The tolerance of the run that is kept,
+    the first, is a thousandth of the other's (without heyoka a hundredth): their distance is the truncation error of
+    the other."""
 
     def __init__(self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float) -> None:
         self._scene, self._runs, self._epsilon = scene, runs, epsilon
@@ -73,18 +67,9 @@ class ReferenceSolver:
 
 
 def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
-    """(n,) rad: a bound on the error of the angles, from how far two runs of unlike tolerance are apart.
-
-    `SAFETY` times the sum of the difference and of the rounding of the largest angle (at least 1 rad), because two runs
-    may round alike; of it the largest so far, because two runs may meet at a sample by chance. It does not contain the
-    rounding of the angles to double precision when they are stored, at most half a unit in the last place.
-
-    Parameters
-    ----------
-    difference : (n,) rad, largest over the angles
-    angles : (n, 1 + blades) rad
-    epsilon : of the runs' arithmetic
-    """
+    """(n,) rad: a bound on the error of (n, 1 + blades) angles, but for their rounding to doubles: `SAFETY` times the
+    sum of the difference of two runs, (n,) rad, and of the rounding of the largest angle, because two runs may round
+    alike; of it the largest so far, because they may meet by chance. `epsilon` is that of their arithmetic."""
     largest = np.maximum(np.abs(angles).max(axis=1), 1.0)
     return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
 
@@ -108,11 +93,8 @@ def _in_doubles(scene: Scene, tolerances: tuple[float, float], times: Array | No
 
 
 def error_growth(scene: Scene) -> Array:
-    """(samples,) How many times a small error of the initial state may have grown by each sample, at most.
-
-    The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the
-    variational equations of the closed form; infinite once it is past what double precision can hold.
-    """
+    """(samples,) How many times a small error of the initial state may have grown, at most: the largest singular value
+    of the state transition matrix (rad, `rate_units`); infinite once past what double precision can hold."""
     return _largest_growth(scene, _variational_matrices(scene))
 
 
@@ -158,7 +140,6 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
 
 
 def _in_units(scene: Scene, matrices: Array) -> Array:
-    """State transition matrices for angles in rad and rates in `rate_units`."""
     units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
     return np.asarray(matrices * units / units[:, None])
 
@@ -168,26 +149,18 @@ _QUAD_TOLERANCE = 1e-30  # its error, grown 1e10-fold, is still below what a dou
 
 @dataclass(frozen=True)
 class TimedReference:
-    """The reference of a scene at chosen times.
+    """The reference of a scene at chosen times."""
 
-    Attributes
-    ----------
-    trajectory : as far as it got: time, angles, rates, error_growth
-    growth : (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs
-        may be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
-    units : (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
-    """
-
-    trajectory: Trajectory
+    trajectory: Trajectory  # as far as it got: time, angles, rates, error_growth
+    # (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs may
+    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
     growth: Array
-    units: Array
+    units: Array  # (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
 
 
 def reference_at(scene: Scene, times: Array) -> TimedReference:
-    """The reference at `times`, (n,) s, increasing from 0 to the scene's duration; nothing is interpolated.
-
-    In quad precision with heyoka, else by DOP853 at its tightest.
-    """
+    """The reference at `times`, (n,) s, increasing from 0 to the duration, nothing interpolated: in quad precision with
+    heyoka, else by DOP853 at its tightest."""
     run = _in_quad(scene, _QUAD_TOLERANCE, times) if is_available() else _in_doubles(scene, _TIGHTEST, times)
     run.integrate()
     trajectory, matrices = run.observe(), _transition_matrices(scene, times)

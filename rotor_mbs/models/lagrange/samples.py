@@ -18,21 +18,13 @@ from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_co
 
 
 class Advance(NamedTuple):
-    """What an integrator made of one segment.
+    """What an integrator made of one segment."""
 
-    Attributes
-    ----------
-    states : (samples reached, variables)
-    end : (variables,) state at the end of the segment
-    evaluations : of the right-hand side; None where they are not counted
-    message : why the end was not reached; "" where it was
-    """
-
-    states: Any
-    end: Any
+    states: Any  # (samples reached, variables)
+    end: Any  # (variables,) state at the end of the segment
     steps: int
-    evaluations: int | None
-    message: str
+    evaluations: int | None  # of the right-hand side; None where they are not counted
+    message: str  # why the end was not reached; "" where it was
 
 
 def over_segments(
@@ -41,13 +33,9 @@ def over_segments(
     initial: Any,
     advance: Callable[[Segment, Any, Array], Advance],
 ) -> tuple[Any, Integration]:
-    """States at the samples, (n, variables), cut before the first row that is not finite; and the engine's report.
-
-    Parameters
-    ----------
-    times : (samples,) s, of which the first is that of the `initial` state
-    advance : (segment, state at its start, sample times inside) -> Advance
-    """
+    """(n, variables) states at the samples, cut before the first row that is not finite, and the engine's report;
+    `times` (samples,) s, the first that of the `initial` state; advance: (segment, state at its start, sample times
+    inside)."""
     state, rows = initial, [initial[None, :]]
     steps, evaluations, message = 0, None, ""
     for segment in segments:
@@ -66,13 +54,8 @@ def over_segments(
 
 
 def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
-    """What the scene asks for.
-
-    Parameters
-    ----------
-    times : (n or more,) s
-    states : (n, 2k) angles, then rates, of the k coordinates that move; with the work in J as one more column, or not
-    """
+    """What the scene asks for, from (n, 2k) angles, then rates, of the k coordinates that move; with the work in J as
+    one more column, or not."""
     count, time = len(scene.moving_coordinates), times[: len(states)]
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
     result = Trajectory(time, angles, rates)

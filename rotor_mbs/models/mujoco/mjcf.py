@@ -39,16 +39,11 @@ _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco
 
 @dataclass(frozen=True)
 class Load:
-    """A moment `gain` times a table over time, on a coordinate (0 = rotor).
-
-    Attributes
-    ----------
-    gain : 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
-    """
+    """A moment `gain` times a table over time, on a coordinate (0 = rotor)."""
 
     name: str
     coordinate: int
-    gain: float
+    gain: float  # 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
     table: Table
 
 
@@ -111,7 +106,6 @@ def text(root: ET.Element) -> str:
 
 
 def items(scene: Scene) -> list[BuiltItem]:
-    """What is built for the scene, in order."""
     kinds = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
     built = []
     for element in model(scene, "rk4", 1.0).iter():
@@ -166,10 +160,7 @@ def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: S
 
 
 def _possible(moments: list[float]) -> list[float]:
-    """Three principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others.
-
-    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.scene`).
-    """
+    """Principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others by rounding."""
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)
     return [min(moment, total - moment) for moment in least]
