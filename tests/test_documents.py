@@ -92,7 +92,7 @@ def dataset(folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def bench() -> None:
-    main("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1".split())
+    main(shlex.split("bench check/general -m lagrange/dop853 -o bench.h5 --budget 1 --repeats 1"))
 
 
 def test_the_readmes_own_scene_is_one() -> None:
