@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from rotor_mbs.analysis.data_verdict import carried_errors
 from rotor_mbs.errors import RotorError
 from rotor_mbs.foreign.trajectory import ForeignData
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
@@ -43,6 +42,15 @@ _FACTORS = {
 _TIMES = ((1e-3, "time in ms taken as s"), (1e-6, "time in us taken as s"), (60.0, "time in minutes taken as s"))
 
 Motion = Callable[[Array], Array | None]  # (n,) s -> (n, 2 (1 + blades)), None where it ends before
+
+
+def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
+    """(n, 2 (1 + blades)) What a relative error of 1 at the start may be in each angle, then rate, at most.
+
+    growth, units   of `TimedReference`
+    """
+    largest = np.maximum.accumulate(np.maximum(np.abs(reference.angles).max(axis=1), 1.0))
+    return np.asarray(np.maximum(np.maximum.accumulate(growth, axis=0), 1.0) * largest[:, None] * units)
 
 
 @dataclass(frozen=True)
