@@ -27,8 +27,7 @@ from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, states_of
-from rotor_mbs.studies.scene_causes import likely_causes
+from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, likely_causes, states_of
 
 METHOD = "data"  # what takes the place of a method's name
 # An error of the state changes the energy by its gradient: some ten times the error, of the energy scale; tenfold that.
