@@ -19,7 +19,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core.canvas import font_file
 from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
-from rotor_mbs.report.plots.paths import projected
+from rotor_mbs.report.plots import projected
 from rotor_mbs.runs.read import StoredScene, open_results
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array

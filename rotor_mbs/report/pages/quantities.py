@@ -12,12 +12,12 @@ import numpy as np
 
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.report import plots
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
 from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.time_histories import LOWEST, Series
+from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Array
@@ -66,7 +66,7 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
                 )
                 for method, run in own.items()
             }
-            panels = histories.lines([(plot.axis, list(lines.values()))], horizon)
+            panels = plots.lines([(plot.axis, list(lines.values()))], horizon)
             legend = [LegendEntry(label_of(method), line.look) for method, line in lines.items()]
             section = Section([picture(panels, name, plot.title)], legend)
         else:
@@ -86,7 +86,7 @@ def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, h
             lines = [part for part in parts if part.group == group]
             series = [Series(run.array("time"), part.values, coordinate_look(part.place)) for part in lines]
             caption = with_capital(label_of(run.method)) + (f", {group} axis" if group else "")
-            pictures.append(picture(histories.lines([(plot.axis, series)], horizon), f"{name}-{i}-{k}", caption))
+            pictures.append(picture(plots.lines([(plot.axis, series)], horizon), f"{name}-{i}-{k}", caption))
             legend |= {part.label: LegendEntry(part.label, coordinate_look(part.place)) for part in lines}
     if not is_compared:
         return Section(pictures, list(legend.values()))
@@ -166,7 +166,7 @@ def error_picture(
     shown = visible(curves)
     exact = [label_of(method) for method in curves if method not in shown]
     notes = [f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else []
-    panels = histories.errors([*others, *shown.values()], axis, horizon, signed=signed)
+    panels = plots.errors([*others, *shown.values()], axis, horizon, signed=signed)
     return picture(panels, name, caption, notes, legend)
 
 

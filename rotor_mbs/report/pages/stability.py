@@ -9,6 +9,7 @@ import numpy as np
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, reached_by, suite_runs
+from rotor_mbs.report import plots
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
@@ -17,7 +18,6 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import quantities
 from rotor_mbs.report.pages.scene import opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
-from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.text_table import listed
@@ -189,7 +189,7 @@ def _motion(run: StoredRun | None) -> Section:
     if unresolved:
         notes.append(f"Only the range is meaningful, samples are too far apart: {listed(unresolved)}.")
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(run.labels)]
-    panels = histories.motion(run.array("time"), run.get("angles"), run.get("rates"))
+    panels = plots.motion(run.array("time"), run.get("angles"), run.get("rates"))
     return Section([picture(panels, "motion", f"Angles and rates of {label_of(run.method)}", notes)], legend)
 
 
@@ -218,5 +218,5 @@ def _error_over_step(ladders: Sequence[Record]) -> Section:
         return Section()
     curves = [(arrays["step"], arrays["angle_error_max"], look_of(name)) for name, arrays in drawn.items()]
     caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
-    shown = picture(histories.error_over_step(curves, TARGET), "steps", caption)
+    shown = picture(plots.error_over_step(curves, TARGET), "steps", caption)
     return Section([shown], quantities.run_legend(drawn))
