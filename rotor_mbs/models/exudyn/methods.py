@@ -9,8 +9,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial
-from rotor_mbs.methods.ladders import step_ladder, tolerance_ladder
+from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial, step_ladder, tolerance_ladder
 from rotor_mbs.methods.settings import choice, step
 from rotor_mbs.models.exudyn import schemes
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.methods.base import Method, Solver, late
-from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
+from rotor_mbs.methods.base import Ladder, Method, Solver, late, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models.equation_items import equation_items
 from rotor_mbs.models.ode45_settings import Ode45Settings

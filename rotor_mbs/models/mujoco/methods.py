@@ -8,8 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial
-from rotor_mbs.methods.ladders import step_ladder
+from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial, step_ladder
 from rotor_mbs.methods.settings import Settings, step
 
 if TYPE_CHECKING:
