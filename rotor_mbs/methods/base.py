@@ -169,7 +169,6 @@ class Method:
 
     @property
     def defaults(self) -> dict[str, object]:
-        """Its settings where none are given."""
         return self.settings().as_dict()
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:

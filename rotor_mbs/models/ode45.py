@@ -73,7 +73,6 @@ class Ode45Result:
 
     @property
     def steps(self) -> int:
-        """How many steps were accepted."""
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:

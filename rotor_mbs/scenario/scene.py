@@ -116,7 +116,6 @@ def _per_blade(kind: Kind) -> Kind:
 
 
 def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
-    """An entry for every coordinate."""
     count = scene.get("blade_count")
     if isinstance(value, list) and count is not None and len(value) != 1 + count:
         raise wrong(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
@@ -380,7 +379,6 @@ _BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
 
 
 def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
-    """The dataclass fields of Scene that are of these parts, in order."""
     return (field for field in fields(Scene) if field.metadata["part"] in parts)
 
 
@@ -539,7 +537,6 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
 
 
 def copied(value: Any) -> Any:
-    """A copy of tables of a file, with lists and tables of its own."""
     if isinstance(value, dict):
         return {name: copied(entry) for name, entry in value.items()}
     return [copied(entry) for entry in value] if isinstance(value, list) else value

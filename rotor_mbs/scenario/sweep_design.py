@@ -20,8 +20,6 @@ DRAWN = ("uniform", "normal", "sobol")
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter."""
-
     key: str
     kind: str  # values, linear, log, uniform, normal or sobol
     numbers: tuple[float, ...]  # the values; start and end; low and high; or mean and standard deviation
@@ -77,7 +75,6 @@ class Design:
 
     @functools.cached_property
     def values(self) -> list[Array]:
-        """(count,) of every axis."""
         sobol = _sobol(self.axes, self.seed)
         return [_values(axis, i, self.seed, sobol) for i, axis in enumerate(self.axes)]
 

@@ -39,14 +39,12 @@ def value_at(table: Table, time: float) -> float:
 
 
 def values_at(table: Table, times: Array) -> Array:
-    """(n,) values at (n,) times in s, as of `value_at`."""
     import numpy as np
 
     return np.array([value_at(table, time) for time in times.tolist()])
 
 
 def is_constant(table: Table) -> bool:
-    """Whether the value never changes."""
     return len({value for _, value in table}) <= 1
 
 
@@ -56,7 +54,6 @@ def is_one_table(value: list[Any]) -> bool:
 
 
 def constant_value(table: Table) -> float:
-    """The value, where it never changes; else 0."""
     return value_at(table, 0.0) if is_constant(table) else 0.0
 
 
@@ -88,7 +85,6 @@ class Segment:
         return self.values[load] + self.slopes[load] * (time - self.start)
 
     def loads_at(self, time: float) -> list[float]:
-        """All loads at one time in s."""
         return [self.at(load, time) for load in range(len(self.lines))]
 
 

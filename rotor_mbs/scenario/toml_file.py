@@ -74,7 +74,6 @@ class TableError(ValueError):
 
 
 def shown_path(path: Path) -> str:
-    """The path as it can stand in a one-line message."""
     text = str(path)
     return text if text.isprintable() else ascii(text)
 
@@ -133,7 +132,6 @@ def toml_value(value: object) -> str:
 
 
 def toml_lines(table: Mapping[str, object]) -> str:
-    """A line `key = value` for each entry."""
     return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
@@ -220,7 +218,6 @@ def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
 
 
 def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict[KeyPath, int]) -> None:
-    """Notes the line of each entry of an array, and of the arrays inside it."""
     numbers: list[int] = []
     for token, line in value:
         if token in "]}":

@@ -25,8 +25,6 @@ _MAX_TURN_PER_SAMPLE = 1.0
 
 
 class Balance(NamedTuple):
-    """Residual of a balance of momentum."""
-
     error: Array  # (n,) kg m²/s or kg m/s, beyond what the samples leave open
     scale: float  # what it is relative to
 

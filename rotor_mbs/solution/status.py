@@ -13,5 +13,4 @@ COMPLETE = ("ok", "inaccurate", "unchecked")
 
 
 def code_of(status: str) -> int:
-    """The integer code of a status. Raises ValueError where there is no such status."""
     return STATUSES.index(status)

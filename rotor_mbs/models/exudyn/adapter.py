@@ -102,7 +102,6 @@ class System:
 
     @property
     def coordinates(self) -> Array:
-        """(n,) displacement coordinates of the initial state."""
         return np.array(self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Initial))
 
     @coordinates.setter
@@ -160,7 +159,6 @@ class System:
         return total
 
     def _solve(self, solver: Any, settings: Any) -> str:
-        """Why the engine says it failed; empty where it says it did not."""
         try:
             if solver.SolveSystem(self._mbs, settings):
                 return ""

@@ -45,7 +45,6 @@ class Placed:
 
     @property
     def rotation(self) -> Array:
-        """(3, 3) body frame to base frame."""
         return rotation_y(np.cos(self.about_shaft), np.sin(self.about_shaft)) @ rotation_z(self.pitch)
 
 
@@ -148,7 +147,6 @@ def _marker(body: str, where: str, rotation: Array, position: Array) -> Part:
 
 
 def _bearing(name: str, first: Part, second: Part) -> list[Part]:
-    """A joint that leaves the two markers free to turn about their common z."""
     markers = (Ref("marker", first.name), Ref("marker", second.name))
     return [first, second, Part("object", name, "ObjectJointRevoluteZ", {"markerNumbers": markers})]
 

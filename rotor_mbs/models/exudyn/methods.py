@@ -20,8 +20,6 @@ _EXTRAPOLATION = choice("none", ("none", "richardson"), doc="richardson: three r
 
 @dataclass(frozen=True)
 class ChainAlphaSettings(schemes.AlphaSettings):
-    """Generalized-alpha of the chain."""
-
     step: float = step(5e-4)
     node: str = _NODE
     extrapolation: str = _EXTRAPOLATION
@@ -29,8 +27,6 @@ class ChainAlphaSettings(schemes.AlphaSettings):
 
 @dataclass(frozen=True)
 class ChainNewmarkSettings(schemes.NewtonSettings):
-    """The trapezoidal rule of the chain."""
-
     node: str = _NODE
     extrapolation: str = _EXTRAPOLATION
 

@@ -39,13 +39,11 @@ class _Reader:
         self.samples: NDArray[np.intp] = rows if met.all() else rows[: int(np.argmin(met))]
 
     def all(self, name: str) -> Array:
-        """(n, k): every kept row."""
         if name not in self._tables:
             self._tables[name] = self._recorded(name)
         return self._tables[name][self._rows, 1:]
 
     def sampled(self, name: str) -> Array:
-        """(samples, k)."""
         return self.all(name)[self.samples]
 
 

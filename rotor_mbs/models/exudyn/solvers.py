@@ -73,7 +73,6 @@ class MultibodySolver:
         self.system = System(parts)
 
     def integrate(self) -> Integration:
-        """From the initial state, every time; bit for bit the same."""
         return self.system.integrate(self._scheme, self._intervals, self._rows_between, self._loads.enter)
 
     def observe(self) -> Trajectory:
@@ -129,7 +128,6 @@ class ExtrapolatedSolver:
         self._integrated = 0
 
     def integrate(self) -> Integration:
-        """All runs, from coarse to fine; steps and evaluations are their sums."""
         self._integrated = 0
         total = Integration(True, steps=0, rhs_evaluations=0, time_reached=float("inf"))
         for run in self._runs:
@@ -174,5 +172,4 @@ def extrapolated(runs: list[Trajectory], tolerance: float) -> Trajectory:
 
 
 def _eliminated(coarse: Array, fine: Array, ratio: float) -> Array:
-    """The result without the error that two results have in this ratio."""
     return fine + (fine - coarse) / (ratio - 1.0)

@@ -17,7 +17,6 @@ _NODE = Ref("node", "joint angles")
 
 
 def parts(scene: Scene, loads: Loads) -> list[Part]:
-    """Everything the engine has of this scene, in the order it is built."""
     moving = scene.moving_coordinates
     node = {
         "referenceCoordinates": [0.0] * len(moving),

@@ -22,15 +22,11 @@ _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 
 @dataclass(frozen=True)
 class TaylorSettings(Settings):
-    """Of heyoka's adaptive Taylor method."""
-
     tolerance: float = number(_EPS, above=0.0, doc="of the local error, absolute and relative")
 
 
 @dataclass(frozen=True)
 class ReferenceSettings(Settings):
-    """Of the two runs in quad precision."""
-
     tolerance: float = number(1e-33, above=0.0, doc="of the run that is kept")
     check_tolerance: float = number(1e-30, above=0.0, doc="of the run whose distance the uncertainty follows from")
 
@@ -46,16 +42,12 @@ def _absolute(default: float) -> Any:
 
 @dataclass(frozen=True)
 class Dop853Settings(Settings):
-    """Of SciPy's DOP853."""
-
     relative_tolerance: float = _relative(3e-14)
     absolute_tolerance: float = _absolute(1e-16)
 
 
 @dataclass(frozen=True)
 class RadauSettings(Settings):
-    """Of SciPy's Radau."""
-
     relative_tolerance: float = _relative(1e-8)
     absolute_tolerance: float = _absolute(1e-11)
 
@@ -79,7 +71,6 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
 
 
 def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float) -> Method:
-    """SciPy's method of that name."""
 
     def build(scene: Scene, chosen: Any) -> Solver:
         from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator

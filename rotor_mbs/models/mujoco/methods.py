@@ -20,8 +20,6 @@ _MAX_STEPS = 1e10
 
 @dataclass(frozen=True)
 class Rk4Settings(Settings):
-    """Classical Runge-Kutta, order 4."""
-
     step: float = step(2.5e-4)
 
 

@@ -65,7 +65,6 @@ def load_segments(scene: Scene) -> tuple[Segment, ...]:
 
 
 def joint_name(coordinate: int) -> str:
-    """Name of the hinge of a coordinate: "rotor", or "pitch i"."""
     return f"pitch {coordinate}" if coordinate else "rotor"
 
 
@@ -100,7 +99,6 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
 
 
 def text(root: ET.Element) -> str:
-    """The model as XML text, indented."""
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -167,7 +165,6 @@ def _possible(moments: list[float]) -> list[float]:
 
 
 def numbers(*values: float) -> str:
-    """Numbers with all their digits."""
     return " ".join(repr(float(value)) for value in values)
 
 

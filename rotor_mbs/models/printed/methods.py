@@ -83,7 +83,6 @@ class PrintedSolver:
         return trajectory
 
     def _accelerations(self, time: Array, states: Array) -> Array:
-        """(n, 1 + blades) rad/s² by the equations that are run; zero of a fixed pitch."""
         import numpy as np
 
         accelerations = np.zeros((len(time), len(self._scene.initial_angles)))
