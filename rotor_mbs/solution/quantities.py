@@ -69,7 +69,6 @@ class Plot:
 class Quantity:
     """An array that a run may have.
 
-
     Examples
     --------
     >>> angular_momentum = Quantity(

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.methods.base import Ladder, Method, Solver, late, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
-from rotor_mbs.models.equation_items import equation_items
-from rotor_mbs.models.ode45_settings import Ode45Settings
+from rotor_mbs.models.equations import Ode45Settings, equation_items
 
 if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.scenario.scene import Scene
