@@ -102,7 +102,6 @@ class System:
 
     @property
     def coordinates(self) -> Array:
-        """(n,) displacement coordinates of the initial state."""
         return np.array(self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Initial))
 
     @coordinates.setter
@@ -121,12 +120,31 @@ class System:
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         settings = _settings(scheme, data.ODE2Size(), data.AEsize())
-        trials = self._limit_trials(scheme) if scheme.trial_steps else []
+        trials: list[float] = []
+        if scheme.trial_steps:
+
+            def before_trial(_system: object, time: float) -> bool:
+                trials.append(time)
+                if len(trials) > scheme.trial_steps:
+                    raise RuntimeError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
+                return True
+
+            self._mbs.SetPreStepUserFunction(before_trial)
         total = Integration(True)
         for interval in intervals:
             before_interval(interval)
             if interval is intervals[0] and scheme.lacks_initial_accelerations:
-                self._find_initial_accelerations()
+                # What sensors of accelerations read at the initial state: only an implicit solver computes it.
+                plain, implicit = _engine.SimulationSettings(), _engine.MainSolverImplicitSecondOrder()
+                plain.solution.file.write = False
+                with contextlib.suppress(
+                    _engine.ExudynError, RuntimeError
+                ):  # a singular start: the run itself will fail
+                    implicit.InitializeSolver(self._mbs, plain)
+                    for name in self._of_accelerations:
+                        values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
+                        self._initial_values[name] = np.array(values, dtype=float)
+                    implicit.FinalizeSolver(self._mbs, plain)
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
             _schedule(settings, scheme, interval, rows_between)
@@ -140,19 +158,7 @@ class System:
             settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, interval.end - interval.start)
         return total
 
-    def _find_initial_accelerations(self) -> None:
-        """What sensors of accelerations read at the initial state: only an implicit solver computes it."""
-        settings, solver = _engine.SimulationSettings(), _engine.MainSolverImplicitSecondOrder()
-        settings.solution.file.write = False
-        with contextlib.suppress(_engine.ExudynError, RuntimeError):  # of a singular start: the run itself will fail
-            solver.InitializeSolver(self._mbs, settings)
-            for name in self._of_accelerations:
-                values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
-                self._initial_values[name] = np.array(values, dtype=float)
-            solver.FinalizeSolver(self._mbs, settings)
-
     def _solve(self, solver: Any, settings: Any) -> str:
-        """Why the engine says it failed; empty where it says it did not."""
         try:
             if solver.SolveSystem(self._mbs, settings):
                 return ""
@@ -164,18 +170,6 @@ class System:
                 return MESSAGE
             reason = _one_line(str(exc))
         return reason or _one_line(solver.GetErrorString()) or "the engine gave no reason"
-
-    def _limit_trials(self, scheme: Scheme) -> list[float]:
-        trials: list[float] = []
-
-        def before_trial(_system: object, time: float) -> bool:
-            trials.append(time)
-            if len(trials) > scheme.trial_steps:
-                raise RuntimeError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
-            return True
-
-        self._mbs.SetPreStepUserFunction(before_trial)
-        return trials
 
 
 # Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization costs less than a dense

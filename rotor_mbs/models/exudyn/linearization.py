@@ -65,7 +65,6 @@ def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
 
 
 def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
-    """(n, free): difference quotients of C λ along each column of N."""
     start = system.coordinates
     here = system.linearized(_STEPS[0]).C @ multipliers
     columns = []

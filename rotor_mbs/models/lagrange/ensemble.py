@@ -39,7 +39,6 @@ _OBSERVED_PER_CALL = 1024
 
 
 def empty_block(scenes: Sequence[Scene]) -> RunBlock:
-    """Room for their samples, all of which are to be put there."""
     first, runs = scenes[0], len(scenes)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
     blades = len(first.blades)
@@ -92,7 +91,6 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
 
 def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
-    """Compiled once per computer (engine's cache on disk)."""
 
     def make() -> Any:
         equations, _ = build_system(example, in_momenta=True)
@@ -103,7 +101,6 @@ def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) ->
 
 
 def _momenta(example: Scene) -> Any:
-    """Compiled code from angles and rates to momenta."""
     engine, parameters = heyoka(), Parameters()
     form, _ = equation_numbers(example, parameters)
     angles, rates = state_symbols(form)
@@ -240,7 +237,6 @@ class _Group:
 
 
 def _propagate(block: RunBlock, group: _Group) -> None:
-    """All its runs into the block."""
     width = group.integrator.state.shape[1]
     runs = len(group.scenes)
     chunk = max(_SAMPLES_PER_CHUNK // len(group.times) // width, 1) * width

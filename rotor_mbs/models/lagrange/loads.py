@@ -41,7 +41,6 @@ def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
 def _loads(
     scene: Scene, times: Array, angles: Numbers, rates: Numbers, convert: Convert, sin: Function, cos: Function
 ) -> dict[str, Array]:
-    """From a motion in numbers of a kind that `convert` makes, and `sin` and `cos` take."""
     moving, applied = scene.moving_coordinates, values_before(load_segments(scene), times)
     accelerations = np.zeros_like(angles)
     of_moving = closed_form.accelerations(

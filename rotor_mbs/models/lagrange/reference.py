@@ -111,7 +111,6 @@ def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
-    """From one more run for each initial value, perturbed."""
     moving = scene.moving_coordinates
 
     def states(start: Scene) -> Array:

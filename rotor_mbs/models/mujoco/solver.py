@@ -54,7 +54,6 @@ class MujocoSolver:
         self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
 
     def integrate(self) -> Integration:
-        """From the initial state, every time; bit for bit the same."""
         scene, self._rows = self._scene, []
         self.engine.start(
             *([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates))
@@ -92,7 +91,6 @@ class MujocoSolver:
         self._rows.append(_Row(time, angles.copy(), rates.copy(), segment, is_sample))
 
     def observe(self) -> Trajectory:
-        """Samples of the last integration, cut before the first that is not finite."""
         scene, rows = self._scene, self._rows
         angles, rates = (np.array([getattr(row, name) for row in rows]) for name in ("angles", "rates"))
         at = [i for i, row in enumerate(rows) if row.is_sample]
