@@ -89,9 +89,11 @@ def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[
             for row in rows:
                 cells: list[Cell] = []
                 for column in columns:
-                    entry = places.get((row, column))
-                    printed = Markup() if entry is None else _mathml(entry.printed)
-                    cells.append((printed, None if entry is None or entry.agrees else _mathml(entry.right)))
+                    cell = places.get((row, column))
+                    if cell is None:
+                        cells.append((Markup(), None))
+                    else:
+                        cells.append((_mathml(cell.printed), None if cell.agrees else _mathml(cell.right)))
                 matrix.append(cells)
             shown.append((equation, matrix))
     return shown
