@@ -155,7 +155,7 @@ def test_a_bench_goes_on_where_it_was(tmp_path: Path) -> None:
     assert bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick).status == 0
     first = curves(tmp_path)
     again = bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick)
-    assert "0 curves measured, 1 already stored" in again.out
+    assert "0 scenes measured, 1 already stored" in again.out
     assert bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", "-m", "exudyn_tree/rk67", *quick).status == 0
     second = curves(tmp_path)
     assert set(second) == {"lagrange/dop853", "exudyn_tree/rk67"}
