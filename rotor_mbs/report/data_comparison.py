@@ -197,10 +197,7 @@ def verdict_of(record: Record) -> DataVerdict:
 
 
 def error_panels(record: Record, *, per_growth: bool = False) -> Panels:
-    """The error of each channel over time, on a logarithmic axis: in rad, or per unit of growth with the tolerance.
-
-    Angles, or rates where the data have no angles.
-    """
+    """The error of each channel over time, on a logarithmic axis: in rad, or per unit of growth with the tolerance."""
     verdict, time = verdict_of(record), record.arrays["time"]
     channels = _drawn(verdict)
     series = []

@@ -119,10 +119,7 @@ class ModePlots:
         self._modes = modes
 
     def __call__(self) -> Panels:
-        """Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of the speed.
-
-        Below, their change since the lowest speed. Raises InputError without speeds.
-        """
+        """Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of the speed."""
         modes = self._rotation()
         panel = panels((2.9, 1.7), SPEED_AXIS)
         frequencies, speeds = modes.damped_frequencies, modes.speeds

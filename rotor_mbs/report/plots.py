@@ -37,10 +37,7 @@ class Series(NamedTuple):
 
 
 def motion(time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None) -> Panels:
-    """Angles (rad), then rates (rad/s), both (n, coordinates); either may be missing.
-
-    The rotor has axes of its own: beside pitches of many turns it is a flat line.
-    """
+    """Angles (rad), then rates (rad/s), both (n, coordinates); either may be missing."""
     drawn: list[tuple[str, Array, int]] = []
     for name, values in (("angle (rad)", angles), ("rate (rad/s)", rates)):
         if values is not None:
@@ -164,10 +161,7 @@ def paths(tip: Array) -> Panels:
 
 
 def draw_paths(axes: Any, tip: Array) -> None:
-    """The paths of `tip` (n, blades, 3) m with the blades at the start (dashed) and at the end (solid), and the shaft.
-
-    Axes of a stated length give the scale.
-    """
+    """The paths of `tip` (n, blades, 3) m, the blades at the start (dashed) and at the end (solid), shaft and scale."""
     reach = 1.04 * float(np.linalg.norm(tip, axis=2).max())
     axes.set(xlim=(-0.95 * reach, 0.95 * reach), ylim=(-1.02 * reach, 1.02 * reach), aspect="equal")
     axes.set_axis_off()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -64,7 +64,7 @@ class RunPlots:
 
     def error(self) -> Panels:
         """Largest angle error (rad) against the reference over time. Raises InputError where there is none."""
-        return error_figure({self._run.method: self._run}, self._reference)
+        return ComparisonPlots({self._run.method: self._run}, self._reference).error()
 
     def tips(self) -> Panels:
         """Paths of the blade tips (m). Raises InputError where the scene does not ask for them."""
@@ -76,7 +76,7 @@ class ComparisonPlots:
     """Figures of several runs of one scene."""
 
     def __init__(self, runs: Mapping[str, Solution], reference: Trajectory | None) -> None:
-        self._runs, self._reference = runs, reference
+        self._runs, self._reference = list(runs.values()), reference
 
     def __call__(self) -> Panels:
         """Draws `error`."""
@@ -84,41 +84,32 @@ class ComparisonPlots:
 
     def error(self) -> Panels:
         """Largest angle error (rad) of each run against the reference over time. Raises InputError without one."""
-        return error_figure(self._runs, self._reference)
+        if self._reference is None:
+            raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
+        series = self._series([angle_error(run.trajectory, self._reference) for run in self._runs])
+        return self._with_legend(plots.errors(series, "largest angle error (rad)", horizon(self._reference)))
 
     def rotor(self) -> Panels:
         """The rotor's angle (rad) by each method over time."""
-        runs = list(self._runs.values())
-        return _with_legend(
-            plots.lines([("rotor angle (rad)", [_series(run, run.angles[:, 0]) for run in runs])]), runs
-        )
+        series = self._series([run.angles[:, 0] for run in self._runs])
+        return self._with_legend(plots.lines([("rotor angle (rad)", series)]))
 
     def energy_error(self) -> Panels:
         """|energy less work, less its start| of each run, of the scene's energy scale. Raises InputError without."""
-        series = []
-        for run in self._runs.values():
+        errors = []
+        for run in self._runs:
             scale = energy_scale(run.scene, run.trajectory)
-            series.append(_series(run, np.abs(_quantity(run, "energy_error")) / (scale or 1.0)))
-        return _with_legend(plots.errors(series, "energy error, of the energy scale"), self._runs.values())
+            errors.append(np.abs(_quantity(run, "energy_error")) / (scale or 1.0))
+        return self._with_legend(plots.errors(self._series(errors), "energy error, of the energy scale"))
 
+    def _series(self, values: Sequence[Array]) -> list[Series]:
+        pairs = zip(self._runs, values, strict=True)
+        return [Series(_some(run.time)[: len(array)], array, look_of(run.method)) for run, array in pairs]
 
-def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> Panels:
-    """Largest angle error (rad) of each run over time (s), on a logarithmic axis, with the horizon."""
-    if reference is None:
-        raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
-    series = [_series(run, angle_error(run.trajectory, reference)) for run in runs.values()]
-    picture = plots.errors(series, "largest angle error (rad)", horizon(reference))
-    return _with_legend(picture, runs.values())
-
-
-def _with_legend(picture: Panels, runs: Iterable[Solution]) -> Panels:
-    looks = {label_of(run.method): look_of(run.method) for run in runs}
-    canvas.legend(picture.axes[0], list(looks.items()))
-    return picture
-
-
-def _series(run: Solution, values: Array) -> Series:
-    return Series(_some(run.time)[: len(values)], values, look_of(run.method))
+    def _with_legend(self, panels: Panels) -> Panels:
+        looks = {label_of(run.method): look_of(run.method) for run in self._runs}
+        canvas.legend(panels.axes[0], list(looks.items()))
+        return panels
 
 
 def _some(time: Array) -> Array:

@@ -92,11 +92,7 @@ def cost_picture(curves: Sequence[Record], caption: str, legend: Sequence[Legend
 
 
 def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
-    """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the left.
-
-    Error on the horizontal axis, falling to the right, so that accuracy grows to the right; time on the vertical one.
-    small: one of many side by side, with front and curves alone.
-    """
+    """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the left."""
     panels = canvas.panels((height,), "largest angle error up to the horizon (rad)")
     axes = panels.axes[0]
     points = [work_precision.points(curve, with_setup=with_setup) for curve in curves]
@@ -257,10 +253,7 @@ def _point_table(curves: Sequence[Record]) -> PageTable:
 
 
 def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -> PageTable:
-    """Every point that is not on a curve, with the reason; one row for all that the budget left out of a curve.
-
-    Then the methods with a ladder that cannot represent the scene.
-    """
+    """Every point that is not on a curve, with the reason; one row for all that the budget left out of a curve."""
     rows: list[Row] = []
     for curve in curves:
         left_out = [i for i, status in enumerate(curve.statuses) if status == "left_out"]

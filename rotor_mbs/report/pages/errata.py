@@ -1,7 +1,4 @@
-"""The errata page: the errors in print, every entry that was checked, the effect of each erratum on each scene.
-
-Formulas of the paper's plain notation, "c² m c3² - d s2" with c3 the cosine of q3, and whole matrices are MathML.
-"""
+"""The errata page: the errors in print, every entry that was checked, the effect of each erratum on each scene."""
 
 from __future__ import annotations
 
@@ -89,11 +86,9 @@ def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[
             for row in rows:
                 cells: list[Cell] = []
                 for column in columns:
-                    cell = places.get((row, column))
-                    if cell is None:
-                        cells.append((Markup(), None))
-                    else:
-                        cells.append((_mathml(cell.printed), None if cell.agrees else _mathml(cell.right)))
+                    checked = places.get((row, column))
+                    printed = Markup() if checked is None else _mathml(checked.printed)
+                    cells.append((printed, None if checked is None or checked.agrees else _mathml(checked.right)))
                 matrix.append(cells)
             shown.append((equation, matrix))
     return shown

@@ -1,7 +1,4 @@
-"""The paper's figures: what each shows, and how it is drawn, for a manuscript and on the page that goes through them.
-
-Both set the models side by side.
-"""
+"""The paper's figures, each model side by side, for a manuscript and on the page that goes through them."""
 
 from __future__ import annotations
 
@@ -84,10 +81,7 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
 
 
 def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
-    """The runs of each picture by label, row by row: by letter, then by key of HEADINGS.
-
-    A figure of torques is one row, with the runs of all its scenes in one picture; elsewhere a picture has one run.
-    """
+    """The runs of each picture by label, row by row: by letter, then by key of HEADINGS."""
     rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
     for label, name in figure.panels:
         letter = "" if figure.kind == TORQUES else label

@@ -156,11 +156,7 @@ def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels
 
 
 def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:
-    """Scene by method, the largest angle error before the horizon; None where no run was compared with a reference.
-
-    methods: (label, name); rows: (scene, page, cells), of a cell the number of its shade, the error, the mark of the
-    status, and a text that is read out; key: the marks that occur, with their meaning
-    """
+    """Scene by method, the largest angle error before the horizon; None where no run was compared with a reference."""
     names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
     methods = run_selection.in_catalogue_order(names)
     if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claim_study import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.rehydrate import scene_of
@@ -48,7 +47,15 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
     pages = ["", *context.files.values(), ""]
     place = pages.index(context.files[name])
     claims = [claim for claim in context.claims if name in claim.published.scenes]
+    study = context.study
+    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims, study.shares if study else None)]
+    # Where a number is rounding error, what it is under other conditions.
+    if study is not None and any(claim.published.rounding for claim in claims):
+        tables += claim_tables.trial_tables(study.numbers)
     condition = context.conditions.get(name.rpartition("/")[2])
+    notes = [condition] if condition else []
+    if study is not None and any(not claim.published.is_number for claim in claims):
+        notes.append(claim_tables.study_note(study.shares))
     figures = str(scene.attributes.get("figures", ""))
     parsed = scene_of(scene)
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
@@ -59,7 +66,7 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
         "toml": str(scene.attributes.get("scene_toml", "")),
         "source": opening_comment(scene),
         "failures": Section(tables=[scene_tables.failure_table(scene)]),
-        "claims": _claims_section(claims, context.study, [condition] if condition else []),
+        "claims": Section(tables=[table for table in tables if table.rows], notes=notes),
         "viewer": viewer(scene, {label_of(run.method): run for run in sides.values()}),
         "key": key_picture(list(sides.values()), claims, horizon),
         "paths": _tips_section(parsed, list(sides.values()), horizon),
@@ -90,17 +97,6 @@ def opening_comment(scene: StoredScene) -> str:
     return " ".join(lines).strip()
 
 
-def _claims_section(claims: Sequence[Claim], study: ClaimStudy | None, notes: list[str]) -> Section:
-    """The numbers and claims about a scene; where a number is rounding error, what it is under other conditions."""
-    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims, study.shares if study else None)]
-    if study is not None and any(claim.published.rounding for claim in claims):
-        tables += claim_tables.trial_tables(study.numbers)
-    tables = [table for table in tables if table.rows]
-    if study is not None and any(not claim.published.is_number for claim in claims):
-        notes = [*notes, claim_tables.study_note(study.shares)]
-    return Section(tables=tables, notes=notes)
-
-
 def key_picture(
     sides: Sequence[StoredRun], claims: Sequence[Claim], horizon: float | None, name: str = "key"
 ) -> Picture | None:
@@ -122,13 +118,10 @@ def key_picture(
     for run in runs:  # the printed model is dashed upon the corrected one
         line = "-" if run.method == REFERENCE or is_corrected(run.method) else "--"
         looks[run.method] = Look(look_of(run.method).colour, line, "")
-    panels_of = [
-        (
-            f"{labels[i]} angle (rad)",
-            [Series(run.array("time"), run.array("angles")[:, i], looks[run.method]) for run in reversed(runs)],
-        )
-        for i in shown
-    ]
+    panels_of = []
+    for i in shown:
+        series = [Series(run.array("time"), run.array("angles")[:, i], looks[run.method]) for run in reversed(runs)]
+        panels_of.append((f"{labels[i]} angle (rad)", series))
     marks = []
     for claim in claims:
         item, of = claim.published, claim.published.of
@@ -337,10 +330,7 @@ def _energy_section(sides: Runs, drawn: Runs, horizon: float | None) -> Section:
 
 
 def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
-    """Torque and power at the shaft; pitches, their commands and the power of their actuators.
-
-    Empty where nothing drives the scene, or the run lacks angles or rates.
-    """
+    """Torque and power at the shaft; pitches, their commands and the power of their actuators."""
     if scene is None or run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
         return Section()
 
