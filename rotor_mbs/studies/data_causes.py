@@ -19,9 +19,8 @@ from rotor_mbs.analysis.data_verdict import carried_errors
 from rotor_mbs.errors import RotorError
 from rotor_mbs.foreign.trajectory import ForeignData
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.models.lagrange.at_times import motion_at
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations
-from rotor_mbs.models.lagrange.reference import TimedReference
+from rotor_mbs.models.lagrange.reference import TimedReference, motion_at
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon, running_growth
 from rotor_mbs.solution.trajectory import Array, Trajectory

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from rotor_mbs.methods.time_limit import OutOfTimeError
-from rotor_mbs.models.lagrange.at_times import LEFT_OUT, at_azimuths
+from rotor_mbs.models.lagrange.reference import LEFT_OUT, at_azimuths
 from rotor_mbs.models.ode45 import Ode45Settings
 from rotor_mbs.models.printed.matrices import Errata
 from rotor_mbs.models.printed.methods import PrintedModel

@@ -13,14 +13,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.linearization import (
-    Jet,
-    cosine,
-    holding_torque,
-    linearize,
-    sine,
-    steady_rotation,
-)
+from rotor_mbs.models.lagrange.linearization import Jet, cosine, holding_torque, linearize, sine, steady_rotation
 from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.models.lagrange.taylor import compiled
