@@ -181,7 +181,6 @@ _TARGETS = (
             "angle_error",
             "energy_scale",
             "_angle_errors",
-            "_relative_error",
             "_motion_sizes",
             "HORIZON_GROWTH",
         ),
