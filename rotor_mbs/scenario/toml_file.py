@@ -80,13 +80,15 @@ def shown_path(path: Path) -> str:
 
 def shown_key(path: KeyPath) -> str:
     """The path as `Scene.replace` and sweeps take it, entries counted from 0: blade[1].mass; odd names in quotes."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{_shown_name(part)}" for part in path)[1:]
-
-
-def _shown_name(name: str) -> str:
-    if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
-        return name
-    return json.dumps(name if len(name) <= 60 else name[:57] + "...")
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        elif re.fullmatch(r"[A-Za-z0-9_-]{1,60}", part):
+            text += f".{part}"
+        else:
+            text += "." + json.dumps(part if len(part) <= 60 else part[:57] + "...")
+    return text[1:]
 
 
 def parse_key(text: str) -> KeyPath:

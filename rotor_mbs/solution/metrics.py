@@ -122,7 +122,13 @@ def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
     metrics = {"horizon_s": horizon(reference)}
     if until > 1:
         metrics["angle_error_max"] = float(error[:until].max())
-        metrics["angle_error_per_growth"] = float(_relative_error(run, reference)[:until].max())
+        # The larger of the rotor's and the pitches' angle errors, each of what an error of 1 at the start would have
+        # become: the growth times how far the rotor has turned from its start, or the largest pitch (at least 1).
+        n = len(error)
+        errors = np.abs(run.angles[:n] - reference.angles[:n])
+        rotor, pitch = (size[:n] for size in _motion_sizes(reference))
+        relative = np.maximum(errors[:, 0] / rotor, errors[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
+        metrics["angle_error_per_growth"] = float(relative[:until].max())
     if len(error) > 1:
         metrics["angle_error_whole"] = float(error.max())
         if len(run.time) == len(reference.time):
@@ -141,17 +147,6 @@ def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
                 slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
                 metrics["zero_pitch_growth_per_s"] = float(slope)
     return metrics
-
-
-def _relative_error(run: Trajectory, reference: Trajectory) -> Array:
-    """(common samples,) Larger of the rotor's and the pitches' angle errors, each of what an error of 1 at the start
-    would have become: the growth times how far the rotor has turned from its start, or the largest pitch (at least 1).
-    """
-    n = min(len(run.time), len(reference.time))
-    error = np.abs(run.angles[:n] - reference.angles[:n])
-    rotor, pitch = (size[:n] for size in _motion_sizes(reference))
-    relative: Array = np.maximum(error[:, 0] / rotor, error[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
-    return relative
 
 
 def _motion_sizes(reference: Trajectory) -> tuple[Array, Array]:

@@ -100,14 +100,6 @@ def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) ->
     return compiled(("batch", tolerance, structure), make)
 
 
-def _momenta(example: Scene) -> Any:
-    engine, parameters = heyoka(), Parameters()
-    form, _ = equation_numbers(example, parameters)
-    angles, rates = state_symbols(form)
-    rows = [engine.expression(0.0) + row for row in hamilton.momenta(angles, rates, form, engine.sin, engine.cos)]
-    return engine.cfunc(rows, [*angles, *rates], compact_mode=is_compact(example))
-
-
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
     """(blades, 3) its tips in m, numbers that come after those of the equations; [] where none are asked for."""
     if not scene.wants("tip"):
@@ -151,15 +143,7 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 
 
 class _Group:
-    """Runs of one structure, and the compiled code for them.
-
-    Attributes
-    ----------
-    places, scenes : of each run, in the block
-    initial : (variables, k) state
-    times : (samples, k) s
-    numbers : (parameters, k) of the rotor, then the pitches that are fixed
-    """
+    """Runs of one structure, and the compiled code for them; places: of each run in the block."""
 
     def __init__(
         self, places: list[int], scenes: list[Scene], rotors: Sequence[_RotorNumbers], tolerance: float
@@ -169,7 +153,16 @@ class _Group:
         self.integrator = _integrator(structure, tolerance, example)
         outputs = example.wants("tip"), example.wants("energy")
         self.observables = compiled(("observables", *outputs, structure), lambda: _observables(example))
-        self.momenta = compiled(("momenta", structure), lambda: _momenta(example))
+
+        def momenta() -> Any:
+            engine, parameters = heyoka(), Parameters()
+            form, _ = equation_numbers(example, parameters)
+            symbols, speeds = state_symbols(form)
+            rows = hamilton.momenta(symbols, speeds, form, engine.sin, engine.cos)
+            rows = [engine.expression(0.0) + row for row in rows]
+            return engine.cfunc(rows, [*symbols, *speeds], compact_mode=is_compact(example))
+
+        self.momenta = compiled(("momenta", structure), momenta)
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
@@ -177,6 +170,7 @@ class _Group:
         self.initial = np.zeros((self.integrator.state.shape[0], len(scenes)))
         self.initial[: 2 * len(self.moving)] = np.concatenate([angles[self.moving], rates[self.moving]])
         self.times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), example.samples)
+        # (parameters, k) of the rotor, then the pitches that are fixed
         self.numbers = np.concatenate([np.stack([numbers for numbers, _ in rotors], axis=1), angles[fixed]])
 
     def solve(self, columns: Sequence[int]) -> tuple[Array, Array, list[Integration]]:

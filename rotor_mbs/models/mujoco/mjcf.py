@@ -9,13 +9,10 @@ slope in N m/s. So a torque that is linear in time enters every stage of a step 
 angle is its `springref` where it is constant; where it changes, it is the activation (rad) of an actuator whose gain is
 the spring's stiffness.
 
-Least inertia
--------------
-MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less. In this text a point
-mass, and a hub without inertia, therefore have `LEAST` = 2e-15 kg or kg m². `adapter.Engine` sets these values to zero
-in the compiled model, where they are allowed, so this package's runs have no such error. A file that MuJoCo itself
-loads keeps them: relative to the moment J of a blade about its pitch axis that is LEAST / J, 2e-17 and below
-round-off for the paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
+MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less: in this text a point mass,
+and a hub without inertia, have `LEAST`. `adapter.Engine` sets them to zero in the compiled model. A file that MuJoCo
+itself loads keeps them, an error of LEAST / J for a blade's moment J about its pitch axis: below round-off for the
+paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
 """
 
 from __future__ import annotations

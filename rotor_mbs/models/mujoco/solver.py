@@ -15,14 +15,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
 from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
 from rotor_mbs.solution.quantities import named_loads
-from rotor_mbs.solution.trajectory import (
-    Array,
-    Integration,
-    Trajectory,
-    all_coordinates,
-    finite_samples,
-    sample_times,
-)
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_samples, sample_times
 
 # rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the step's square.
 _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)

@@ -99,16 +99,14 @@ class PrintedModel:
     def items(self, scene: Scene) -> list[BuiltItem]:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
         self._rotor(scene)
-        return equation_items(scene, self._sources(len(scene.blades)))
-
-    def _sources(self, blades: int) -> tuple[str, str]:
-        """Where in the paper the rotor's row and a pitch's stand, in the form that is run."""
+        # Where in the paper the rotor's row and a pitch's stand, in the form that is run.
         if self._errata:
             left = " ".join(name.upper() for name, is_left in asdict(self._errata).items() if is_left)
-            return (f"(24)-(38) derived anew, {left} left in",) * 2
-        if blades == 1:
-            return "(33), rotor row", "(33), pitch row"
-        return "(42)-(45), (52), (56) with its factor multiplied in", "(46)-(51), (53)-(56)"
+            return equation_items(scene, (f"(24)-(38) derived anew, {left} left in",) * 2)
+        if len(scene.blades) == 1:
+            return equation_items(scene, ("(33), rotor row", "(33), pitch row"))
+        rows = "(42)-(45), (52), (56) with its factor multiplied in", "(46)-(51), (53)-(56)"
+        return equation_items(scene, rows)
 
     def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
