@@ -44,7 +44,7 @@ def test_every_function_takes_a_scene_by_its_name(tmp_path: Path) -> None:
     run = rm.run("paper/fig08", "lagrange/dop853")
     assert run.scene == rm.scene("paper/fig08")
     assert rm.compare("paper/fig08", "lagrange/dop853").scene == run.scene
-    assert rm.compare_data({"time": run.time, "angles": run.angles}, "paper/fig08").agrees
+    assert rm.compare({"time": run.time, "angles": run.angles}, "paper/fig08").agrees
     assert rm.modes("paper/fig08").scene == "paper/fig08"
     assert rm.sweep("paper/fig08", {"gravity": [0.0]}, methods="lagrange/dop853").statuses == {"ok": 1}
     assert [path.name for path in rm.export("paper/fig08", "csv", tmp_path / "a.csv")] == ["a.csv"]
@@ -119,7 +119,7 @@ def test_a_comparison_is_saved_opened_and_rendered(study: rm.Comparison, tmp_pat
 
 def test_a_file_of_records_alone_lists_them(tmp_path: Path) -> None:
     run = rm.run(rm.scene("paper/fig03").replace(duration=0.1, samples=11), "lagrange/dop853")
-    rm.compare_data({"t": run.time, "rotor": run.angles[:, 0]}, run.scene).save(tmp_path / "c.h5")
+    rm.compare({"t": run.time, "rotor": run.angles[:, 0]}, run.scene).save(tmp_path / "c.h5")
     lines = repr(rm.open(tmp_path / "c.h5")).splitlines()
     assert lines[0].endswith("c.h5: 0 scenes, 0 runs, 1 records")
     assert lines[1:] == ["  comparison/paper/fig03/data/trajectory"]

@@ -103,7 +103,7 @@ class Place:
     row: np.dtype[np.void]
 
     def write(self, first: int, rows: Rows) -> None:
-        """Store the rows from number `first` on, their statuses last.
+        """Store the rows from number `first` on, their statuses last; meanwhile they are missing.
 
         Raises
         ------
@@ -115,6 +115,9 @@ class Place:
         with saving(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: is another file by now")
+            for name, status in statuses.items():
+                file.seek(self.offsets[name] + first - self.first)
+                file.write(np.full(len(status), MISSING, np.int8).data)
             for name, values in columns.items():
                 file.seek(self.offsets[name] + (first - self.first) * self.row[name].itemsize)
                 file.write(np.ascontiguousarray(values).data)
