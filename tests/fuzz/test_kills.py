@@ -112,7 +112,7 @@ def is_known(name: str) -> bool:
     outputs = "|".join(map(re.escape, OUTPUTS))
     stems = "|".join(re.escape(Path(output).stem) for output in OUTPUTS)
     known = (
-        rf"[abs]\.toml|whole\.h5|log|({outputs})(\.full\.h5)?(\.parts)?|({stems})(-report|\.sha256)|\..*\.[0-9]+\.tmp"
+        rf"[abs]\.toml|whole\.h5|log|({outputs})(\.full\.h5)?|({stems})(-report|\.sha256)|\..*\.([0-9]+\.tmp|lock)"
     )
     return bool(re.fullmatch(known, name))
 
@@ -144,7 +144,7 @@ def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, .
     for name in names:
         finish(disturbed, COMMANDS[name])
         finish(undisturbed, COMMANDS[name])
-    assert not [path.name for path in disturbed.iterdir() if path.name.endswith((".tmp", ".parts", ".full.h5"))]
+    assert not [path.name for path in disturbed.iterdir() if path.name.endswith((".tmp", ".lock", ".full.h5"))]
     if "run" in names:
         assert samples(disturbed / "run.h5") == samples(undisturbed / "run.h5") != {}
     if "sweep" in names:

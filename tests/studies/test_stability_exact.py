@@ -38,9 +38,7 @@ def some_quick(names: Sequence[str]) -> list[object]:
     return [name if name in QUICK else pytest.param(name, marks=pytest.mark.full) for name in names]
 
 
-@pytest.mark.parametrize(
-    "hub", ["1e3", "1e0", "1e-3", "1e-6"]
-)
+@pytest.mark.parametrize("hub", ["1e3", "1e0", "1e-3", "1e-6"])
 def test_through_the_singular_pitch(hub: str) -> None:
     """Time and rotor angle at every tenth pitch that the run passes, against 40-digit integrals over the pitch."""
     one = scene(f"extreme/passage-{hub}")
