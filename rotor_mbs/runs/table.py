@@ -379,15 +379,5 @@ def stored_tables(path: Path) -> dict[str, StoredTable]:
     """All tables of a file by their group. Raises StoreError where it is damaged or another program's."""
     with files.open_file(path) as file, files.reading(path):
         _refuse_changes(file, "")
-        return {group: stored_table(file, group) for group in _groups_with_runs(file, "", set())}
-
-
-def _groups_with_runs(group: Any, path: str, seen: set[Any]) -> Iterator[str]:
-    if group in seen:
-        raise StoreError(f"{group.file.filename}: {path} is another name of a group; allowed: one name of each")
-    seen.add(group)
-    if "run" in group:
-        yield path
-    for name, item in files.members(group):
-        if files.is_group(item):
-            yield from _groups_with_runs(item, f"{path}/{name}" if path else name, seen)
+        paths = [str(group.name).strip("/") for group in files.groups_in(file) if "run" in group]
+        return {path: stored_table(file, path) for path in paths}
