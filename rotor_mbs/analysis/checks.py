@@ -21,7 +21,7 @@ from rotor_mbs.analysis.run_integrity import copies, settings_faults, steps_off
 from rotor_mbs.analysis.run_selection import PRINTED
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, methods
-from rotor_mbs.runs.files import DIGESTS, reading
+from rotor_mbs.runs.files import reading
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -80,7 +80,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
 
     Parameters
     ----------
-    results : the file.
+    results : the file, opened with verify=False: a row that has changed is judged, too.
     frozen : the shipped references.
     bounds : the bounds; those that methods declare go before them.
 
@@ -101,11 +101,12 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
             except StoreError:
                 reference = None  # fails with each of them
             for run in scene.runs.values():
-                damaged = ["row"] if run.is_damaged else []
-                checks.append(_integrity(scene.name, run.method, damaged, bounds))
+                hint = "its row changed after it was written" if run.is_damaged else "as written"
+                where = Where(scene.name, run.method, "row")
+                checks.append(make_check(bounds, "integrity", where, run.is_damaged, "rows", hint))
                 try:
                     # Whatever goes wrong with a run that is known to be damaged is that damage.
-                    with reading(str(scene.name), run.method) if damaged else nullcontext():
+                    with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
                         checks += _of_run(run, own, rehydrate(scene, run, reference), _motion_ends(scene))
                 except StoreError as exc:
                     checks.append(_of(run, "complete", "all", math.nan, own, "faults", str(exc)))
@@ -125,13 +126,6 @@ def _is_shipped(scene: StoredScene) -> bool:
 
 def _of(run: StoredRun, name: str, channel: str, value: float, bounds: Bounds, unit: str, hint: str) -> Check:
     return make_check(bounds, name, Where(run.scene, run.method, channel), value, unit, hint)
-
-
-def _integrity(scene: str, method: str, parts: Sequence[str], bounds: Bounds) -> Check:
-    hint = f"{', '.join(parts)} changed after it was written" if parts else "as written"
-    if list(parts) == [DIGESTS]:
-        hint = "it has no digests: they were removed, or an earlier version wrote it"
-    return make_check(bounds, "integrity", Where(scene, method, "digests"), len(parts), "parts", hint)
 
 
 def _copies(scene: StoredScene, bounds: Bounds) -> list[Check]:

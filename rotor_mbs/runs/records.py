@@ -196,7 +196,7 @@ def read_records(path: Path, *kinds: str) -> list[Record]:
 
 def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
     """The rows of a table that belong to one curve, one ladder, or one method and scene."""
-    stored = file.tables[kind]
+    stored = file.table(kind)
     rows: dict[tuple[str, str], list[int]] = {}
     for i in range(len(stored.runs)):
         known = file.known(kind, i)

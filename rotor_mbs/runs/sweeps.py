@@ -25,7 +25,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column
 from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, lay_out, stored_table
+from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, columns_of, lay_out, stored_table
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
@@ -178,12 +178,12 @@ class StoredSweep:
             if IDENTITY not in self.attributes:
                 raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
             self._table: StoredTable = stored_table(file)
+            columns = columns_of(file)
         table = self._table
         self.columns: dict[str, Column] = {
             "run": Column(("run",), "1", "run number, from 0"),
-            **{name: column for name, (column, _) in {**table.scales, **table.known}.items() if name != CHARACTERS},
-            **{name: stored.column for name, stored in table.filled.items()},
         }
+        self.columns |= {name: column for name, column in columns.items() if name not in (CHARACTERS, "run")}
         self.keys: list[str] = self.attributes["parameter_keys"]
         first = int(table.runs[0]) if len(table.runs) else 0
         with files.reading(path):
@@ -221,6 +221,6 @@ class StoredSweep:
             with files.reading(self._path, name):
                 values: NDArray[Any] = np.memmap(self._path, stored.kind, "r", stored.offset, stored.shape)
             return values
-        if name in table.known or name in table.scales:
-            return {**table.scales, **table.known}[name][1]
+        if name in table.known:
+            return table.known[name]
         raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")

@@ -19,23 +19,18 @@ from rotor_mbs.models.printed.matrices import AS_PRINTED, Errata, Matrix
 
 
 class BladeTerms(NamedTuple):
-    """What one blade adds to the equations at (q2, q3).
+    """What one blade adds to the equations at (q2, q3)."""
 
-    d_ij        kg m², coefficients of the accelerations
-    h_i_jk      kg m², coefficients of q̇j q̇k in row i
-    gravity_i   N m
-    """
-
-    d_22: float
+    d_22: float  # d: kg m², coefficients of the accelerations
     d_23: float
     d_33: float
-    h_2_22: float
+    h_2_22: float  # h_i_jk: kg m², coefficients of q̇j q̇k in row i
     h_2_23: float
     h_2_33: float
     h_3_22: float
     h_3_23: float
     h_3_33: float
-    gravity_2: float
+    gravity_2: float  # N m
     gravity_3: float
 
 
