@@ -86,7 +86,8 @@ _TARGETS = (
     Target("lagrange", f"{_L}.parameters",
            "rotor_form _inertia_about_hub _rotor_inertia _coefficients _cosine_of_turn"),
     # What all but the printed equations share: every group's checks see it.
-    Target("lagrange", "rotor_mbs.scenario.time_table", "value_at values_at constant_value values at segments _lines values_before"),
+    Target("lagrange", "rotor_mbs.scenario.time_table",
+           "value_at values_at constant_value values at segments _lines values_before"),
     Target("multibody", "rotor_mbs.scenario.time_table", "intervals steps_and_rows"),
     Target("lagrange", f"{_L}.samples", "trajectory _put_energies constant_work"),
     Target("printed", f"{_P}.literal", "*"),
