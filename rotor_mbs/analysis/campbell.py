@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.modes import Complex, ModeSet, multiblade, multiblade_shapes
+from rotor_mbs.analysis.modes import Complex, ModeSet, multiblade, multiblade_shapes, whirl_frequencies
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.files import Column
 from rotor_mbs.runs.records import Record, read_records
@@ -65,13 +65,12 @@ class LinearModes(ModeSet):
 
     @property
     def whirl(self) -> tuple[Array, Array]:
-        """(speeds, n) rad/s backward and forward whirl, of cosine and sine modes; NaN for others."""
+        """(speeds, n) rad/s backward and forward whirl of cosine and sine modes; NaN for others."""
         harmonics = np.full(len(self.names), np.nan)
         for k, name in enumerate(self.names):
             if name.startswith(("cosine", "sine")):  # "cosine pitch", "cosine 2 pitch"
                 harmonics[k] = int(name.split()[1]) if name.split()[1].isdigit() else 1
-        frequency, speed = self.damped_frequencies, self.speeds[:, None]
-        return np.abs(frequency - harmonics * speed), frequency + harmonics * speed
+        return whirl_frequencies(self.damped_frequencies, self.speeds[:, None], harmonics)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 
 from rotor_mbs.errors import InputError, nearest
-from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.ladders import Ladder
+from rotor_mbs.methods.base import Ladder, Method
 
 REFERENCE = "reference"
 GROUP = "rotor_mbs.methods"
@@ -121,17 +120,13 @@ def ladders(names: Sequence[str] = ()) -> tuple[Ladder, ...]:
 
 def label_of(curve: str) -> str:
     """How a method, or a variant of one by the name of its curve, is called; its name where it is not known here."""
-    method = _method_or_variant(curve)
+    method = look_up(curve) or next((ladder for ladder in ladders() if ladder.curve == curve), None)
     return method.label if method else curve
 
 
 def model_label(model: str) -> str:
     """How a model is called: "closed form" for "lagrange"; its name where it is not known here."""
     return next((method.model_label for method in methods() if method.model == model), model)
-
-
-def _method_or_variant(curve: str) -> Method | Ladder | None:
-    return look_up(curve) or next((ladder for ladder in ladders() if ladder.curve == curve), None)
 
 
 def _load(place: str) -> tuple[Method, ...]:

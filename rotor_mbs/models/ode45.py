@@ -17,7 +17,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from rotor_mbs.models.ode45_settings import Ode45Settings as Ode45Settings
+from rotor_mbs.models.equations import Ode45Settings as Ode45Settings
 from rotor_mbs.solution.trajectory import Array
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
@@ -73,7 +73,6 @@ class Ode45Result:
 
     @property
     def steps(self) -> int:
-        """How many steps were accepted."""
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs import files
-from rotor_mbs.runs.results import OF_METHODS, RUNS, TableFile
+from rotor_mbs.runs.results import OF_METHODS, REPEATED, RUNS, TableFile
 from rotor_mbs.runs.table import MISSING, Place, Rows, checksums, text_of
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import STATUSES
@@ -70,7 +70,7 @@ class StoredRun:
         facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
         facts |= {name: text_of(self._row[name]) for name in _TEXTS}
         for name, value in self._row.items():
-            if name in ("status", "crc32", *_TEXTS) or np.ndim(value):
+            if name in ("status", "crc32", *REPEATED.values(), *_TEXTS) or np.ndim(value):
                 continue
             number = value.item()
             if (isinstance(number, int) and number >= 0) or (isinstance(number, float) and number == number):

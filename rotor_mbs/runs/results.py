@@ -1,7 +1,7 @@
 """Results files as they are written: a row per run in the table /runs, its arrays in a table of its scene.
 
 /runs           run (text), scene, method_name, settings, versions; status, message, metrics, times
-/paper/fig11    run (text), time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
+/paper/fig11    run (text), status, samples, time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
                 error_growth, angle_uncertainty (time): of the reference
 /bench, /stability ...   tables of other studies, each row with a status of its own
 """
@@ -22,7 +22,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.runs import files, table
 from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column
-from rotor_mbs.runs.table import Place, Rows, StoredTable, Table, blank_rows, characters, text_of
+from rotor_mbs.runs.table import STATUS_REPEATED, Place, Rows, StoredTable, Table, blank_rows, characters, text_of
 from rotor_mbs.runs.versions import machine, row_versions, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -69,6 +69,8 @@ _COMPUTED = {
     "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, at the integrator's own output points"),
     "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate either way, at the integrator's own output points"),
 }
+# What a scene's table repeats of /runs, by its name there; in a row it has this name.
+REPEATED = {"status": STATUS_REPEATED, "samples": "samples_repeated"}
 _CHECKSUM = Column(("run",), "1", "CRC-32 of the row in all computed columns", "<u4")
 _TEXTS = {
     "scene": "scene",
@@ -190,7 +192,8 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
         "axes": ["run", "time", "coordinate"],
     }
     labels = {"coordinate": scene.coordinate_labels} if "coordinate" in used else {}
-    return Table(scene.name, [run.method for run in runs], {}, filled, scales, labels, attributes)
+    repeated = {name: _COMPUTED[name] for name in REPEATED}
+    return Table(scene.name, [run.method for run in runs], {}, repeated | filled, scales, labels, attributes)
 
 
 def results_tables(asked: Sequence[Asked]) -> list[Table]:
@@ -243,7 +246,8 @@ class TableFile:
         arrays = self.table(scene)
         label = run.removeprefix(f"{scene}/")
         others = arrays.place(arrays.runs.tolist().index(label))
-        offsets, kinds = dict(others.offsets), [(name, others.row[name]) for name in others.row.names or ()]
+        offsets = {REPEATED.get(name, name): offset for name, offset in others.offsets.items()}
+        kinds = [(REPEATED.get(name, name), others.row[name]) for name in others.row.names or ()]
         for name, column in arrays.filled.items():
             if label == REFERENCE and not column.is_of_runs:
                 offsets[name] = column.offset
@@ -314,7 +318,7 @@ def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]
     for group in dict.fromkeys((*stored, *new)):
         before, made = stored.get(group), new.get(group)
         base = made or stored[group]
-        if "status" not in base.filled:
+        if "crc32" not in base.filled:
             continue
         rows = {run: row for run, row in _known_rows(before).items() if (group, run) not in dropped}
         asked = _known_rows(made)
@@ -337,7 +341,7 @@ def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]
         list(made.runs) == list(stored[group].runs) and made.filled.keys() == stored[group].filled.keys()
         for group, made in merged.items()
     )
-    if is_same and len(kept) == sum(len(made.runs) for made in stored.values() if "status" in made.filled):
+    if is_same and len(kept) == sum(len(made.runs) for made in stored.values() if "crc32" in made.filled):
         return old
     places = [(group, run, old.place(run, group)) for group, run in kept]
     rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
@@ -398,7 +402,7 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
         file = TableFile(temporary)
         given = {(group, run): values for group, run, values in rows}
         for made in tables:
-            for run in made.runs if "status" in made.filled else ():
+            for run in made.runs if "crc32" in made.filled else ():
                 place = file.place(str(run), made.group)
                 values = given.get((made.group, str(run)))
                 if values is None:
@@ -415,7 +419,7 @@ def _description(tables: Sequence[Table]) -> dict[str, object]:
     scenes = set(runs.known["scene"][1]) if runs is not None else set()
     count = len(runs.runs) if runs is not None else 0
     summary = f"{count} runs of {len(scenes)} scenes: trajectories, energies, status and errors of each"
-    others = sorted(made.group for made in tables if made.group != RUNS and "status" in made.filled)
+    others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.filled)
     if others:
         summary += f"; tables {', '.join(others)}"
     return {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}
@@ -456,4 +460,11 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
         column = name if run.method == REFERENCE else OF_METHODS.get(name, name)
         if column in row:
             row[column][0, : len(array)] = array
+    repeat(row)
     return row
+
+
+def repeat(row: Rows) -> None:
+    """Put status and samples where the table of the scene has them, too."""
+    for name, repeated in REPEATED.items():
+        row[repeated][:] = row[name]

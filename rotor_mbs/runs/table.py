@@ -37,6 +37,7 @@ from rotor_mbs.solution.status import STATUSES
 Rows = dict[str, NDArray[Any]]
 
 MISSING = -1  # status of a row that is not stored
+STATUS_REPEATED = "status_repeated"  # in a row, the status for a second table
 CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
 STATUS_FLAGS = {
     "flag_values": np.arange(MISSING, len(STATUSES), dtype=np.int8),
@@ -110,7 +111,7 @@ class Place:
             Where the file cannot be written, or is another one by now.
         """
         columns = rows | {"crc32": checksums(first, rows, self.row)}
-        status = columns.pop("status")
+        statuses = {name: columns.pop(name) for name in (STATUS_REPEATED, "status") if name in columns}
         with saving(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: is another file by now")
@@ -119,8 +120,9 @@ class Place:
                 file.write(np.ascontiguousarray(values).data)
             file.flush()
             os.fsync(file.fileno())
-            file.seek(self.offsets["status"] + first - self.first)
-            file.write(np.ascontiguousarray(status, np.int8).data)
+            for name, status in statuses.items():
+                file.seek(self.offsets[name] + first - self.first)
+                file.write(np.ascontiguousarray(status, np.int8).data)
 
     def read(self, count: int = 1, start: int = 0, file: IO[bytes] | None = None) -> Rows:
         """(count, ...) The columns of the rows from `start` on; file: one that is open.
@@ -170,8 +172,10 @@ class Place:
         """Take back the statuses of some rows, counted from the first, before they are computed again."""
         with saving(self.path), self.path.open("r+b") as file:
             for row in rows:
-                file.seek(self.offsets["status"] + row)
-                file.write(np.int8(MISSING).tobytes())
+                for name in ("status", STATUS_REPEATED):
+                    if name in self.offsets:
+                        file.seek(self.offsets[name] + row)
+                        file.write(np.int8(MISSING).tobytes())
             file.flush()
             os.fsync(file.fileno())
 

@@ -61,7 +61,6 @@ def list_scenes() -> list[tuple[str, str]]:
 
 
 def list_sweeps() -> list[tuple[str, str]]:
-    """Name and title of every shipped sweep."""
     paths = sorted(sweeps_folder().glob("*.toml"), key=lambda path: natural_key(path.name))
     return [(f"{sweeps_folder().name}/{path.stem}", _title(path)) for path in paths]
 
@@ -130,7 +129,6 @@ def _title(path: Path) -> str:
 
 
 def _files(argument: str) -> list[Path]:
-    """The files that one argument means."""
     shipped = _shipped()
     if argument in shipped:
         return [shipped[argument]]

@@ -75,7 +75,6 @@ def _value(node: ast.expr, depth: int) -> float:
 
 
 def _applied(called: str, function: Callable[..., float], *arguments: float) -> float:
-    """The finite value of the call; ExpressionError where there is none."""
     try:
         value = function(*arguments)
     except (ArithmeticError, ValueError):

@@ -51,7 +51,6 @@ def wrong(what: str, allowed: str = "") -> TableError:
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
-    """ "1 blade", "3 blades"."""
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
@@ -86,7 +85,6 @@ def read_number(value: object) -> float:
 
 
 def read_text(value: object) -> str:
-    """A text that is not blank."""
     if not isinstance(value, str):
         raise wrong(f"{shown(value)} is not text")
     if not value.strip():
@@ -162,7 +160,6 @@ def whole(lowest: int, highest: int, allowed: str = "") -> Kind:
 
 
 def choice(names: Sequence[str]) -> Kind:
-    """One of the names."""
 
     def read(value: object) -> str:
         if not isinstance(value, str):
@@ -192,7 +189,6 @@ def _read_entries(read: Callable[[Any], Any], entries: Iterable[tuple[str | int,
 
 
 def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -> Kind:
-    """A list, kept as a tuple."""
 
     def read(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list):
@@ -205,7 +201,6 @@ def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -
 
 
 def dict_of(kind: Kind, allowed: str) -> Kind:
-    """A table with any keys."""
 
     def read(value: object) -> dict[str, Any]:
         if not isinstance(value, dict):

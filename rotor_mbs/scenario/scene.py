@@ -116,7 +116,6 @@ def _per_blade(kind: Kind) -> Kind:
 
 
 def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
-    """An entry for every coordinate."""
     count = scene.get("blade_count")
     if isinstance(value, list) and count is not None and len(value) != 1 + count:
         raise wrong(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
@@ -380,7 +379,6 @@ _BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
 
 
 def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
-    """The dataclass fields of Scene that are of these parts, in order."""
     return (field for field in fields(Scene) if field.metadata["part"] in parts)
 
 
@@ -443,7 +441,14 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
         table, _, name = field.metadata["key"].rpartition(".")
         written: Any
         if field.name == "blades":
-            written = _blade_tables(scene)
+            # One table for equal blades; a tip that only repeats the centre of mass was not given.
+            written = []
+            for blade in scene.blades if len(set(scene.blades)) > 1 else scene.blades[:1]:
+                of_blade = {key: _listed(getattr(blade, key)) for key in BLADE_KEYS}
+                if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
+                    del of_blade["tip"]
+                written.append(of_blade)
+            written = written if len(written) > 1 else written[0]
         elif field.name == "settings":
             written = dict(value)
         elif field.metadata["kind"].per_blade and len(set(value)) == 1:
@@ -454,17 +459,6 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
             written = _listed(value)
         (tables.setdefault(table, {}) if table else tables)[name] = written
     return tables
-
-
-def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
-    """One table for equal blades; a tip that only repeats the centre of mass was not given."""
-    tables: list[dict[str, Any]] = []
-    for blade in scene.blades if len(set(scene.blades)) > 1 else scene.blades[:1]:
-        table = {name: _listed(getattr(blade, name)) for name in BLADE_KEYS}
-        if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
-            del table["tip"]
-        tables.append(table)
-    return tables if len(tables) > 1 else tables[0]
 
 
 def _listed(value: Any) -> Any:
@@ -539,7 +533,6 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
 
 
 def copied(value: Any) -> Any:
-    """A copy of tables of a file, with lists and tables of its own."""
     if isinstance(value, dict):
         return {name: copied(entry) for name, entry in value.items()}
     return [copied(entry) for entry in value] if isinstance(value, list) else value

@@ -97,7 +97,6 @@ class AxisTable:
             raise wrong(what, f"exactly one of {', '.join(VARIED)}")
 
     def axis(self, draws: int) -> Axis:
-        """The axis of a design with so many draws."""
         kind = next(name for name in VARIED if getattr(self, name) is not None)
         numbers = getattr(self, kind)
         if kind in ("linear", "log"):
@@ -172,7 +171,6 @@ class Sweep:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """The unit of every axis' key."""
         return tuple(unit_of(parse_key(key)) for key in self.keys)
 
     @property

@@ -74,20 +74,21 @@ class TableError(ValueError):
 
 
 def shown_path(path: Path) -> str:
-    """The path as it can stand in a one-line message."""
     text = str(path)
     return text if text.isprintable() else ascii(text)
 
 
 def shown_key(path: KeyPath) -> str:
     """The path as `Scene.replace` and sweeps take it, entries counted from 0: blade[1].mass; odd names in quotes."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{_shown_name(part)}" for part in path)[1:]
-
-
-def _shown_name(name: str) -> str:
-    if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
-        return name
-    return json.dumps(name if len(name) <= 60 else name[:57] + "...")
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        elif re.fullmatch(r"[A-Za-z0-9_-]{1,60}", part):
+            text += f".{part}"
+        else:
+            text += "." + json.dumps(part if len(part) <= 60 else part[:57] + "...")
+    return text[1:]
 
 
 def parse_key(text: str) -> KeyPath:
@@ -102,8 +103,29 @@ _TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     """The text of the file and its tables. Raises InputError with one line."""
-    text = _read_text(path)
-    return text, parse_toml(text, shown_path(path))
+    shown = shown_path(path)
+    try:
+        if path.exists() and not path.is_file():  # a pipe or a device would block, or never end
+            kind = "a folder" if path.is_dir() else "not a regular file"
+            raise InputError(f"{shown}: is {kind}; allowed: a TOML file")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(f"{shown}: cannot be read: {reason}; allowed: a readable TOML file") from error
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{shown}: is larger than {MAX_BYTES} bytes; allowed: at most that")
+    if not content.strip():
+        raise InputError(f"{shown}: is empty; allowed: a TOML file")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{shown}:{line}: is not UTF-8; allowed: TOML text in UTF-8") from error
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise InputError(f"{shown}:{line}: contains a NUL byte; allowed: TOML text in UTF-8")
+    return text, parse_toml(text, shown)
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
@@ -133,34 +155,7 @@ def toml_value(value: object) -> str:
 
 
 def toml_lines(table: Mapping[str, object]) -> str:
-    """A line `key = value` for each entry."""
     return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
-
-
-def _read_text(path: Path) -> str:
-    shown = shown_path(path)
-    try:
-        if path.exists() and not path.is_file():  # a pipe or a device would block, or never end
-            kind = "a folder" if path.is_dir() else "not a regular file"
-            raise InputError(f"{shown}: is {kind}; allowed: a TOML file")
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise InputError(f"{shown}: cannot be read: {reason}; allowed: a readable TOML file") from error
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{shown}: is larger than {MAX_BYTES} bytes; allowed: at most that")
-    if not content.strip():
-        raise InputError(f"{shown}: is empty; allowed: a TOML file")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{shown}:{line}: is not UTF-8; allowed: TOML text in UTF-8") from error
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise InputError(f"{shown}:{line}: contains a NUL byte; allowed: TOML text in UTF-8")
-    return text
 
 
 def _syntax_error(message: str, text: str) -> str:
@@ -220,7 +215,6 @@ def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
 
 
 def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict[KeyPath, int]) -> None:
-    """Notes the line of each entry of an array, and of the arrays inside it."""
     numbers: list[int] = []
     for token, line in value:
         if token in "]}":

@@ -33,7 +33,6 @@ class Variants:
         return self.__dict__ | {"_rotors": self._rotors if all(map(_is_of_start, self._paths)) else {}}
 
     def scene(self, values: Sequence[float]) -> Scene:
-        """The scene with `values`, one per key, in place. Raises TableError."""
         pairs = list(zip(self._paths, values, strict=True))
         rotor_numbers = tuple(value for path, value in pairs if not _is_of_start(path))
         if rotor_numbers not in self._rotors:

@@ -25,8 +25,6 @@ _MAX_TURN_PER_SAMPLE = 1.0
 
 
 class Balance(NamedTuple):
-    """Residual of a balance of momentum."""
-
     error: Array  # (n,) kg m²/s or kg m/s, beyond what the samples leave open
     scale: float  # what it is relative to
 
@@ -61,12 +59,12 @@ def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
     of the bearing, where a load has a kink (the force jumps there), or as for `angular_balance`, oscillations of a
     stiff bearing among the motion."""
     force = run.get("shaft_force")
-    if (
-        force is None
-        or len(run.time) < max(_POINTS_WITHOUT_SLOPES)
-        or knots(scene.load_tables, scene.duration)
-        or not _is_resolved(scene, run, _fastest_bearing(scene))
-    ):
+    if force is None or len(run.time) < max(_POINTS_WITHOUT_SLOPES) or knots(scene.load_tables, scene.duration):
+        return None
+    # rad/s: the largest natural frequency of a blade on the spring of its bearing.
+    on_springs = [(scene.bearing(i)[0], blade) for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
+    frequencies = [np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2]) for stiffness, blade in on_springs]
+    if not _is_resolved(scene, run, max(frequencies, default=0.0)):
         return None
     momentum, mass = np.zeros(force.shape), sum(blade.mass for blade in scene.blades)
     for i, blade in enumerate(scene.blades):
@@ -83,12 +81,6 @@ def _is_resolved(scene: Scene, run: Trajectory, frequency: float = 0.0) -> bool:
     """Whether little happens from sample to sample: at the run's rates, and at a frequency in rad/s."""
     step = scene.duration / (scene.samples - 1)
     return len(run.time) > 1 and bool(max(np.abs(run.rates).max(), frequency) * step < _MAX_TURN_PER_SAMPLE)
-
-
-def _fastest_bearing(scene: Scene) -> float:
-    """rad/s: the largest natural frequency of a blade on the spring of its bearing."""
-    blades = [(scene.bearing(i)[0], blade) for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
-    return max((np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2]) for stiffness, blade in blades), default=0.0)
 
 
 def _beyond(residual: Array, uncertainty: Array) -> Array:

@@ -45,8 +45,6 @@ _CLEAR_SHARE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a run is judged to be."""
-
     status: str  # one of `status.STATUSES`
     message: str  # one line; "" for ok
     false_success: bool  # the engine reported success of a run that is wrong

@@ -38,31 +38,22 @@ class QuantityMetric:
     """How a run's array becomes one number that is stored with the run, and the largest value that passes.
 
     The number is the largest size over all samples (with the last dimension `axis`: of the vectors).
-
-    Attributes
-    ----------
-    metric : name of the number among the run's metrics.
-    with_reference : the size is that of the difference from the reference's array, up to the horizon.
-    relative_to : from the scene to what the number is divided by before it is judged; None for 1.
-    per_growth_of : from (scene, reference, number of samples up to the horizon) to a scale; the number is then the
-        error of each sample divided by it and by the error growth up to there, which is not the method's fault.
-    check : name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here.
-    bound : largest value that passes where no check has one; None where the number is not judged.
-    channel, unit : what the judged number is called in a verdict, and its unit in words.
-    fault : sentence for a number that does not pass, with the field {value}.
-    look_at : where a failure would come from.
     """
 
-    metric: str
-    with_reference: bool = True
+    metric: str  # name of the number among the run's metrics
+    with_reference: bool = True  # the size is that of the difference from the reference's array, up to the horizon
+    # from the scene to what the number is divided by before it is judged; None for 1
     relative_to: Callable[[Scene], float] | None = None
+    # from (scene, reference, number of samples up to the horizon) to a scale; the number is then the error of each
+    # sample divided by it and by the error growth up to there, which is not the method's fault
     per_growth_of: Callable[[Scene, Samples, int], float] | None = None
+    # name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here
     check: str = ""
-    bound: float | None = None
-    channel: str = ""
+    bound: float | None = None  # largest value that passes where no check has one; None where the number is not judged
+    channel: str = ""  # what the judged number is called in a verdict, and its unit in words
     unit: str = ""
-    fault: str = ""
-    look_at: str = ""
+    fault: str = ""  # sentence for a number that does not pass, with the field {value}
+    look_at: str = ""  # where a failure would come from
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,19 +69,6 @@ class Plot:
 class Quantity:
     """An array that a run may have.
 
-    Attributes
-    ----------
-    name : name of the dataset, and of the attribute of a solution.
-    dimensions : names of its axes, see `SCALES`; the first is `time` but for an integrator's own output points.
-    units, long_name : as stored.
-    output : the entry of a scene's `outputs` that asks for it; "" where it is stored whenever the model has it.
-    producer : from (scene, samples) to the array, where one formula serves all methods; None where each model
-        computes it from its own state. Returns None where the samples lack what it needs.
-    required : whether every run has it whose scene asks for it; else some methods alone have it.
-    judgement : how a run's array is judged; None where it is not, or where `metrics` has a rule of its own for it.
-    plot : how it is drawn; None where it is not drawn by itself.
-    has_peak : whether its largest size, and the time of it, are among a run's metrics.
-
     Examples
     --------
     >>> angular_momentum = Quantity(
@@ -101,20 +79,24 @@ class Quantity:
     True
     """
 
-    name: str
+    name: str  # name of the dataset, and of the attribute of a solution
+    # names of its axes, see `SCALES`; the first is `time` but for an integrator's own output points
     dimensions: tuple[str, ...]
-    units: str
+    units: str  # as stored
     long_name: str
+    # the entry of a scene's `outputs` that asks for it; "" where it is stored whenever the model has it
     output: str = ""
+    # from (scene, samples) to the array, where one formula serves all methods; None where each model computes it from
+    # its own state. Returns None where the samples lack what it needs
     producer: Callable[[Scene, Samples], Array | None] | None = None
-    required: bool = True
+    required: bool = True  # whether every run has it whose scene asks for it; else some methods alone have it
+    # how a run's array is judged; None where it is not, or where `metrics` has a rule of its own for it
     judgement: QuantityMetric | None = None
-    plot: Plot | None = None
-    has_peak: bool = False
+    plot: Plot | None = None  # how it is drawn; None where it is not drawn by itself
+    has_peak: bool = False  # whether its largest size, and the time of it, are among a run's metrics
 
     @property
     def is_over_time(self) -> bool:
-        """Whether it has a value per sample."""
         return self.dimensions[:1] == ("time",)
 
 
@@ -134,7 +116,6 @@ SCALES = {
 
 
 def sample_times(scene: Scene) -> Array:
-    """(samples,) s, both ends included."""
     return np.linspace(0.0, scene.duration, scene.samples)
 
 
@@ -366,7 +347,6 @@ def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None
 
 
 def arrays(scene: Scene, samples: Samples) -> dict[str, Array]:
-    """All arrays of a run that its scene asks for, by name."""
     by_name = {quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)}
     return {name: values for name, values in by_name.items() if values is not None}
 

@@ -3,11 +3,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # `rotor-mbs list` and every --help need no NumPy
-    pass
-
 # Those that a run's state can have ("unchecked": complete, with nothing to judge it by), a point of which no run was
 # made, and a run whose process died. Codes are places in this list: new ones go to its end.
 STATUSES = (
@@ -18,5 +13,4 @@ COMPLETE = ("ok", "inaccurate", "unchecked")
 
 
 def code_of(status: str) -> int:
-    """The integer code of a status. Raises ValueError where there is no such status."""
     return STATUSES.index(status)

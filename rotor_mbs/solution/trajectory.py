@@ -83,7 +83,6 @@ class RunBlock:
     samples: list[int]  # how many rows of each are finite
 
     def trajectory(self, i: int) -> Trajectory:
-        """Run i alone, cut where it broke off."""
         n = self.samples[i]
         return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
 
@@ -106,7 +105,6 @@ def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, A
 
 
 def finite_rows(*tables: Array) -> int:
-    """How many rows from the first are finite in every table."""
     finite = np.all([np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0)
     return len(finite) if finite.all() else int(np.argmin(finite))
 

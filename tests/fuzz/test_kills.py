@@ -98,7 +98,8 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
     try:
         process.wait(chance.uniform(0.05, LATEST_SIGNAL_S.get(name, LATEST_SIGNAL_OF_OTHERS_S)))
     except subprocess.TimeoutExpired:
-        workers = sorted(set(processes_of(mark)) - {process.pid})
+        # Not Python's own resource tracker, which multiprocessing starts anew with a warning.
+        workers = sorted(number for number, line in processes_of(mark).items() if "spawn_main" in line)
         if not hits_worker:
             process.send_signal(number)
         elif workers:

@@ -115,7 +115,7 @@ _TARGETS = (
            "energy_slack energy_conditioning _shares_at_quarter_turns smallest_rotor_inertia_share "
            "rotor_inertia_shares _shaft_inertia_forms _SINGULAR_SHARE _ROUND_OFF _RESEMBLES _NO_INERTIA", 0.5),
     Target("rules", "rotor_mbs.solution.metrics",
-           "running_growth horizon_samples angle_error energy_scale _angle_errors _relative_error _motion_sizes "
+           "running_growth horizon_samples angle_error energy_scale _angle_errors _motion_sizes "
            "HORIZON_GROWTH", 0.5),
     # A thousandth: step rules and tableau; of a tableau's fractions any.
     Target("ode45", "rotor_mbs.models.ode45", "*", 0.001),

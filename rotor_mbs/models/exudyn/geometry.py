@@ -31,7 +31,6 @@ def rotation_y(cosine: float, sine: float) -> Array:
 
 
 def rotation_z(angle: float) -> Array:
-    """(3, 3) turn about the pitch axis, angle in rad."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 

@@ -48,8 +48,25 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     vectors, singular_values, _ = np.linalg.svd(linear.C)
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
     N: Array = np.asarray(vectors[:, rank:])
-    geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
-    joint = _joint_angles(state) @ N
+    # Difference quotients of C λ along each column of N.
+    start, here = system.coordinates, system.linearized(_STEPS[0]).C @ multipliers
+    quotients = []
+    for step in _STEPS:
+        columns = []
+        for direction in N.T:
+            system.coordinates = start + step * direction
+            columns.append((system.linearized(_STEPS[0]).C @ multipliers - here) / step)
+        quotients.append(np.array(columns).T)
+    geometric = limit_at_zero(quotients, 2.0)
+    # Rates of the joint angles from those of the bodies' coordinates, positions and Euler parameters p; the angular
+    # velocity is 2 (e0 ė - ė0 e + e × ė).
+    bodies = chain.placed_bodies(state)
+    by_coordinates = np.zeros((len(bodies), 7 * len(bodies)))
+    for k, placed in enumerate(bodies):
+        p = quaternion(placed.about_shaft, placed.pitch)
+        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
+        by_coordinates[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
+    joint = by_coordinates @ N
     mass = N.T @ linear.M @ N
 
     def in_joint_angles(matrix: Array) -> Array:
@@ -62,27 +79,3 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
 
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
     return Linearized(*(limit_at_zero(matrices, 2.0) for matrices in zip(*map(linearized, _STEPS), strict=True)))
-
-
-def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
-    """(n, free): difference quotients of C λ along each column of N."""
-    start = system.coordinates
-    here = system.linearized(_STEPS[0]).C @ multipliers
-    columns = []
-    for direction in N.T:
-        system.coordinates = start + step * direction
-        columns.append((system.linearized(_STEPS[0]).C @ multipliers - here) / step)
-    system.coordinates = start
-    return np.array(columns).T
-
-
-def _joint_angles(scene: Scene) -> Array:
-    """(1 + pitching, n): rates of the joint angles from those of the bodies' coordinates, positions and Euler
-    parameters p; the angular velocity is 2 (e0 ė - ė0 e + e × ė)."""
-    bodies = chain.placed_bodies(scene)
-    by_coordinates = np.zeros((len(bodies), 7 * len(bodies)))
-    for k, placed in enumerate(bodies):
-        p = quaternion(placed.about_shaft, placed.pitch)
-        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
-        by_coordinates[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
-    return by_coordinates

@@ -64,7 +64,6 @@ def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: 
 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
-    """What `tree_loads` reads; on_link: (name, output, link, point) -> sensor."""
     sensors = []
     for i, blade in enumerate(scene.blades):
         place = on_body(scene, i, blade.centre_of_mass)
@@ -127,7 +126,6 @@ def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> t
 
 
 def matrices(rows: Array) -> Array:
-    """(n, 3, 3) of the (n, 9) that a sensor keeps of rotations."""
     return rows.reshape(-1, 3, 3)
 
 

@@ -12,8 +12,6 @@ _END_ACCELERATIONS = "explicit.computeEndOfStepAccelerations"
 
 @dataclass(frozen=True)
 class Scheme:
-    """A time integration."""
-
     solver: str  # the engine's name of it
     stages: int  # evaluations in a step; 0 for an implicit one
     # by dotted path below the engine's settings of a time integration

@@ -26,7 +26,6 @@ _COMMENTS = {  # by kind; parts of another kind are left out
 
 
 def exudyn_script(scene: Scene) -> str:
-    """The text of the script."""
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
     moving = [0, *(1 + i for i in pitching(scene))]
     calls = []

@@ -13,14 +13,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.linearization import (
-    Jet,
-    cosine,
-    holding_torque,
-    linearize,
-    sine,
-    steady_rotation,
-)
+from rotor_mbs.models.lagrange.linearization import Jet, cosine, holding_torque, linearize, sine, steady_rotation
 from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.models.lagrange.taylor import compiled
@@ -84,6 +77,7 @@ def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
     period = 2.0 * math.pi / speed
     shift = np.zeros(2 * n)
     shift[0] = 2.0 * math.pi
+    form = rotor_form(scene)
     best: Turn | None = None
     for _ in range(_MAX_CORRECTIONS):
         end, derivatives, trace = system.propagate(state, torque, period)
@@ -91,7 +85,16 @@ def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
         residual = (end - state - shift) / units
         mismatch = float(np.abs(residual).max())
         if best is None or mismatch < best.mismatch:
-            best = Turn(speed, state, torque, by_state, *_invariants(scene, state, torque), trace, mismatch)
+            # Gradient of energy less the torques' work, zero where dampers act; and the state's time derivative.
+            variables, loads = Jet.variables(state), loads_at_start(scene, torque)
+            kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
+            gradient = (kinetic + potential).slope
+            gradient[:n] -= [torque, *loads.pitches]
+            gradient = np.zeros(2 * n) if scene.has_damping else gradient
+            angles, rates = state[:n].tolist(), state[n:].tolist()
+            accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
+            flow = np.array([*rates, *accelerations])
+            best = Turn(speed, state, torque, by_state, gradient, flow, trace, mismatch)
         if mismatch < _CLOSED or mismatch > _LOST:
             break
         jacobian = np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
@@ -102,19 +105,6 @@ def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
         left = math.inf if best is None else best.mismatch
         raise InputError(f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
     return best
-
-
-def _invariants(scene: Scene, state: Array, torque: float) -> tuple[Array, Array]:
-    """(2n,) gradient of energy less the torques' work, zero where dampers act; (2n,) time derivative of the state."""
-    form, n = rotor_form(scene), len(state) // 2
-    variables = Jet.variables(state)
-    loads = loads_at_start(scene, torque)
-    kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
-    gradient = (kinetic + potential).slope
-    gradient[:n] -= [torque, *loads.pitches]
-    angles, rates = state[:n].tolist(), state[n:].tolist()
-    accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
-    return (np.zeros(2 * n) if scene.has_damping else gradient), np.array([*rates, *accelerations])
 
 
 class _Variational:

@@ -73,13 +73,11 @@ class Jet:
 
 
 def sine(x: Jet) -> Jet:
-    """sin x with its derivatives."""
     s, c = math.sin(x.value), math.cos(x.value)
     return x.function(s, c, -s)
 
 
 def cosine(x: Jet) -> Jet:
-    """cos x with its derivatives."""
     s, c = math.sin(x.value), math.cos(x.value)
     return x.function(c, -s, -c)
 

@@ -149,7 +149,6 @@ def load_tables(scene: Scene) -> tuple[Table, ...]:
 
 
 def changing_loads(scene: Scene) -> tuple[int, ...]:
-    """Which of `load_tables` change over time."""
     return tuple(i for i, table in enumerate(load_tables(scene)) if not is_constant(table))
 
 

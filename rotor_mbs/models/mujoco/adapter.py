@@ -85,7 +85,6 @@ class Engine:
 
     @property
     def state(self) -> tuple[Array, Array]:
-        """(coordinates,) rad and rad/s."""
         return self._data.qpos, self._data.qvel
 
     def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
@@ -94,7 +93,6 @@ class Engine:
         return Poses(*map(np.array, zip(*rows, strict=True)))
 
     def _pose(self, angles: Array, rates: Array, loads: Array) -> tuple[Array, ...]:
-        """The fields of `Poses`, of one state."""
         model, data = self._model, self._data
         data.qpos[:], data.qvel[:], data.act[:] = angles, rates, loads
         _engine.mj_forward(model, data)

@@ -15,14 +15,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
 from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
 from rotor_mbs.solution.quantities import named_loads
-from rotor_mbs.solution.trajectory import (
-    Array,
-    Integration,
-    Trajectory,
-    all_coordinates,
-    finite_samples,
-    sample_times,
-)
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_samples, sample_times
 
 # rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the step's square.
 _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)
@@ -54,7 +47,6 @@ class MujocoSolver:
         self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
 
     def integrate(self) -> Integration:
-        """From the initial state, every time; bit for bit the same."""
         scene, self._rows = self._scene, []
         self.engine.start(
             *([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates))
@@ -92,7 +84,6 @@ class MujocoSolver:
         self._rows.append(_Row(time, angles.copy(), rates.copy(), segment, is_sample))
 
     def observe(self) -> Trajectory:
-        """Samples of the last integration, cut before the first that is not finite."""
         scene, rows = self._scene, self._rows
         angles, rates = (np.array([getattr(row, name) for row in rows]) for name in ("angles", "rates"))
         at = [i for i, row in enumerate(rows) if row.is_sample]
