@@ -413,6 +413,8 @@ class Runs(Mapping[Any, Any]):
             if unstack:
                 keys = [parameter_name(key) for key in self._sweep.keys]
                 keys += ["method_name"] if len(self._sweep.methods) > 1 else []
+                if len(keys) == 1:
+                    return data.swap_dims(run=keys[0]).drop_vars("run")
                 data = data.set_index(run=keys).unstack("run")
             return data
         with xarray.open_dataset(self.path, group=self.scene) as scene:

@@ -201,32 +201,6 @@ def test_bad_input_is_one_line(words: tuple[str, ...], says: str, tmp_path: Path
     assert says in ended.err.splitlines()[-1]
 
 
-@pytest.mark.full
-def test_two_benches_tell_the_same(tmp_path: Path) -> None:
-    """Errors bit by bit, failures one by one; medians of runs over 1 ms within 15 % where nothing else is running."""
-    methods = ("lagrange/taylor", "exudyn_tree/rk44", "exudyn_tree/rk67", "exudyn_tree/generalized_alpha")
-    chosen = [part for name in methods for part in ("-m", name)]
-    for name in ("a.h5", "b.h5"):
-        assert bench(tmp_path, "paper/fig09", *chosen, "--budget", "25", name=name).status == 0
-    first, second = curves(tmp_path, "a.h5"), curves(tmp_path, "b.h5")
-    assert set(first) == set(second)
-    idle = max(curve.attributes["load_before"] for curve in (*first.values(), *second.values())) < 0.5
-    changes = {}
-    for name, one in first.items():
-        other = second[name]
-        both = np.array([a != "left_out" != b for a, b in zip(one.statuses, other.statuses, strict=True)])
-        assert both.sum() >= 6
-        np.testing.assert_array_equal(one.arrays["angle_error_max"][both], other.arrays["angle_error_max"][both])
-        np.testing.assert_array_equal(one.arrays["status"][both], other.arrays["status"][both])
-        a, b = one.arrays["run_time_s"][both], other.arrays["run_time_s"][both]
-        long = a > 1e-3
-        changes[name] = np.abs(b[long] / a[long] - 1.0)
-    print("largest change of a median:", {name: f"{found.max(initial=0.0):.1%}" for name, found in changes.items()})
-    if not idle:
-        pytest.skip("the machine was busy: the medians were not judged")
-    assert all(np.all(found < 0.15) for found in changes.values())
-
-
 Runner = Callable[[float], tuple[Callable[[], object], Callable[[], float]]]
 
 
