@@ -94,6 +94,7 @@ def test_chaotic_scenes_to_1e_6_before_the_horizon(name: str, step: float, toler
     assert (error <= uncertainty).all()
 
 
+@pytest.mark.full
 def test_every_quantity_is_extrapolated() -> None:
     name = "check/general"
     given = beginning(name, 21)

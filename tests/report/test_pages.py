@@ -344,6 +344,7 @@ def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(t
     assert "Exudyn tree, RK67" in sections["shaft_moment"]
 
 
+@pytest.mark.full
 def test_the_uncertainty_of_an_extrapolated_run_is_drawn_and_stated(tmp_path: Path) -> None:
     path, (scene,) = results_file(tmp_path / "r.h5", ["check/held"], []), find_scenes(["check/held"])
     run = solve("exudyn_chain/newmark_index2", scene, {"extrapolation": "richardson", "step": 5e-3})
@@ -443,6 +444,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(results: Path, tmp_path: Pa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.full
 def test_the_same_file_gives_the_same_bytes_in_any_number_of_processes(tmp_path: Path) -> None:
     path = store(tmp_path / "r.h5", [Made(replace(PLAIN, name=name), TAYLOR, SWING) for name in ("one", "two")])
     folders = [write_report(path, tmp_path / str(jobs), jobs=jobs).parent for jobs in (1, 2)]

@@ -94,6 +94,7 @@ def test_a_script_for_mujoco_agrees(tmp_path: Path) -> None:
     assert (found.status, found.message) == ("ok", "")
 
 
+@pytest.mark.full
 def test_an_exported_script_for_exudyn_agrees(tmp_path: Path) -> None:
     """The CSV that the script writes, run without this package, as it is."""
     (script,) = rm.export(rm.scene("check/pitch-loads"), "exudyn", tmp_path / "model.py")

@@ -248,6 +248,7 @@ def test_e3_alone_is_no_mistake() -> None:
 UNKNOWN = Plant("", spoilt=lambda t, q, w: (t, q + 1e-2 * np.sin(7.0 * t)[:, None], w))
 
 
+@pytest.mark.full
 def test_nothing_is_said_where_nothing_fits() -> None:
     comparison = rm.compare(UNKNOWN.data(), short("paper/fig11"))
     assert comparison.status == "inaccurate"
