@@ -44,12 +44,7 @@ class Where(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A number against its bound, both in `unit`; `hint` says where a failure would come from.
-
-    >>> check = Check("energy", Where("paper/fig08", "exudyn_tree/rk67", "balance"), 2.5e-10, 1e-9, "", "of scale")
-    >>> check.passed, check.margin
-    (True, 4.0)
-    """
+    """A number against its bound, both in `unit`; `hint` says where a failure would come from."""
 
     name: str
     where: Where
@@ -78,16 +73,9 @@ def make_check(bounds: Bounds, name: str, where: Where, value: float, unit: str,
 def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Check]:
     """Every check that an open file allows, in the order of its scenes.
 
-    Parameters
-    ----------
-    results : the file, opened with verify=False: a row that has changed is judged, too.
-    frozen : the shipped references.
-    bounds : the bounds; those that methods declare go before them.
+    The file is opened with verify=False: a row that has changed is judged, too. frozen: the shipped references.
 
-    Raises
-    ------
-    InputError
-        Where a stored scene is none.
+    Raises InputError where a stored scene is none.
     """
     bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
     shipped = {name: scene for file in frozen for name, scene in file.scenes.items()}

@@ -29,8 +29,19 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
     Raises InputError or StoreError, in one line, for what cannot be read.
     """
     path = Path(path)
-    head = _head(path)
     source = str(path)
+    if not path.is_file():
+        raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; allowed: {FORMATS}")
+    size = path.stat().st_size
+    if size == 0:
+        raise InputError(f"{path}: empty; allowed: {FORMATS}")
+    if size > LARGEST:
+        raise InputError(f"{path}: {size / 2**30:.1f} GB; allowed: up to {LARGEST / 2**30:g} GB: export fewer rows")
+    try:
+        with path.open("rb") as file:
+            head = file.read(1024)
+    except OSError as exc:
+        raise InputError(f"{path}: cannot be read: {exc.strerror}") from exc
     try:
         if head.startswith(_HDF5) or head[512:].startswith(_HDF5):  # MATLAB puts a block of its own in front
             if files.is_of_this_program(path) and not is_sweep(path):
@@ -42,37 +53,24 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
         if head.startswith(_MATLAB_5):
             return _matlab(path)
         if head.startswith(_NETCDF3):
-            return _netcdf3(path)
+            from scipy.io import netcdf_file  # late: 0.1 s
+
+            with netcdf_file(path, "r", mmap=False) as file:
+                arrays = {name: np.array(variable[:]) for name, variable in file.variables.items()}
+                units = {name: item.units.decode() for name, item in file.variables.items() if hasattr(item, "units")}
+            return table_of(source, arrays, units)
         if path.suffix.lower() == ".outb":
             return _openfast(path)
         if b"\x00" in head and not head.startswith(_UTF_16):
             raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
-        return read_text(source, _decoded(path.read_bytes()))
+        content = path.read_bytes()
+        try:
+            text = content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+        return read_text(source, text)
     except (OSError, ValueError, zipfile.BadZipFile, struct.error, MemoryError, KeyError) as exc:
         raise InputError(f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}") from exc
-
-
-def _head(path: Path) -> bytes:
-    """The first bytes. Raises InputError for what is no file, is empty, or is too large."""
-    if not path.is_file():
-        raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; allowed: {FORMATS}")
-    size = path.stat().st_size
-    if size == 0:
-        raise InputError(f"{path}: empty; allowed: {FORMATS}")
-    if size > LARGEST:
-        raise InputError(f"{path}: {size / 2**30:.1f} GB; allowed: up to {LARGEST / 2**30:g} GB: export fewer rows")
-    try:
-        with path.open("rb") as file:
-            return file.read(1024)
-    except OSError as exc:
-        raise InputError(f"{path}: cannot be read: {exc.strerror}") from exc
-
-
-def _decoded(content: bytes) -> str:
-    try:
-        return content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
 
 
 def _line(exc: BaseException) -> str:
@@ -88,15 +86,6 @@ def _matlab(path: Path) -> DataTable:
     except (MatReadError, TypeError, IndexError) as exc:
         raise InputError(f"{path}: a damaged MAT file: {_line(exc)}") from exc
     return table_of(str(path), {name: values for name, values in variables.items() if not name.startswith("__")})
-
-
-def _netcdf3(path: Path) -> DataTable:
-    from scipy.io import netcdf_file  # late: as above
-
-    with netcdf_file(path, "r", mmap=False) as file:
-        arrays = {name: np.array(variable[:]) for name, variable in file.variables.items()}
-        units = {name: item.units.decode() for name, item in file.variables.items() if hasattr(item, "units")}
-    return table_of(str(path), arrays, units)
 
 
 def _openfast(path: Path) -> DataTable:
