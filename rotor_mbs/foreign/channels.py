@@ -1,11 +1,5 @@
 """The channels that data may have: time, and angle and rate of every coordinate; which column is which, in which unit,
-sign and zero: from a mapping file, or guessed from the names.
-
-    time = { column = "Time", unit = "ms" }
-    rotor = { column = "Azimuth", unit = "deg", sign = -1, offset = 90.0, wrapped = true }
-    pitch_1 = "BldPitch1"                   # in the unit that the file states, else rad, rad/s or s
-    pitch_1_rate = "theta_dot_1"
-    group = "paper/fig08/lagrange/taylor"   # of an HDF5 file, where it has several
+sign and zero: from a mapping file (see docs/compare.md), or guessed from the names.
 
 A channel is sign * (column + offset), the offset in the column's own unit. What a mapping leaves out is not compared;
 the time alone is guessed then. All are guessed where it names a group alone.
