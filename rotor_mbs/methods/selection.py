@@ -21,17 +21,8 @@ _NEARLY_SINGULAR = 1e-3
 
 
 def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
-    """The methods for `scene`, the recommended one first, and why, in one line.
-
-    Parameters
-    ----------
-    defaults : names of the default methods, see `catalogue.default_methods`
-
-    Raises
-    ------
-    MethodRefusal
-        With the reason, where no motion exists to be followed.
-    """
+    """The methods for `scene`, the recommended one of the `defaults` first, and why, in one line. Raises MethodRefusal
+    with the reason where no motion exists to be followed."""
     reason = singular_reason(scene)
     if reason:
         raise MethodRefusal(f"{scene.name}: refused: {reason}; name a method with -m to see what it makes of it")

@@ -66,11 +66,8 @@ def polled() -> Iterator[None]:
 
 
 def step_callback() -> Callable[[object], bool] | None:
-    """Called with anything after every step, it returns whether to go on; None where there is no limit.
-
-    For use inside `polled`. To look at the clock after every step costs a fast integrator an eighth of its run time;
-    where there is a signal, only what the signal has set is read.
-    """
+    """Called with anything after every step, it returns whether to go on; None where there is no limit; for use inside
+    `polled`."""
     if math.isinf(_State.end):
         return None
     if _State.has_signal:

@@ -16,10 +16,10 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.kinematics import tip_paths
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.report.core.canvas import font_file
+from rotor_mbs.report.core.canvas import FONT_FILE
 from rotor_mbs.report.core.looks import GREY, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
-from rotor_mbs.report.plots.paths import projected
+from rotor_mbs.report.plots import projected
 from rotor_mbs.runs.read import StoredScene, open_results
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
@@ -33,19 +33,13 @@ _INK, _FAINT = "#1b1f24", "#d5dae0"
 
 
 def write_animation(results: Path, name: str, output: Path, magnified: float | None = None) -> Path:
-    """Write a scene of a results file as an animation.
+    """Write a scene of a results file as an animation, and return its file.
 
     Parameters
     ----------
     results, name : the file, and the name of the scene in it.
     output : the animation; its suffix gives the format.
-    magnified : how many times the tip's distance from the pitch axis is drawn, which the picture states; None: so many
-        times that it is visible.
-
-    Returns
-    -------
-    Path
-        `output`.
+    magnified : how many times the tip's distance from the pitch axis is drawn; None: so many that it is visible.
 
     Raises
     ------
@@ -97,73 +91,58 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
 
 
 class Wires(NamedTuple):
-    """A run at equally spaced times, as points (frames, blades, 2) in m, projected.
+    """A run at equally spaced times, as points (frames, blades, 2) in m, projected."""
 
-    axis, edge, root   the pitch axis' end, the tip, and the tip's offset at the hub
-    reach              m from the hub to the farthest tip
-    ended              the frame after the last that the run has
-    """
-
-    axis: Array
-    edge: Array
-    root: Array
-    reach: float
-    ended: int
+    axis: Array  # the pitch axis' end
+    edge: Array  # the tip
+    root: Array  # the tip's offset at the hub
+    reach: float  # m from the hub to the farthest tip
+    ended: int  # the frame after the last that the run has
 
 
 def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Wires:
     """At the times `at` (s); distances from the pitch axis are drawn `magnified` times."""
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
-    axis, edge, root = (_points(scene, moved, *scales) for scales in ((0.0, 1.0), (magnified, 1.0), (magnified, 0.06)))
+    lines = []
+    for across, along in ((0.0, 1.0), (magnified, 1.0), (magnified, 0.06)):
+        blades = []
+        for blade in scene.blades:
+            x, y, z = blade.tip
+            blades.append(replace(blade, tip=(across * x, across * y, along * z)))
+        paths = tip_paths(replace(scene, blades=tuple(blades)), moved)
+        lines.append(projected(paths.reshape(-1, 3)).reshape(*paths.shape[:2], 2))
     reach = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades)
+    axis, edge, root = lines
     return Wires(axis, edge, root, reach, int(np.searchsorted(at, time[-1], side="right")))
 
 
-def _points(scene: Scene, angles: Array, across: float, along: float) -> Array:
-    """(frames, blades, 2) of each blade's tip, its offset `across` times and its length `along` times as large."""
-    blades = tuple(
-        replace(blade, tip=(across * blade.tip[0], across * blade.tip[1], along * blade.tip[2]))
-        for blade in scene.blades
-    )
-    paths = tip_paths(replace(scene, blades=blades), angles)
-    return projected(paths.reshape(-1, 3)).reshape(*paths.shape[:2], 2)
-
-
 def _picture(drawn: Mapping[str, Wires], frame: int, time: float, magnified: float) -> Image.Image:
+    """The runs side by side: paths up to the frame, then the blades."""
     size = (_SIDE * len(drawn), _SIDE + _TOP)
     image = Image.new("RGB", (_FINE * size[0], _FINE * size[1]), "white")
     pen = ImageDraw.Draw(image)
-    font = ImageFont.truetype(str(font_file()), 12 * _FINE)
+    font = ImageFont.truetype(str(FONT_FILE), 12 * _FINE)
     for place, (name, wire) in enumerate(drawn.items()):
         left = _FINE * place * _SIDE
         last = min(frame, wire.ended - 1)
         over = f", ended at {time * last / frame:.2f} s" if frame > last else ""
         pen.text((left + 12 * _FINE, 4 * _FINE), f"{name}{over}", _INK, font)
-        _rotor(pen, wire, last, (left + _FINE * _SIDE / 2, _FINE * (_TOP + _SIDE / 2)))
+        centre = (left + _FINE * _SIDE / 2, _FINE * (_TOP + _SIDE / 2))
+        scale = 0.5 * _FINE * _SIDE / (1.08 * wire.reach)
+        edge, axis, root = (points * (scale, -scale) + centre for points in (wire.edge, wire.axis, wire.root))
+        for blade in range(edge.shape[1]):
+            path = [tuple(point) for point in edge[: last + 1, blade].tolist()]
+            if len(path) > 1:
+                pen.line(path, fill=coordinate_look(blade + 1).colour, width=_FINE)
+        for blade in range(edge.shape[1]):
+            corners = [centre, *(tuple(points[last, blade].tolist()) for points in (axis, edge, root))]
+            pen.polygon(corners, fill=_FAINT)
+            pen.line([*corners, centre], fill=coordinate_look(blade + 1).colour, width=3 * _FINE, joint="curve")
+        dot = 6 * _FINE
+        pen.ellipse((centre[0] - dot, centre[1] - dot, centre[0] + dot, centre[1] + dot), fill=_INK)
     text = f"t = {time:.2f} s" + (f", offset drawn ×{magnified:g}" if magnified != 1.0 else "")
     pen.text((12 * _FINE, 22 * _FINE), text, GREY, font)
     return image.resize(size, Image.Resampling.LANCZOS)
-
-
-def _rotor(pen: ImageDraw.ImageDraw, wire: Wires, frame: int, centre: tuple[float, float]) -> None:
-    """Paths up to the frame, then the blades."""
-    scale = 0.5 * _FINE * _SIDE / (1.08 * wire.reach)
-
-    def at(point: Array) -> tuple[float, float]:
-        return centre[0] + scale * float(point[0]), centre[1] - scale * float(point[1])
-
-    for blade in range(wire.edge.shape[1]):
-        colour = coordinate_look(blade + 1).colour
-        path = [at(point) for point in wire.edge[: frame + 1, blade]]
-        if len(path) > 1:
-            pen.line(path, fill=colour, width=_FINE)
-    for blade in range(wire.edge.shape[1]):
-        colour = coordinate_look(blade + 1).colour
-        axis, edge, root = (at(points[frame, blade]) for points in (wire.axis, wire.edge, wire.root))
-        pen.polygon([centre, axis, edge, root], fill=_FAINT)
-        pen.line([centre, axis, edge, root, centre], fill=colour, width=3 * _FINE, joint="curve")
-    dot = 6 * _FINE
-    pen.ellipse((centre[0] - dot, centre[1] - dot, centre[0] + dot, centre[1] + dot), fill=_INK)
 
 
 def _film(pictures: Iterator[Image.Image], output: Path) -> None:

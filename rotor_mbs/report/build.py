@@ -18,11 +18,9 @@ from rotor_mbs.report.core import files
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.bench import bench_pages
-from rotor_mbs.report.pages.data_comparison import comparison_page
 from rotor_mbs.report.pages.errata import errata_page
 from rotor_mbs.report.pages.figures import PaperFigure, available, figures_page, walk_figure
 from rotor_mbs.report.pages.index import index_page
-from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
@@ -33,17 +31,14 @@ from rotor_mbs.runs.sweeps import StoredSweep
 _GROUPS = 2  # per worker
 _TIMEOUT_S = 600.0
 
-Task = Callable[[OpenResults, Context], Any]  # makes pages by file name, or what a page has of a figure
+Task = Callable[[OpenResults], Any]  # makes pages by file name, or what a page has of a figure
 OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
 
 
 def write_report(
     results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None, *, checked: bool = False
 ) -> Path:
-    """Write the pages about any file that this program writes into a folder.
-
-    Runs, the stability suite, a bench, modes, comparisons, a sweep: what the file has is one site with one navigation.
-    Nothing is written before every page is made.
+    """Write the pages about any file that this program writes into a folder, all or none; returns the index.
 
     Parameters
     ----------
@@ -51,11 +46,6 @@ def write_report(
     jobs : so many processes, or a pool that is open.
     on_page : called with the number of pages that are made, and of all.
     checked : also a page with the verdicts of `check` on the file's runs, which takes seconds of its own.
-
-    Returns
-    -------
-    Path
-        The index.
 
     Raises
     ------
@@ -83,7 +73,8 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
         labels[files.INDEX] = "Stability suite" if is_suite else "Overview"
     if figures:
         labels[files.FIGURES] = "The paper's figures"
-    if has_runs and not is_suite and _has_errata(opened):
+    printed = {run_selection.PRINTED, *errata_methods().values()}
+    if has_runs and not is_suite and any(printed & {*scene.runs} for scene in opened.scenes.values()):
         labels[files.ERRATA] = "Errata"
     if bench:
         labels[files.BENCH] = "Error against run time"
@@ -103,23 +94,21 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
     elif has_runs:
         pages |= _run_pages(opened, site, figures, bench, jobs, on_page)
     if bench and names[files.BENCH] not in pages:
-        pages |= bench_pages(opened, names[files.BENCH], site)
+        pages |= bench_pages(names[files.BENCH], site, opened)
     if modes:
+        from rotor_mbs.report.mode_study import modes_page
+
         page = modes_page(list(read_modes(opened.path).values()))
         pages[names[files.MODES]] = render("modes", page, site, names[files.MODES])
     for file, record in zip(data_files, compared, strict=True):
+        from rotor_mbs.report.data_comparison import comparison_page
+
         pages[names[file]] = render("data_comparison", comparison_page(record), site, names[file])
     if has_runs and checked:
         from rotor_mbs.report.pages.check import check_page
 
         pages[files.CHECK] = render("check", check_page(opened.path), site, files.CHECK)
     return pages
-
-
-def _has_errata(opened: OpenResults) -> bool:
-    """Whether there are runs of the printed equations."""
-    printed = {run_selection.PRINTED, *errata_methods().values()}
-    return any(printed & {*scene.runs} for scene in opened.scenes.values())
 
 
 def _run_pages(
@@ -136,31 +125,30 @@ def _run_pages(
     decided = claims(opened.scenes)
     has_errata = any(file == files.ERRATA for file, _ in site)
     context = Context(
-        opened.path,
         page_names(opened.scenes),
         decided,
         published.conditions() if decided else {},
         claim_study() if decided else None,
         by_scene(bench),
         published.errata() if has_errata else (),
-        site,
     )
-    tasks: list[Task] = [partial(_figure, figure) for figure in figures]
-    tasks.append(_index)
+    tasks: list[Task] = [partial(walk_figure, figure, context) for figure in figures]
+    tasks.append(partial(_page, "index", files.INDEX, site, partial(index_page, context)))
     if has_errata:
-        tasks.append(_errata)
+        tasks.append(partial(_page, "errata", files.ERRATA, site, partial(errata_page, context)))
     if bench:
-        tasks.append(_bench)
-    tasks += [partial(_scene, name) for name in context.files]
+        tasks.append(partial(bench_pages, files.BENCH, site))
+    for scene, file in context.files.items():
+        tasks.append(partial(_page, "scene", file, site, partial(scene_page, scene, context)))
     made: dict[int, Any] = {}
     on_page(0, len(tasks))
     with pool_of(0 if jobs == 1 else jobs) as pool:
         # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
         count = min(_GROUPS * pool.workers, len(tasks)) if pool.workers > 1 else 1
         groups = [dict(list(enumerate(tasks))[start::count]) for start in range(count)]
-        for finished in run_in(pool, partial(make_parts, context), groups, _TIMEOUT_S):
+        for finished in run_in(pool, partial(make_parts, opened.path), groups, _TIMEOUT_S):
             if finished.value is None:
-                raise finished.error or StoreError(f"{context.results}: a page was not made: {finished.message}")
+                raise finished.error or StoreError(f"{opened.path}: a page was not made: {finished.message}")
             made |= finished.value
             on_page(len(made), len(tasks))
     pages: dict[str, str] = {}
@@ -172,28 +160,13 @@ def _run_pages(
     return pages
 
 
-def make_parts(context: Context, tasks: dict[int, Task]) -> dict[int, Any]:
+def make_parts(results: Path, tasks: dict[int, Task]) -> dict[int, Any]:
     """The work of a process: what each task makes, by its number. Raises StoreError."""
-    with open_results(context.results) as file:
-        opened = file
-        return {number: task(opened, context) for number, task in tasks.items()}
+    with open_results(results) as opened:
+        return {number: task(opened) for number, task in tasks.items()}
 
 
-def _figure(figure: PaperFigure, opened: OpenResults, context: Context) -> dict[str, object]:
-    return walk_figure(figure, opened.scenes, context)
-
-
-def _index(opened: OpenResults, context: Context) -> dict[str, str]:
-    return {files.INDEX: render("index", index_page(opened, context), context.site, files.INDEX)}
-
-
-def _errata(opened: OpenResults, context: Context) -> dict[str, str]:
-    return {files.ERRATA: render("errata", errata_page(opened, context), context.site, files.ERRATA)}
-
-
-def _bench(opened: OpenResults, context: Context) -> dict[str, str]:
-    return bench_pages(opened, files.BENCH, context.site)
-
-
-def _scene(name: str, opened: OpenResults, context: Context) -> dict[str, str]:
-    return {context.files[name]: render("scene", scene_page(opened.scenes[name], context), context.site)}
+def _page(
+    template: str, file: str, site: Site, content: Callable[[OpenResults], dict[str, object]], opened: OpenResults
+) -> dict[str, str]:
+    return {file: render(template, content(opened), site, file)}

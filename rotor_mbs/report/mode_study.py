@@ -1,26 +1,40 @@
-"""The modes of a scene in memory, with tables, figures, files: what `rotor_mbs.modes` returns."""
+"""The modes of a scene: what `rotor_mbs.modes` returns, its figures, and the page of modes."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from rotor_mbs.analysis.campbell import LinearModes, SceneModes, linear_dataset, mode_rows, to_records
+import numpy as np
+
+from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence, linear_dataset, mode_rows, to_records
+from rotor_mbs.analysis.modes import GROWTH, multiblade
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.core.canvas import Panels, curve, growth_map, log_axis, panels
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.files import write_page
-from rotor_mbs.report.pages import modes as pages
+from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
+from rotor_mbs.report.core.numbers import NOTHING, number
+from rotor_mbs.report.core.svg import picture
 from rotor_mbs.runs.records import write_records
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.solution import need_xarray
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.modes import compute_modes
+
+SPEED_AXIS = "rotor speed (rad/s)"
+# Multiples of the rotor speed drawn as lines: gravity acts once a turn, a tower or yaw error on each blade in turn.
+_HARMONICS = (1, 2, 3, 6)
+_MARKS = ("o", "s", "^", "D", "v", "P", "x")
+# Growth over a turn beyond which the colours of the chart end.
+MAX_GROWTH = 1e3
 
 
 def modes(scene: Scene | str, speeds: Sequence[float] = (), stiffnesses: Sequence[float] = ()) -> Modes:
@@ -91,7 +105,7 @@ class Modes(SceneModes):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """The page into a folder; its path."""
-        return write_page(folder, "modes", pages.modes_page([self]))
+        return write_page(folder, "modes", modes_page([self]))
 
     def _repr_html_(self) -> str:
         drawn = self.plot()._repr_svg_() if self.rotation else ""
@@ -105,30 +119,166 @@ class ModePlots:
         self._modes = modes
 
     def __call__(self) -> Panels:
-        """Campbell diagram: damped frequencies (rad/s) over rotor speed. Raises InputError without speeds."""
-        rotation = self._rotation()
-        panels = pages.campbell(rotation)
-        looks = [pages.mode_look(k) for k in range(len(rotation.names))]
-        canvas.legend(panels.axes[0], list(zip(rotation.names, looks, strict=True)))
-        return panels
+        """Campbell diagram: damped frequencies (rad/s) over rotor speed, with multiples of the speed."""
+        modes = self._rotation()
+        panel = panels((2.9, 1.7), SPEED_AXIS)
+        frequencies, speeds = modes.damped_frequencies, modes.speeds
+        top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
+        apart = float(speeds[-1]) > 0.05 * top  # else the labels would lie on each other
+        for k in _HARMONICS:
+            panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")
+            if apart or k == _HARMONICS[-1]:
+                end = min(float(speeds[-1]), top / k)
+                panel.axes[0].text(end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
+        for k, known in enumerate(frequencies.T):
+            first = known[np.flatnonzero(np.isfinite(known))[:1]]
+            change = np.where(np.nanmax(known) > 1e-6 * top, known - first, np.nan)
+            every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
+            for axes, values in zip(panel.axes, (known, change), strict=True):
+                curve(axes, speeds, values, mode_look(k), markevery=every, markersize=4.0)
+        panel.axes[0].set_ylim(0.0, top)
+        panel.axes[0].set_ylabel("frequency (rad/s)")
+        panel.axes[1].set_ylabel("change (rad/s)")
+        canvas.legend(panel.axes[0], [(name, mode_look(k)) for k, name in enumerate(modes.names)])
+        return panel
 
     def damping(self) -> Panels:
         """Damping ratios and growth rates (1/s) over rotor speed. Raises InputError without speeds."""
-        return pages.damping(self._rotation())
+        modes = self._rotation()
+        panel = panels((2.0, 2.0), SPEED_AXIS)
+        curves = {"damping ratio": modes.damping_ratios, "growth rate (1/s)": modes.growth_rates}
+        for axes, (label, numbers) in zip(panel.axes, curves.items(), strict=True):
+            for k, values in enumerate(numbers.T):
+                curve(axes, modes.speeds, values, replace(mode_look(k), marker=""))
+            axes.set_ylabel(label)
+        return panel
 
     def multipliers(self) -> Panels:
         """Moduli of the Floquet multipliers over rotor speed. Raises InputError where there are none."""
-        if self._modes.floquet is None:
+        table = self._modes.floquet
+        if table is None:
             raise InputError(f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0")
-        return pages.multipliers(self._modes.floquet)
+        panel = panels((2.6,), SPEED_AXIS)
+        axes = panel.axes[0]
+        sizes = np.abs(table.multipliers)
+        shown = np.where(sizes > 0.0, sizes, np.nan)
+        curve(axes, table.speeds, shown, Look(BLUE, "", "o"), markersize=2.0, markerfacecolor=BLUE)
+        curve(axes, table.speeds, table.largest, Look(VERMILLION, "-", ""), 1.5)
+        axes.axhline(1.0, color=GREY, linewidth=0.8)
+        known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+        if len(known) and known.max() / known.min() > 10.0:
+            log_axis(axes, float(known.min()), float(known.max()))
+        elif len(known) and known.max() / known.min() < 1.0 + 10.0 * GROWTH:
+            axes.set_ylim(0.9, 1.1)
+        axes.set_ylabel("modulus of the multipliers")
+        return panel
 
     def chart(self) -> Panels:
-        """Growth over a turn over speed and bearing stiffness. Raises InputError where there is none."""
-        if self._modes.chart is None:
+        """Growth over a turn as colour over speed and bearing stiffness. Raises InputError where there is none."""
+        table = self._modes.chart
+        if table is None:
             raise InputError(f"{self._modes.scene}: no stability chart; it needs gravity, speeds and stiffnesses")
-        return pages.chart(self._modes.chart)
+        panel = panels((3.6,), SPEED_AXIS)
+        label = "growth over a turn (powers of ten)"
+        growth_map(panel, table.speeds, table.stiffnesses, table.largest, MAX_GROWTH, label, 1.0 + GROWTH)
+        panel.axes[0].set_ylabel("bearing stiffness (N m/rad)")
+        return panel
 
     def _rotation(self) -> LinearModes:
         for linear in self._modes.rotation.values():
             return linear
         raise InputError(f"{self._modes.scene}: no modes over speed; ask for speeds")
+
+
+def mode_look(index: int) -> Look:
+    """Line and marker of a mode: equal frequencies lie on each other, so that each mode has its own marker."""
+    return replace(coordinate_look(index), marker=_MARKS[index % len(_MARKS)])
+
+
+def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
+    """The content of the page: a part for each scene, of which each id is unique on the page."""
+    return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)]}
+
+
+def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
+    sources = max((list(kind.values()) for kind in (modes.rest, modes.rotation)), key=len)
+    rest = next(iter(modes.rest.values()), None)
+    rotation = next(iter(modes.rotation.values()), None)
+    plots = ModePlots(modes)
+    pictures: list[Picture] = []
+    legend: list[LegendEntry] = []
+    fastest = Section()
+    if rotation is not None and not np.isnan(rotation.growth_rates).all():
+        last = len(rotation.speeds) - 1
+        state = f"{modes.scene}, {number(float(rotation.speeds[last]), 4)} rad/s"
+        fastest = Section(tables=_tables(rotation, last, state))
+        if last > 0:
+            caption = "Damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
+            pictures.append(picture(plots(), f"{name}-campbell", caption))
+            legend += [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
+            if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
+                caption = "Damping ratios and growth rates"
+                pictures.append(picture(plots.damping(), f"{name}-damping", caption))
+    return {
+        "id": name,
+        "name": modes.scene,
+        "title": modes.title,
+        "models": [f"{linear.label} ({linear.source})" for linear in sources],
+        "agrees": modes.agrees,
+        "difference": modes.disagreement,
+        "notes": ([with_capital(floquet_sentence(modes.floquet))] if modes.floquet is not None else [])
+        + list(modes.notes),
+        "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
+        "campbell": Section(pictures, legend),
+        "fastest": fastest,
+        "turning": _turning(modes, name),
+    }
+
+
+def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
+    """Frequencies and shapes at the i-th speed; state: the beginning of captions, which differ on the whole page."""
+    columns = {
+        "undamped (Hz)": linear.undamped_frequencies / (2.0 * math.pi),
+        "undamped (rad/s)": linear.undamped_frequencies,
+        "damped (rad/s)": linear.damped_frequencies,
+        "damping ratio": linear.damping_ratios,
+        "growth rate (1/s)": linear.growth_rates,
+        "backward whirl (rad/s)": linear.whirl[0],
+        "forward whirl (rad/s)": linear.whirl[1],
+    }
+    frequencies, shapes = [], []
+    for k, name in enumerate(linear.names):
+        frequencies.append([name, *(_shown(float(values[i, k]), 7) for values in columns.values())])
+        amplitudes = np.abs(linear.multiblade_shapes[i][k])
+        largest = max(float(amplitudes.max()), 1e-300)
+        shapes.append([name, *(_shown(float(amplitude) / largest, 3) for amplitude in amplitudes)])
+    caption = f"{state}: modes by the {linear.label} ({linear.source})"
+    table = PageTable(caption, ("Mode", *columns), frequencies, range(1, 1 + len(columns))).without_empty_columns()
+    head = ("Shape", "rotor", *multiblade(linear.blades)[0])
+    return [table, PageTable(f"{state}: shapes, the largest amplitude 1", head, shapes, range(1, len(head)))]
+
+
+def _shown(value: float, digits: int) -> str:
+    if not math.isfinite(value):
+        return NOTHING
+    return number(0.0 if abs(value) < 1e-12 else value, digits)
+
+
+def _turning(modes: SceneModes, name: str) -> Section:
+    table = modes.floquet
+    if table is None:
+        return Section()
+    drawn: list[Picture] = []
+    if len(table.speeds) > 1 and np.isfinite(table.largest).any():
+        caption = "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
+        drawn.append(picture(ModePlots(modes).multipliers(), f"{name}-multipliers", caption))
+    if modes.chart is not None:
+        caption = "Stability chart: growth over a turn under gravity; a line bounds what is stable"
+        drawn.append(picture(ModePlots(modes).chart(), f"{name}-chart", caption))
+    rows: list[Row] = []
+    for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
+        cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
+        numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
+        rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
+    head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
+    return Section(drawn, (), [PageTable(f"{modes.scene}: multipliers", head, rows, (0, 1, 2, 3, 4))])

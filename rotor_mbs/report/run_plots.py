@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look, label_of, look_of
 from rotor_mbs.report.pages.quantities import components
-from rotor_mbs.report.plots import time_histories
-from rotor_mbs.report.plots.paths import paths
-from rotor_mbs.report.plots.time_histories import Series
+from rotor_mbs.report.plots import Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.solution import Solution
@@ -30,7 +29,7 @@ class RunPlots:
         """Angles (rad) and rates (rad/s) over time (s): rotor and pitches."""
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
-        return time_histories.motion(_some(run.time), run.angles, run.rates, horizon_s)
+        return plots.motion(_some(run.time), run.angles, run.rates, horizon_s)
 
     def energy(self) -> Panels:
         """Kinetic energy, potential energy, and their sum less the work (J) over time. Raises InputError without."""
@@ -39,7 +38,7 @@ class RunPlots:
         curves = {"kinetic": kinetic, "potential": potential, "total less work": kinetic + potential - work}
         looks = dict(zip(curves, (Look(VERMILLION, "-", ""), Look(BLUE, "--", ""), Look(INK, "-", "")), strict=True))
         series = [Series(run.time, values, looks[name]) for name, values in curves.items()]
-        picture = time_histories.lines([("energy (J)", series)])
+        picture = plots.lines([("energy (J)", series)])
         canvas.legend(picture.axes[0], list(looks.items()))
         return picture
 
@@ -59,25 +58,25 @@ class RunPlots:
             looks[part.label] = coordinate_look(part.place)
             label = f"{part.group} {load.plot.axis}".strip()
             rows.setdefault(label, []).append(Series(self._run.time, part.values, looks[part.label]))
-        panels = time_histories.lines(list(rows.items()), height=1.6)
+        panels = plots.lines(list(rows.items()), height=1.6)
         canvas.legend(panels.axes[0], list(looks.items()))
         return panels
 
     def error(self) -> Panels:
         """Largest angle error (rad) against the reference over time. Raises InputError where there is none."""
-        return error_figure({self._run.method: self._run}, self._reference)
+        return ComparisonPlots({self._run.method: self._run}, self._reference).error()
 
     def tips(self) -> Panels:
         """Paths of the blade tips (m). Raises InputError where the scene does not ask for them."""
         _some(self._run.time)
-        return paths(_quantity(self._run, "tip"))
+        return plots.paths(_quantity(self._run, "tip"))
 
 
 class ComparisonPlots:
     """Figures of several runs of one scene."""
 
     def __init__(self, runs: Mapping[str, Solution], reference: Trajectory | None) -> None:
-        self._runs, self._reference = runs, reference
+        self._runs, self._reference = list(runs.values()), reference
 
     def __call__(self) -> Panels:
         """Draws `error`."""
@@ -85,41 +84,32 @@ class ComparisonPlots:
 
     def error(self) -> Panels:
         """Largest angle error (rad) of each run against the reference over time. Raises InputError without one."""
-        return error_figure(self._runs, self._reference)
+        if self._reference is None:
+            raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
+        series = self._series([angle_error(run.trajectory, self._reference) for run in self._runs])
+        return self._with_legend(plots.errors(series, "largest angle error (rad)", horizon(self._reference)))
 
     def rotor(self) -> Panels:
         """The rotor's angle (rad) by each method over time."""
-        runs = list(self._runs.values())
-        return _with_legend(
-            time_histories.lines([("rotor angle (rad)", [_series(run, run.angles[:, 0]) for run in runs])]), runs
-        )
+        series = self._series([run.angles[:, 0] for run in self._runs])
+        return self._with_legend(plots.lines([("rotor angle (rad)", series)]))
 
     def energy_error(self) -> Panels:
         """|energy less work, less its start| of each run, of the scene's energy scale. Raises InputError without."""
-        series = []
-        for run in self._runs.values():
+        errors = []
+        for run in self._runs:
             scale = energy_scale(run.scene, run.trajectory)
-            series.append(_series(run, np.abs(_quantity(run, "energy_error")) / (scale or 1.0)))
-        return _with_legend(time_histories.errors(series, "energy error, of the energy scale"), self._runs.values())
+            errors.append(np.abs(_quantity(run, "energy_error")) / (scale or 1.0))
+        return self._with_legend(plots.errors(self._series(errors), "energy error, of the energy scale"))
 
+    def _series(self, values: Sequence[Array]) -> list[Series]:
+        pairs = zip(self._runs, values, strict=True)
+        return [Series(_some(run.time)[: len(array)], array, look_of(run.method)) for run, array in pairs]
 
-def error_figure(runs: Mapping[str, Solution], reference: Trajectory | None) -> Panels:
-    """Largest angle error (rad) of each run over time (s), on a logarithmic axis, with the horizon."""
-    if reference is None:
-        raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
-    series = [_series(run, angle_error(run.trajectory, reference)) for run in runs.values()]
-    picture = time_histories.errors(series, "largest angle error (rad)", horizon(reference))
-    return _with_legend(picture, runs.values())
-
-
-def _with_legend(picture: Panels, runs: Iterable[Solution]) -> Panels:
-    looks = {label_of(run.method): look_of(run.method) for run in runs}
-    canvas.legend(picture.axes[0], list(looks.items()))
-    return picture
-
-
-def _series(run: Solution, values: Array) -> Series:
-    return Series(_some(run.time)[: len(values)], values, look_of(run.method))
+    def _with_legend(self, panels: Panels) -> Panels:
+        looks = {label_of(run.method): look_of(run.method) for run in self._runs}
+        canvas.legend(panels.axes[0], list(looks.items()))
+        return panels
 
 
 def _some(time: Array) -> Array:

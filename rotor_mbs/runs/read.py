@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -160,10 +160,14 @@ class OpenResults:
 
 
 @contextmanager
-def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
+def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
     """An open results file. A run is compared with its checksum when it is read, but for verify=False.
 
     A file that replaces it meanwhile is not seen.
+
+    Parameters
+    ----------
+    only : names of the scenes that are read, by default all.
 
     Raises
     ------
@@ -178,7 +182,7 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
             if stored.groups and stored.table(stored.groups[0]).inode != os.fstat(file.fileno()).st_ino:
                 continue
             with files.reading(path):
-                scenes = {scene.name: scene for scene in _scenes(stored, file, verify)}
+                scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
             yield OpenResults(path, attributes, {name: scenes[name] for name in natural_order(scenes)})
             return
     raise StoreError(f"{path}: is being replaced by another process")
@@ -198,7 +202,7 @@ def is_sweep(path: Path) -> bool:
         return "run" in file
 
 
-def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[StoredScene]:
+def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None) -> Iterator[StoredScene]:
     if RUNS not in stored.groups:
         return
     runs = stored.table(RUNS)
@@ -210,6 +214,8 @@ def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[Stored
             continue
         known = stored.known(RUNS, i)
         scene = str(known["scene"])
+        if only is not None and scene not in only:
+            continue
         arrays = stored.table(scene)
         scales = arrays.known
         labels = tuple(map(str, arrays.labels.get("coordinate", ())))

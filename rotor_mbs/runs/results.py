@@ -318,7 +318,7 @@ def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]
             continue
         rows = {run: row for run, row in _known_rows(before).items() if (group, run) not in dropped}
         asked = _known_rows(made)
-        kept += [(group, run) for run in rows if run not in asked or rows[run] == asked[run]]
+        kept += [(group, run) for run in rows if run not in asked or _is_same(rows[run], asked[run])]
         rows |= asked
         if rows:
             runs = sorted(rows, key=_order) if group == RUNS else list(rows)
@@ -365,6 +365,13 @@ def _known_rows(made: Table | None) -> dict[str, dict[str, Any]]:
         return {}
     columns = {name: list(values) for name, (_, values) in made.known.items()}
     return {str(run): {name: values[i] for name, values in columns.items()} for i, run in enumerate(made.runs)}
+
+
+def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
+    """Whether a row is as it is asked for; a number that it does not have is NaN in both."""
+    return stored.keys() == asked.keys() and all(
+        value == asked[name] or (value != value and asked[name] != asked[name]) for name, value in stored.items()
+    )
 
 
 def _joined(before: Table | None, made: Table | None) -> dict[str, Column]:

@@ -1,7 +1,4 @@
-"""The bounds that results are judged by: reference/accuracy.toml, and a user's own file before it.
-
-A run's status and the verdicts of `check` read the same entries.
-"""
+"""The bounds that statuses and `check` judge by: reference/accuracy.toml, and a user's own file before it."""
 
 from __future__ import annotations
 
@@ -54,10 +51,8 @@ class _BoundsFile:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds in the order in which they are tried: the first entry whose check, method and scene fit counts.
-
-    scene   the shipped scene that they are for; "" for any
-    """
+    """The first entry whose check, method and scene fit counts; scene: the shipped one that they are for, "" for
+    any."""
 
     entries: Sequence[Bound]
     scene: str = ""
@@ -82,12 +77,7 @@ class Bounds:
         return None
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
-        """Bounds that try `entries` first, then these.
-
-        >>> bounds = Bounds([Bound("energy", "*", 1e-6, "default")])
-        >>> bounds.with_entries([Bound("energy", "mine/*", 1e-3, "explicit")]).of("energy", "mine/euler").value
-        0.001
-        """
+        """Bounds that try `entries` first, then these."""
         return replace(self, entries=[*entries, *self.entries])
 
 

@@ -1,12 +1,6 @@
-"""The one judgement of a run, from its samples: runs, bench, check and report use it.
-
-The bounds are those of reference/accuracy.toml, which `check` reads, too, and those that a quantity brings: a status
-and a verdict cannot follow from different numbers.
-
-An engine's report can only lower a status: a run that it calls failed is never ok, a run that it calls good is examined
-all the same. The printed equations are not judged against the reference or by their energy: that they depart from them
-is the finding.
-"""
+"""The one judgement of a run, from its samples, by the bounds that `check` reads, too. An engine's report can only
+lower a status. The printed equations are not judged against the reference or by their energy: that they depart from
+them is the finding."""
 
 from __future__ import annotations
 
@@ -51,8 +45,6 @@ _CLEAR_SHARE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a run is judged to be."""
-
     status: str  # one of `status.STATUSES`
     message: str  # one line; "" for ok
     false_success: bool  # the engine reported success of a run that is wrong
@@ -61,15 +53,9 @@ class Judgement:
 
 @functools.cache
 def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> tuple[float, float] | None:
-    """The bounds on "model/integrator", `own` first; None for methods that have none (the printed equations).
-
-    Returns
-    -------
-    angle : relative error (of the rotor's way from its start, of the largest pitch, each at least 1 rad) per unit of
-        error growth: the scene's own growth, which is not the method's fault, carries every local error on (samples
-        before the horizon)
-    energy : of the scene's energy scale, over the whole run; see `energy_conditioning`
-    """
+    """(angle, energy) bounds on "model/integrator", `own` first; None for methods that have none (the printed
+    equations). Angle: relative error (of the rotor's way, of the largest pitch, each at least 1 rad) per unit of error
+    growth, up to the horizon; energy: of the scene's energy scale, over the whole run, see `energy_conditioning`."""
     bounds = shipped_bounds().with_entries(own)
     angle, energy = (bounds.find(check, method) for check in ("agreement", "energy"))
     if angle is None or energy is None:
@@ -78,7 +64,6 @@ def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> tuple[float, float] 
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
-    """The bound on a quantity's number for a method; None where the number is not judged."""
     entry = bounds.find(rule.check, method) if rule.check else None
     return entry.value if entry else rule.bound
 
@@ -107,18 +92,8 @@ def clearly_ok(
     angles: Array,
     own: tuple[Bound, ...] = (),
 ) -> NDArray[np.bool_]:
-    """Whether `judge`, without a reference, is certain to call each run ok; of a method without bounds it is not.
-
-    Parameters
-    ----------
-    scenes, integrations, samples : of each of k runs of one `method`
-    drifts, angles : (k,) energy error of its scale, and the largest angle in rad, of each run
-    own : bounds that the method brings
-
-    Returns
-    -------
-    ndarray of bool, shape (k,)
-    """
+    """(k,) whether `judge`, without a reference, is certain to call each of k runs of a method ok; of a method without
+    bounds it is not. From energy errors `drifts` (of their scale) and the largest `angles` (rad) of each."""
     allowed = allowed_of(method, own)
     complete = np.array([run.success and n == scenes[0].samples for run, n in zip(integrations, samples, strict=True)])
     complete &= angles <= ANGLE_LIMIT
@@ -129,11 +104,8 @@ def clearly_ok(
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
-    """Whether a claim of success may stand: the end reached, and off by no more than a coarse step is.
-
-    An inaccurate run is no false success as long as it resembles the motion; a wrong one is. Against an unchecked
-    run's claim nothing is known.
-    """
+    """Whether a claim of success may stand: an inaccurate run that resembles the motion is no false success; against an
+    unchecked run's claim nothing is known."""
     if status != "inaccurate":
         return status in ("ok", "unchecked")
     errors = [metrics[name] for name in _CHECKS if name in metrics]
@@ -251,11 +223,8 @@ def _shares_at_quarter_turns(scene: Scene, angles: Array) -> Array:
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
-    """Smallest S / (rotor inertia) at the last sample and on the straight way on to the next one.
-
-    S = J_hub + Σ (a - b²/Jzz) is the Schur complement of the mass matrix: with every pitch free to give way, the
-    rotor's remaining inertia. For point-mass blades it is m (c² + d²) cos²θ.
-    """
+    """Smallest S / (rotor inertia) at the last sample and on the straight way on to the next one. S = J_hub + Σ (a -
+    b²/Jzz) is the rotor's inertia with every pitch free to give way: m (c² + d²) cos²θ for point masses."""
     if not len(run.time):
         angles = np.array([scene.initial_angles])
     else:

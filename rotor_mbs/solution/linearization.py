@@ -31,14 +31,8 @@ def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque
 
 
 def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
-    """Difference quotients with the steps h, 2h, 4h, ... extrapolated to a step of 0 (Richardson).
-
-    Parameters
-    ----------
-    quotients : arrays of the same shape, from the shortest step to the longest
-    ratio : by which a doubled step enlarges the first term of the error, and each further term once more: 2 for
-        one-sided quotients, 4 for central ones
-    """
+    """Difference quotients with the steps h, 2h, 4h, ... extrapolated to a step of 0 (Richardson); ratio: by which a
+    doubled step enlarges each further term of the error, 2 for one-sided quotients, 4 for central ones."""
     values = list(quotients)
     for power in range(1, len(values)):
         pairs = itertools.pairwise(values)

@@ -15,24 +15,9 @@ from rotor_mbs.solution.quantities import sample_times as sample_times
 
 
 class Trajectory:
-    """Samples at equally spaced times, as far as the run got (n rows; every row finite).
-
-    Angles are unwrapped. A pitch without inertia stays at its initial value. Further quantities are in `quantities` by
-    name; the built-in ones are attributes, too, None where the scene does not ask for them or the model lacks them.
-
-    Attributes
-    ----------
-    time : (n,) s
-    angles, rates : (n, 1 + blades) rad, rad/s: rotor, then the pitch of each blade
-    quantities : the other arrays by name; dimensions and units are declared in `solution.quantities`
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> run = Trajectory(np.zeros(1), np.zeros((1, 4)), np.zeros((1, 4)), work=np.zeros(1))
-    >>> run.work, run.tip
-    (array([0.]), None)
-    """
+    """Samples at equally spaced times, as far as the run got (n rows; every row finite); angles are unwrapped.
+    Quantities beside angles and rates (n, 1 + blades) are in `quantities` by name; the built-in ones are attributes,
+    too, None where the scene does not ask for them or the model lacks them."""
 
     time: Array
     angles: Array
@@ -98,7 +83,6 @@ class RunBlock:
     samples: list[int]  # how many rows of each are finite
 
     def trajectory(self, i: int) -> Trajectory:
-        """Run i alone, cut where it broke off."""
         n = self.samples[i]
         return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
 
@@ -121,7 +105,6 @@ def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, A
 
 
 def finite_rows(*tables: Array) -> int:
-    """How many rows from the first are finite in every table."""
     finite = np.all([np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0)
     return len(finite) if finite.all() else int(np.argmin(finite))
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
+from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
 from rotor_mbs.methods.catalogue import find_method, ladders, settings_for
-from rotor_mbs.methods.ladders import STEP, TOLERANCE, Ladder
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in

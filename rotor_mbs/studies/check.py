@@ -21,7 +21,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.run import OnProgress, ignore_progress, run_scenes
-from rotor_mbs.studies.stored_references import shipped_files
+from rotor_mbs.studies.stored_references import shipped_files, shipped_reference
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
@@ -83,7 +83,11 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     try:
         with ExitStack() as stack:
             results = stack.enter_context(open_results(path, verify=False))
-            shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
+            frozen = [shipped_reference(str(scene.attributes["scene_hash"])) for scene in results.scenes.values()]
+            shipped = [
+                stack.enter_context(open_results(file, only=[known.scene for known in frozen if known is not None]))
+                for file in {known.path for known in frozen if known is not None}
+            ]
             checks = checks_of(results, shipped, bounds)
     except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
         raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc

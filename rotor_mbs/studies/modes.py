@@ -58,7 +58,7 @@ def modes_of_scenes(
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
-    """The modes of every scene into the results file `output`; what it has of other scenes is kept.
+    """The modes of every scene into the file `output`; those of other scenes that it has are kept.
 
     speeds        rad/s, of the Campbell diagram and the Floquet multipliers
     stiffnesses   N m/rad, of every bearing, for the stability chart over speed

@@ -36,7 +36,7 @@ BOTH = ("-m", "lagrange/dop853", "-m", "exudyn_tree/rk67")
 def hashes(path: Path) -> dict[str, str]:
     with open_results(path) as results:
         return {
-            f"{scene.name}/{run.method}": run.attributes["run_hash"]
+            f"{scene.name}/{run.method}": run.known["scene_hash"]
             for scene in results.scenes.values()
             for run in scene.runs.values()
         }

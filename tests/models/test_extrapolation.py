@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.references import reference, run, scene
 
-from rotor_mbs.models.exudyn.extrapolation import extrapolated
+from rotor_mbs.models.exudyn.solvers import extrapolated
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon_samples
 from rotor_mbs.solution.solution import Solution

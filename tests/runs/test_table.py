@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -197,7 +198,7 @@ def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
             subprocess.Popen([sys.executable, "-c", program, str(path), str(first)], env=environment)
             for first in (0, 1)
         ]
-        with suppress(subprocess.TimeoutExpired):
+        with contextlib.suppress(subprocess.TimeoutExpired):
             writers[0].wait(timeout=0.5 + 0.03 * round_)
         for writer in writers:
             writer.send_signal(signal.SIGKILL)
@@ -279,13 +280,16 @@ def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_
 def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
     fit(path, results_tables(_asked("lagrange/taylor")))
-    point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5}
+    point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5, "tolerance": np.nan}
     file = fit(path, [points_table("stability", [point])])
     place = file.place("a", "stability")
     place.write(place.first, row_of_point(place, "ok", "", {"angle_error_max": 0.25}))
     file = fit(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
     assert file.place("a", "stability").is_stored
     assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
+    assert fit(path, [points_table("stability", [point])]).place("a", "stability").is_stored
+    changed = fit(path, [points_table("stability", [point | {"step": 0.25}])])
+    assert not changed.place("a", "stability").is_stored
     file = fit(path, [], dropped=[("stability", "a")])
     assert "stability" not in file.groups
 

@@ -9,17 +9,14 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from rotor_mbs.runs.case import Case
 from support.scenes import PAPER
 
 from rotor_mbs.analysis.published import checked_entries
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.runner import Job
-from rotor_mbs.scenario.catalogue import find_scenes, reference_folder
-from rotor_mbs.studies.reproduce import BENCHED, ladder_cases
-from rotor_mbs.studies.run import store_time_out
+from rotor_mbs.scenario.catalogue import reference_folder
 
+pytestmark = pytest.mark.full
 METHODS = {"printed/ode45", "lagrange/taylor", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"}
 
 
@@ -76,14 +73,6 @@ def test_the_report_says_what_was_found(reproduced: Path) -> None:
     assert len(pages) == len(PAPER) + 5  # index, errata, the figures one by one, the bench and its scene
     for page in pages:
         assert not re.search(r'(?:src|href)="(?:https?:)?//', page.read_text())
-
-
-def test_a_curve_that_was_ended_leaves_no_run_and_a_run_does(tmp_path: Path) -> None:
-    scene = find_scenes([BENCHED])[0]
-    for case in (ladder_cases(scene)[0], Case(scene, "lagrange/ode45")):
-        found = store_time_out(Job(case, tmp_path / f"{case.study}.h5"), "too slow")
-        assert found.status == "timed_out"
-    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
 
 
 def test_a_second_time_nothing_is_made_anew(reproduced: Path) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.results import Asked, TableFile, fit, results_tables, row_of_run
+from rotor_mbs.runs.results import RUNS, Asked, TableFile, fit, results_tables, row_of_run
+from rotor_mbs.runs.table import Rows
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.solution import Solution
@@ -113,3 +114,16 @@ def damage(path: Path, run: str, column: str, at: int = 0) -> None:
         byte = file.read(1)[0]
         file.seek(-1, 1)
         file.write(bytes([byte ^ 1]))
+
+
+def change_row(path: Path, run: str, change: Callable[[Rows], None]) -> None:
+    """Change the columns of a stored run in place; its row has the checksum of what it holds then."""
+    place = TableFile(path).place(run)
+    row = {name: values.copy() for name, values in place.read().items()}
+    change({name: values[0, ...] for name, values in row.items()})
+    place.write(place.first, row)
+
+
+def drop(path: Path, run: str) -> None:
+    """Take a run out of a file."""
+    fit(path, [], dropped=[(RUNS, run)])

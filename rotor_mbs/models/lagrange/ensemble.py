@@ -1,10 +1,6 @@
-"""Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure.
-
-In Hamilton's variables, whose equations take fewer and cheaper steps; what is stored are rates, as of a run alone.
-
-A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a sweep gives the same
-bits. Runs in one process and one thread: processes are the parallelism.
-"""
+"""Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure, in
+Hamilton's variables. A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a
+sweep gives the same bits. One thread: processes are the parallelism."""
 
 from __future__ import annotations
 
@@ -43,7 +39,6 @@ _OBSERVED_PER_CALL = 1024
 
 
 def empty_block(scenes: Sequence[Scene]) -> RunBlock:
-    """Room for their samples, all of which are to be put there."""
     first, runs = scenes[0], len(scenes)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
     blades = len(first.blades)
@@ -67,18 +62,8 @@ def lanes() -> int:
 
 
 def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
-    """Run all scenes; a run that breaks off is in the result, cut and with its reason.
-
-    Parameters
-    ----------
-    scenes : with the same number of blades and samples and the same outputs, loads not among them
-    tolerance : of the local error, absolute and relative
-
-    Raises
-    ------
-    MethodRefusal
-        Where heyoka is not installed.
-    """
+    """Run all scenes, with the same number of blades and samples and the same outputs, loads not among them; a run that
+    breaks off is in the result, cut and with its reason. Raises MethodRefusal where heyoka is not installed."""
     block = empty_block(scenes)
     rotors: dict[tuple[object, ...], _RotorNumbers] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
@@ -106,7 +91,6 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
 
 def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
-    """Compiled once per computer (engine's cache on disk)."""
 
     def make() -> Any:
         equations, _ = build_system(example, in_momenta=True)
@@ -114,15 +98,6 @@ def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) ->
         return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
 
     return compiled(("batch", tolerance, structure), make)
-
-
-def _momenta(example: Scene) -> Any:
-    """Compiled code from angles and rates to momenta."""
-    engine, parameters = heyoka(), Parameters()
-    form, _ = equation_numbers(example, parameters)
-    angles, rates = state_symbols(form)
-    rows = [engine.expression(0.0) + row for row in hamilton.momenta(angles, rates, form, engine.sin, engine.cos)]
-    return engine.cfunc(rows, [*angles, *rates], compact_mode=is_compact(example))
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
@@ -133,10 +108,8 @@ def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
 
 
 def _observables(example: Scene) -> Any:
-    """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta.
-
-    It takes a tenth of the time that NumPy takes for the same formulas, a quarter of a run with 1,001 samples.
-    """
+    """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta: a tenth of
+    NumPy's time for the same formulas."""
     engine, parameters = heyoka(), Parameters()
     form, loads = equation_numbers(example, parameters)
     points = _tip_numbers(example, parameters)
@@ -156,12 +129,8 @@ def _observables(example: Scene) -> Any:
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
-    """(rows, runs, samples): what a compiled function gives, such as x y z in m of each tip, or the energies in J.
-
-    `states` are (variables, runs, samples), of what moves: angles in rad, then rates or momenta; `numbers` are
-    (parameters, runs), of equations and tips, then the pitches that are fixed. The runs must fill the processor's
-    lanes, once or more: what is left over is rounded by other instructions.
-    """
+    """(rows, runs, samples) of compiled code at (variables, runs, samples) states of what moves; `numbers` (parameters,
+    runs) as of `_Group`. The runs must fill the lanes: what is left over is rounded by other instructions."""
     _, runs, samples = states.shape
     parts = []
     for i in range(0, samples, _OBSERVED_PER_CALL):
@@ -174,15 +143,7 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 
 
 class _Group:
-    """Runs of one structure, and the compiled code for them.
-
-    Attributes
-    ----------
-    places, scenes : of each run, in the block
-    initial : (variables, k) state
-    times : (samples, k) s
-    numbers : (parameters, k) of the rotor, then the pitches that are fixed
-    """
+    """Runs of one structure, and the compiled code for them; places: of each run in the block."""
 
     def __init__(
         self, places: list[int], scenes: list[Scene], rotors: Sequence[_RotorNumbers], tolerance: float
@@ -192,7 +153,16 @@ class _Group:
         self.integrator = _integrator(structure, tolerance, example)
         outputs = example.wants("tip"), example.wants("energy")
         self.observables = compiled(("observables", *outputs, structure), lambda: _observables(example))
-        self.momenta = compiled(("momenta", structure), lambda: _momenta(example))
+
+        def momenta() -> Any:
+            engine, parameters = heyoka(), Parameters()
+            form, _ = equation_numbers(example, parameters)
+            symbols, speeds = state_symbols(form)
+            rows = hamilton.momenta(symbols, speeds, form, engine.sin, engine.cos)
+            rows = [engine.expression(0.0) + row for row in rows]
+            return engine.cfunc(rows, [*symbols, *speeds], compact_mode=is_compact(example))
+
+        self.momenta = compiled(("momenta", structure), momenta)
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
@@ -200,6 +170,7 @@ class _Group:
         self.initial = np.zeros((self.integrator.state.shape[0], len(scenes)))
         self.initial[: 2 * len(self.moving)] = np.concatenate([angles[self.moving], rates[self.moving]])
         self.times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), example.samples)
+        # (parameters, k) of the rotor, then the pitches that are fixed
         self.numbers = np.concatenate([np.stack([numbers for numbers, _ in rotors], axis=1), angles[fixed]])
 
     def solve(self, columns: Sequence[int]) -> tuple[Array, Array, list[Integration]]:
@@ -260,7 +231,6 @@ class _Group:
 
 
 def _propagate(block: RunBlock, group: _Group) -> None:
-    """All its runs into the block."""
     width = group.integrator.state.shape[1]
     runs = len(group.scenes)
     chunk = max(_SAMPLES_PER_CHUNK // len(group.times) // width, 1) * width

@@ -1,9 +1,5 @@
-"""A scene's numbers as the closed form needs them: coefficients, loads, units of rates.
-
-Coefficients are in exact rational arithmetic until the last step. Why: for a point mass the coefficients
-Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating point they leave a rounding remainder, and near
-a pitch of ±π/2 that remainder, not the physics, would be the inertia.
-"""
+"""A scene's numbers as the closed form needs them. Coefficients are in exact rational arithmetic until the last step:
+of a point mass some vanish identically, and near a pitch of ±π/2 a rounding remainder would be the inertia."""
 
 from __future__ import annotations
 
@@ -70,13 +66,8 @@ class RotorForm:
 def rotor_form(
     scene: Scene, convert: Convert = float, phases: Sequence[tuple[Fraction, Fraction]] | None = None
 ) -> RotorForm:
-    """The coefficients of `scene`; its doubles are taken as exact, so that every precision solves the same rotor.
-
-    Parameters
-    ----------
-    convert : rounds each coefficient once from its exact value
-    phases : (blades,) cosines and sines of the mounting angles, where they are not those of `Scene.phases`
-    """
+    """The coefficients of `scene`, whose doubles are taken as exact; `convert` rounds each once. `phases`: (blades,)
+    cosines and sines of the mounting angles, where they are not those of `Scene.phases`."""
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
@@ -158,7 +149,6 @@ def load_tables(scene: Scene) -> tuple[Table, ...]:
 
 
 def changing_loads(scene: Scene) -> tuple[int, ...]:
-    """Which of `load_tables` change over time."""
     return tuple(i for i, table in enumerate(load_tables(scene)) if not is_constant(table))
 
 
@@ -177,12 +167,9 @@ _UNIT_FREQUENCY = 100.0
 
 
 def rate_units(scene: Scene) -> Array:
-    """(1 + moving blades,) rad/s: 1, or a coordinate's own frequency where that is above 100 rad/s.
-
-    Without it the quarter period that turns an angle into a rate would count as growth of an error: 1e5-fold on a
-    bearing of 1e12 N m/rad, where nothing grows at all. The frequency is that of the bearing's spring, of gravity on
-    the offset mass and of the rotor's turning, at the start.
-    """
+    """(1 + moving blades,) rad/s: 1, or a coordinate's own frequency at the start (spring, gravity, turning) above 100
+    rad/s. Else the quarter period that turns an angle into a rate would count as growth of an error: 1e5-fold on a
+    bearing of 1e12 N m/rad."""
     form = rotor_form(scene)
     spin = abs(scene.initial_rates[0])
     frequencies = [0.0]

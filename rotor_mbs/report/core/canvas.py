@@ -1,14 +1,11 @@
-"""The only module that imports matplotlib: panels, the styles of pages and manuscripts, reproducible output.
-
-Uses Figure directly: no pyplot, hence no global state and no window.
-"""
+"""The only module that imports matplotlib: panels, the styles of pages and manuscripts, reproducible output."""
 
 from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +14,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.collections import QuadMesh
+from matplotlib.collections import QuadMesh as QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -32,6 +29,7 @@ WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px hig
 TIME_AXIS = "time (s)"
 hex_colour = to_hex  # of any colour of matplotlib's: "#0072b2"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
+FONT_FILE = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 KINDS = ("pdf", "svg", "png")
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
     matplotlib.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
@@ -59,31 +57,26 @@ class Panels:
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
     """Panels one below the other; heights in inches, that of the top one first. x_label: of the last one."""
-    with style(), _without_ticks():
-        figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
-        grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-        axes: list[Axes] = []
-        for row in range(len(heights)):
-            axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
-            axes[-1].tick_params(labelbottom=row == len(heights) - 1)
-        axes[-1].set_xlabel(x_label)
-        # Fixed margins: the layout does not depend on the fonts.
-        height = float(figure.get_figheight())
-        figure.subplots_adjust(left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09)
-    return Panels(figure, axes)
-
-
-@contextmanager
-def _without_ticks() -> Iterator[None]:
-    """Axes made here have no tick objects before they are drawn; those of a page are not, and these took a quarter."""
-    known = {name: vars(Axis)[name] for name in ("majorTicks", "minorTicks")}
+    # Axes made here have no tick objects before they are drawn; those of a page are not, and these took a quarter.
+    lazy_ticks = {name: vars(Axis)[name] for name in ("majorTicks", "minorTicks")}
+    figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
+    axes: list[Axes] = []
     try:
-        for name in known:
+        for name in lazy_ticks:
             setattr(Axis, name, ())
-        yield
+        with style():
+            grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+            for row in range(len(heights)):
+                axes.append(figure.add_subplot(grid[row], sharex=axes[0] if axes else None))
+                axes[-1].tick_params(labelbottom=row == len(heights) - 1)
+            axes[-1].set_xlabel(x_label)
     finally:
-        for name, made_when_read in known.items():
-            setattr(Axis, name, made_when_read)
+        for name, descriptor in lazy_ticks.items():
+            setattr(Axis, name, descriptor)
+    # Fixed margins: the layout does not depend on the fonts.
+    height = float(figure.get_figheight())
+    figure.subplots_adjust(left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09)
+    return Panels(figure, axes)
 
 
 def print_grid(rows: int, columns: int, height: float) -> Panels:
@@ -102,11 +95,6 @@ def print_grid(rows: int, columns: int, height: float) -> Panels:
 def style(*, for_print: bool = False) -> AbstractContextManager[None]:
     """A context in which figures are drawn in the style of the pages, or in that of manuscripts."""
     return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
-
-
-def font_file() -> Path:
-    """The font of all figures."""
-    return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
 
 
 def legend(target: Any, labelled: Sequence[tuple[str, Look]], *, for_print: bool = False, **place: Any) -> None:
@@ -152,10 +140,7 @@ def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any
 
 
 def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: float) -> bool:
-    """Powers of ten of the growth over `x` and `y` as colour, from 1 to `largest`, with a scale on the right.
-
-    Returns whether there is a line on which the growth is `boundary`; it is drawn.
-    """
+    """Powers of ten of the growth over `x` and `y` as colour, from 1 to `largest`, with a scale on the right."""
     axes, levels = panels.axes[0], np.log10(np.maximum(growth, np.finfo(float).tiny))
     shown, top = np.clip(levels, 0.0, np.log10(largest)), np.log10(largest)
     mesh = axes.pcolormesh(x, y, shown, cmap="cividis", shading="nearest", vmin=0.0, vmax=top, rasterized=True)
@@ -166,8 +151,3 @@ def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, labe
     if has_line:
         axes.contour(x, y, levels, levels=[np.log10(boundary)], colors=[VERMILLION], linewidths=1.0)
     return has_line
-
-
-def is_map(artist: Any) -> bool:
-    """Whether an artist is the map of `growth_map`, or a part of its colour scale."""
-    return isinstance(artist, QuadMesh)

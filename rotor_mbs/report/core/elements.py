@@ -30,18 +30,13 @@ MARKS = {
 
 @dataclass(frozen=True)
 class TableCell:
-    """A cell of a table that is more than a text.
-
-    tone      "good", "bad" or "": the colour of a verdict
-    href      a page of the report, or ""
-    note      small text below the cell's own; note_language: of that text, where it is not English
-    """
+    """A cell of a table that is more than a text."""
 
     text: str
-    tone: str = ""
+    tone: str = ""  # "good" or "bad": the colour of a verdict
     href: str = ""
-    note: str = ""
-    note_language: str = ""
+    note: str = ""  # small text below
+    note_language: str = ""  # where it is not English
 
 
 Row = Sequence[TableCell | str]

@@ -1,7 +1,4 @@
-"""Pages as files: their names, their HTML by a template (text is escaped), and their writing.
-
-Earlier pages of a report are replaced, other files stay.
-"""
+"""Pages as files: their names, their HTML by a template (text is escaped), and their writing."""
 
 from __future__ import annotations
 
@@ -79,10 +76,7 @@ def _is_ours(path: Path) -> bool:
 
 
 def render(template: str, page: Mapping[str, object], site: Site = (), here: str = "") -> str:
-    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have.
-
-    site, here: the main pages of the report, and the file that the page is; no navigation where there is no other.
-    """
+    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have."""
     links = [(file, label, file == here) for file, label in site] if {file for file, _ in site} - {here} else []
     return _environment().get_template(f"{template}.html.j2").render(page=page, site=links)
 

@@ -75,10 +75,7 @@ _OTHER_MARKERS = ("D", "o", "s", "^", "v", "P", "X", "h", "p", "<", ">")
 
 
 def look_of(curve: str) -> Look:
-    """Return how a method, or a curve of the bench, is drawn; one that is not in the table in grey.
-
-    Line and marker of a method of another package follow from its name, the same in every report.
-    """
+    """Return how a method, or a curve of the bench, is drawn; one that is not in the table in grey."""
     if curve in _LOOKS:
         return _LOOKS[curve]
     code = zlib.crc32(curve.encode("utf-8", "replace"))

@@ -1,9 +1,7 @@
 """A figure as SVG inside a page: what its axes hold, written without a renderer; colours as classes of the style sheet.
 
-A renderer of matplotlib makes and measures every tick mark as an object of its own, which takes most of the time of a
-report. Here ticks are numbers from the axes' own locators, and the rest are the data of lines, areas and texts. Nested
-`svg` elements clip. Colours of `looks.PALETTE` become classes, so that the page's style sheet can change
-them for a dark page. Coordinates are points from the upper left corner of the figure.
+A renderer of matplotlib makes and measures every tick mark as an object, which takes most of the time of a report. Here
+ticks are numbers from the axes' own locators. Coordinates are points from the upper left corner of the figure.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, hex_colour, is_map, style
+from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, QuadMesh, hex_colour, style
 from rotor_mbs.report.core.elements import MARKS, LegendEntry, Picture
 from rotor_mbs.report.core.looks import INK, PAPER, class_of
 from rotor_mbs.report.core.numbers import SPACE, power
@@ -65,7 +63,7 @@ class _Page:
         yield '<svg x="{0}" y="{1}" width="{2}" height="{3}" viewBox="{0} {1} {2} {3}">'.format(*seen)
         artists = [artist for artist in (*axes.patches, *axes.collections, *axes.lines) if artist.get_visible()]
         for artist in sorted(artists, key=lambda artist: artist.get_zorder()):
-            if is_map(artist):
+            if isinstance(artist, QuadMesh):
                 yield from self._map(artist)
             elif hasattr(artist, "get_xydata"):
                 yield from self._line(artist)

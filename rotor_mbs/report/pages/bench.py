@@ -27,14 +27,13 @@ from rotor_mbs.runs.read import OpenResults, StoredScene
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.scenario.catalogue import natural_order
 
+_TARGETS = [f"{power(round(math.log10(target)))} rad" for target in work_precision.TARGETS_RAD]
 _FRONT_COLOUR = "#c8c8c8"
 _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
 _FAILED_LEFT, _FAILED, _FAILED_RIGHT = 120.0, 20.0, 3.0  # rad: the band of failed runs on the axis of errors
-_INTEGRATION = "Run time of the integration alone"
-_WITH_SETUP = "With set-up (everything compiled anew) and reading out of samples"
 
 
-def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
+def bench_pages(main: str, site: Site, results: OpenResults) -> dict[str, str]:
     """By file name, the pages on the curves of `results`, and CSV; `main`: the file of the one over all scenes."""
     grouped = work_precision.by_scene(read_records(results.path, "bench"))
     scenes = {name: grouped[name] for name in natural_order(grouped)}
@@ -54,25 +53,23 @@ def bench_pages(results: OpenResults, main: str, site: Site) -> dict[str, str]:
     pages = {main: render("bench", index, site, main), "bench.csv": csv_text(every_curve)}
     for name, curves in scenes.items():
         csv_file = files[name].removesuffix(".html") + ".csv"
-        pages[files[name]] = render("bench_scene", _scene(results.scenes.get(name), curves, csv_file), site)
+        pictures = [picture(diagram(curves), "bench-0", "Run time of the integration alone")]
+        if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
+            caption = "With set-up (everything compiled anew) and reading out of samples"
+            pictures.append(picture(diagram(curves, with_setup=True), "bench-1", caption))
+        page = {
+            "scene": name,
+            "facts": curves[0].attributes,
+            "diagram": Section(pictures, cost_legend(curves)),
+            "reach": Section(tables=[reach_table(curves)]),
+            "order": Section(tables=[_order_table(curves)]),
+            "failures": Section(tables=[failure_table(curves, results.scenes.get(name))]),
+            "points": Section(tables=[_point_table(curves)]),
+            "csv": csv_file,
+        }
+        pages[files[name]] = render("bench_scene", page, site)
         pages[csv_file] = csv_text(curves)
     return pages
-
-
-def _scene(stored: StoredScene | None, curves: Sequence[Record], csv_file: str) -> dict[str, object]:
-    pictures = [picture(diagram(curves), "bench-0", _INTEGRATION)]
-    if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
-        pictures.append(picture(diagram(curves, with_setup=True), "bench-1", _WITH_SETUP))
-    return {
-        "scene": curves[0].scene,
-        "facts": curves[0].attributes,
-        "diagram": Section(pictures, cost_legend(curves)),
-        "reach": Section(tables=[reach_table(curves)]),
-        "order": Section(tables=[order_table(curves)]),
-        "failures": Section(tables=[failure_table(curves, stored)]),
-        "points": Section(tables=[point_table(curves)]),
-        "csv": csv_file,
-    }
 
 
 def cost_section(scene: StoredScene, curves: Sequence[Record]) -> Section:
@@ -95,11 +92,7 @@ def cost_picture(curves: Sequence[Record], caption: str, legend: Sequence[Legend
 
 
 def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
-    """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the left.
-
-    Error on the horizontal axis, falling to the right, so that accuracy grows to the right; time on the vertical one.
-    small: one of many side by side, with front and curves alone.
-    """
+    """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the left."""
     panels = canvas.panels((height,), "largest angle error up to the horizon (rad)")
     axes = panels.axes[0]
     points = [work_precision.points(curve, with_setup=with_setup) for curve in curves]
@@ -170,11 +163,6 @@ def csv_text(curves: Sequence[Record]) -> str:
     return stream.getvalue()
 
 
-def _target_text(target: float) -> str:
-    """ "10⁻⁶ rad": the targets are powers of ten."""
-    return f"{power(round(math.log10(target)))} rad"
-
-
 def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, str]) -> PageTable:
     """A row per scene: for each target the fastest method with its time, and the next one with its ratio."""
     rows: list[Row] = []
@@ -197,33 +185,35 @@ def overview_table(scenes: Mapping[str, Sequence[Record]], files: Mapping[str, s
             )
         rows.append(row)
     caption = "Run time of the fastest method to an angle error, and how many times as long the next one takes."
-    return PageTable(caption, ["scene", *map(_target_text, work_precision.TARGETS_RAD)], rows)
+    return PageTable(caption, ["scene", *_TARGETS], rows)
 
 
 def reach_table(curves: Sequence[Record]) -> PageTable:
-    """A row per curve: time and ratio for each target."""
-    rows = [[method_cell(curve.name)] for curve in curves]
-    for target in work_precision.TARGETS_RAD:
-        reaches = {curve.name: reach for curve, reach in work_precision.fastest(curves, target)}
-        for row, curve in zip(rows, curves, strict=True):
-            row.append(_reach_cell(curve, reaches.get(curve.name)))
-    head = ["method", *map(_target_text, work_precision.TARGETS_RAD)]
+    """A row per curve: time and ratio for each target, or whether the method cannot, or was not asked to."""
+    rows: list[Row] = []
+    for curve in curves:
+        errors = curve.arrays["angle_error_max"][work_precision.succeeded(curve)]
+        missing = TableCell(
+            NOTHING, note=f"{with_unit(errors.min(), 'rad')} at best" if len(errors) else "no run is ok"
+        )
+        count = work_precision.left_out(curve)
+        if count:
+            note = f"{count} finer {'setting' if count == 1 else 'settings'} left out"
+            missing = TableCell("not measured", note=note)
+        row = [method_cell(curve.name)]
+        for target in work_precision.TARGETS_RAD:
+            for other, reach in work_precision.fastest(curves, target):
+                if other is curve:
+                    row.append(TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}"))
+                    break
+            else:
+                row.append(missing)
+        rows.append(row)
+    head = ["method", *_TARGETS]
     return PageTable("Run time to an angle error, and its ratio to the fastest", head, rows, range(1, len(head)))
 
 
-def _reach_cell(curve: Record, reach: work_precision.Reach | None) -> TableCell:
-    """Time and ratio, or whether the method cannot, or was not asked to."""
-    if reach is not None:
-        return TableCell(prefixed(reach.seconds, "s", 3), note=f"× {number(reach.ratio)}")
-    count = work_precision.left_out(curve)
-    if count:
-        return TableCell("not measured", note=f"{count} finer {'setting' if count == 1 else 'settings'} left out")
-    errors = curve.arrays["angle_error_max"][work_precision.succeeded(curve)]
-    best = f"{with_unit(float(errors.min()), 'rad')} at best" if len(errors) else "no run is ok"
-    return TableCell(NOTHING, note=best)
-
-
-def order_table(curves: Sequence[Record]) -> PageTable:
+def _order_table(curves: Sequence[Record]) -> PageTable:
     """A row per fixed-step curve."""
     rows = [
         [method_cell(curve.name), number(curve.attributes.get("order"), 3), f"{curve.attributes['order_expected']:g}"]
@@ -234,7 +224,7 @@ def order_table(curves: Sequence[Record]) -> PageTable:
     return PageTable("Fitted on the finest points above the round-off floor.", head, rows, numeric=(1, 2))
 
 
-def point_table(curves: Sequence[Record]) -> PageTable:
+def _point_table(curves: Sequence[Record]) -> PageTable:
     """A row per point that was run."""
     head = (
         "method", "setting", "angle error (rad)", "at the end (rad)", "tip error (m)", "energy drift", "median",
@@ -242,32 +232,28 @@ def point_table(curves: Sequence[Record]) -> PageTable:
     )  # fmt: skip
     rows: list[Row] = []
     for curve in curves:
-        arrays = curve.arrays
         for i, status in enumerate(curve.statuses):
             if status == "left_out":
                 continue
+            values = {name: _finite(array[i]) for name, array in curve.arrays.items()}
+            seconds = {name: prefixed(value, "s") for name, value in values.items()}
             row = [method_cell(curve.name), _setting(curve, i)]
             for name in ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max"):
-                row.append(number(_finite(arrays[name][i])))
-            row.append(_seconds(arrays["run_time_s"][i]))
-            if arrays["repeats"][i] > 1:
-                row.append(f"{_seconds(arrays['run_time_q1_s'][i])} to {_seconds(arrays['run_time_q3_s'][i])}")
-                row.append(_seconds(arrays["run_time_min_s"][i]))
+                row.append(number(values[name]))
+            row.append(seconds["run_time_s"])
+            if curve.arrays["repeats"][i] > 1:
+                row += [f"{seconds['run_time_q1_s']} to {seconds['run_time_q3_s']}", seconds["run_time_min_s"]]
             else:
                 row += ["", ""]
-            for name in ("setup_time_s", "setup_again_time_s", "output_time_s"):
-                row.append(_seconds(arrays[name][i]))
-            row += [str(arrays["repeats"][i]), str(arrays["steps"][i])]
+            row += [seconds[name] for name in ("setup_time_s", "setup_again_time_s", "output_time_s")]
+            row += [str(curve.arrays[name][i]) for name in ("repeats", "steps")]
             row.append(TableCell(status_text(status), tone="" if status == "ok" else "bad"))
             rows.append(row)
     return PageTable("Every setting measured.", head, rows, numeric=range(1, 14)).without_empty_columns()
 
 
 def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -> PageTable:
-    """Every point that is not on a curve, with the reason; one row for all that the budget left out of a curve.
-
-    Then the methods with a ladder that cannot represent the scene.
-    """
+    """Every point that is not on a curve, with the reason; one row for all that the budget left out of a curve."""
     rows: list[Row] = []
     for curve in curves:
         left_out = [i for i, status in enumerate(curve.statuses) if status == "left_out"]
@@ -278,7 +264,7 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
             if i in left_out and len(left_out) > 1:
                 setting += f" and {len(left_out) - 1} finer"
             claimed = "yes" if curve.arrays["false_success"][i] else ""
-            seconds = _seconds(curve.arrays["run_time_s"][i])
+            seconds = prefixed(_finite(curve.arrays["run_time_s"][i]), "s")
             rows.append([method_cell(curve.name), setting, seconds, status_text(status), claimed, message])
     scene = None if stored is None else scene_of(stored)
     if scene is not None:
@@ -295,10 +281,6 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
 def _setting(curve: Record, i: int) -> str:
     value = float(curve.arrays["setting"][i])
     return prefixed(value, "s", 3) if curve.attributes["setting_kind"] == "step" else number(value, 2)
-
-
-def _seconds(value: float) -> str:
-    return prefixed(_finite(value), "s", 3)
 
 
 def _finite(value: float) -> float | None:

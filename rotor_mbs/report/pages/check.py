@@ -1,7 +1,4 @@
-"""Checks as lines of text, JSON, JUnit XML, annotations and job summaries of GitHub, and as a page.
-
-Names and messages come from files of any origin: what is not printable is written as an escape.
-"""
+"""Checks as lines of text, JSON, JUnit XML, annotations and job summaries of GitHub, and as a page."""
 
 from __future__ import annotations
 
@@ -36,13 +33,9 @@ def line(check: Check) -> str:
 
 def github(check: Check) -> str:
     """A workflow command that GitHub shows as an error annotation."""
-    title = _escaped(printable(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}"))
-    return f"::error title={title.replace(':', '%3A').replace(',', '%2C')}::{_escaped(line(check))}"
-
-
-def _escaped(text: str) -> str:
-    """As GitHub's own toolkit escapes the text of a command."""
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    title = printable(f"rotor-mbs {check.name} {check.where.scene} {check.where.method}").replace("%", "%25")
+    title = title.replace(":", "%3A").replace(",", "%2C")
+    return f"::error title={title}::{line(check).replace('%', '%25')}"  # neither has a line break
 
 
 def worst_first(checks: Sequence[Check]) -> list[Check]:
@@ -133,29 +126,25 @@ def check_page(results: Path) -> dict[str, object]:
         key = (check.name, check.where.method, check.bound)
         if key not in largest or not check.value <= largest[key].value:
             largest[key] = check
+
+    def table(caption: str, shown: Sequence[Check]) -> Section:
+        rows: list[Row] = []
+        for check in shown:
+            rows.append([
+                printable(check.name),
+                method_cell(printable(check.where.method)),
+                TableCell(printable(check.where.scene), note=printable(check.where.channel)),
+                number(check.value),
+                with_unit(check.bound, check.unit),
+                number(check.margin, 3) if math.isfinite(check.margin) else NOTHING,
+                TableCell("pass", "good") if check.passed else TableCell("fail", "bad", note=printable(check.hint)),
+            ])  # fmt: skip
+        head = ("Check", "Method", "Where", "Seen", "Bound", "Margin", "Outcome")
+        return Section(tables=[PageTable(caption, head, rows, numeric=(3, 4, 5))])
+
     return {
         "lead": [f"{count}: numbers computed again from the stored samples, each against its bound."],
-        "failures": Section(tables=[_table("Checks that fail", worst_first(failed))]),
-        "nearest": Section(tables=[_table("The checks that pass by least", measured[:WORST])]),
-        "all": Section(
-            tables=[_table("The largest number seen of every check, method and bound", [*largest.values()])]
-        ),
+        "failures": table("Checks that fail", worst_first(failed)),
+        "nearest": table("The checks that pass by least", measured[:WORST]),
+        "all": table("The largest number seen of every check, method and bound", [*largest.values()]),
     }
-
-
-def _table(caption: str, checks: Sequence[Check]) -> PageTable:
-    head = ("Check", "Method", "Where", "Seen", "Bound", "Margin", "Outcome")
-    return PageTable(caption, head, [_row(check) for check in checks], numeric=(3, 4, 5))
-
-
-def _row(check: Check) -> Row:
-    outcome = TableCell("pass", "good") if check.passed else TableCell("fail", "bad", note=printable(check.hint))
-    return [
-        printable(check.name),
-        method_cell(printable(check.where.method)),
-        TableCell(printable(check.where.scene), note=printable(check.where.channel)),
-        number(check.value),
-        with_unit(check.bound, check.unit),
-        number(check.margin, 3) if math.isfinite(check.margin) else NOTHING,
-        outcome,
-    ]

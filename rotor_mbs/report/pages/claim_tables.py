@@ -5,15 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from rotor_mbs.analysis.claim_study import (
-    FAILS,
-    HOLDS,
-    RULE,
-    UNDECIDED,
-    ClaimShares,
-    Conditions,
-    NumberTrials,
-)
+from rotor_mbs.analysis.claim_study import FAILS, HOLDS, RULE, UNDECIDED, ClaimShares, Conditions, NumberTrials
 from rotor_mbs.analysis.claims import STATISTICS, Claim
 from rotor_mbs.analysis.published import TrajectoryNumber, published
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
@@ -22,12 +14,6 @@ from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, number, power, 
 ROUNDING = "amplified rounding error, which depends on how the equations are written"
 _UNITS = {"angle": "rad", "rate": "rad/s"}
 _TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
-
-
-def description_of(asked: TrajectoryNumber) -> str:
-    """What is read off a trajectory: "largest pitch 1 rate"."""
-    body = "rotor" if asked.coordinate == 0 else f"pitch {asked.coordinate}"
-    return f"{STATISTICS[asked.statistic].text} {body} {asked.quantity}"
 
 
 def unit_of(asked: TrajectoryNumber) -> str:
@@ -47,12 +33,11 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
         verdict = _verdict(printed.holds, "reproduced", "not reproduced")
         if item.rounding and printed.holds:
             verdict = replace(verdict, note=ROUNDING)
-        quoted = TableCell(
-            f"{description_of(item.of)} ({unit_of(item.of)})", note=f"«{item.quote}»", note_language="es"
-        )
+        body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
+        description = f"{STATISTICS[item.of.statistic].text} {body} {item.of.quantity} ({unit_of(item.of)})"
         rows.append([
             item.figure,
-            quoted,
+            TableCell(description, note=f"«{item.quote}»", note_language="es"),
             fixed(item.value, item.decimals),
             fixed(printed.value, item.decimals + 2),
             verdict,
@@ -63,24 +48,18 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
 
 
 def claim_table(claims: Iterable[Claim], shares: ClaimShares | None = None) -> PageTable:
-    """The claims in words, a row each.
-
-    Verdicts by the shares of many runs, which stand beside them, where there are any; else by the stored runs.
-    """
-    sides = ("As printed", "Corrected model")
+    """The claims in words, a row each: verdicts by the shares of many runs, if there are any, else by stored runs."""
     durations = [] if shares is None else shares.durations
     head = ["Figure", "In the paper"]
-    for side in sides:
+    for side in ("As printed", "Corrected model"):
         head += [side, *(f"over {duration:g}{SPACE}s" for duration in durations)]
     rows: list[Row] = []
     for claim in claims:
         item = claim.published
         if item.is_number:
             continue
-        row: list[TableCell | str] = [
-            item.figure,
-            TableCell(item.statement, note=f"«{item.quote}»", note_language="es"),
-        ]
+        statement = TableCell(item.statement, note=f"«{item.quote}»", note_language="es")
+        row: list[TableCell | str] = [item.figure, statement]
         for place, result in enumerate((claim.printed, claim.corrected)):
             if shares is None or item.id not in shares.claims:
                 row += [_verdict(result.holds, HOLDS, FAILS), *[""] * len(durations)]

@@ -1,13 +1,9 @@
-"""The errata page: the errors in print, every entry that was checked, the effect of each erratum on each scene.
-
-Formulas of the paper's plain notation, "c² m c3² - d s2" with c3 the cosine of q3, and whole matrices are MathML.
-"""
+"""The errata page: the errors in print, every entry that was checked, the effect of each erratum on each scene."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from html import escape
 
 from markupsafe import Markup
 
@@ -28,7 +24,7 @@ _PLACE = re.compile(r"row (\d) column (\d)")
 Cell = tuple[Markup, Markup | None]  # an entry as printed, in MathML; the correct one where it is faulty
 
 
-def errata_page(opened: OpenResults, context: Context) -> dict[str, object]:
+def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
     """The content of the page of errata."""
     entries = checked_entries()
     agreeing = [entry for entry in entries if entry.agrees]
@@ -86,39 +82,38 @@ def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[
                 places[int(place[1]), int(place[2])] = entry
         if places:
             rows, columns = (range(1, 1 + max(place[axis] for place in places)) for axis in (0, 1))
-            shown.append((equation, [[_cell(places.get((row, column))) for column in columns] for row in rows]))
+            matrix = []
+            for row in rows:
+                cells: list[Cell] = []
+                for column in columns:
+                    checked = places.get((row, column))
+                    printed = Markup() if checked is None else _mathml(checked.printed)
+                    cells.append((printed, None if checked is None or checked.agrees else _mathml(checked.right)))
+                matrix.append(cells)
+            shown.append((equation, matrix))
     return shown
 
 
-def _cell(entry: CheckedEntry | None) -> Cell:
-    if entry is None:
-        return Markup(), None
-    printed, right = (Markup(_row(text) or f"<mtext>{escape(text)}</mtext>") for text in (entry.printed, entry.right))
-    return printed, None if entry.agrees else right
-
-
-def _row(text: str) -> str | None:
-    """MathML of a formula; None where a part of it is not understood."""
+def _mathml(text: str) -> Markup:
+    """MathML of a formula; a text where a part of it is not understood."""
     parts, at = [], 0
     while at < len(text):
         token = _TOKEN.match(text, at)
         if token is None:
-            return None
-        parts.append(_element(token))
+            return Markup("<mtext>{}</mtext>").format(text)
         at = token.end()
-    return "<mrow>" + "".join(parts) + "</mrow>"
-
-
-def _element(token: re.Match[str]) -> str:
-    if token["number"]:
-        return f"<mn>{token['number']}</mn>"
-    if token["sign"]:
-        return f"<mo>{token['sign'].replace('-', '−')}</mo>"
-    if token["space"]:
-        return '<mspace width="0.2em"/>'
-    base = f"<mi>{token['name']}</mi>"
-    if token["trig"]:
-        base = f"<msub><mi>{token['trig']}</mi><mn>{token['index']}</mn></msub>"
-    elif token["rate_index"]:
-        base = f"<msub><mover><mi>q</mi><mo>˙</mo></mover><mn>{token['rate_index']}</mn></msub>"
-    return f"<msup>{base}<mn>{_POWERS[token['square']]}</mn></msup>" if token["square"] else base
+        if token["number"]:
+            parts.append(f"<mn>{token['number']}</mn>")
+        elif token["sign"]:
+            parts.append(f"<mo>{token['sign'].replace('-', '−')}</mo>")
+        elif token["space"]:
+            parts.append('<mspace width="0.2em"/>')
+        else:
+            base = f"<mi>{token['name']}</mi>"
+            if token["trig"]:
+                base = f"<msub><mi>{token['trig']}</mi><mn>{token['index']}</mn></msub>"
+            elif token["rate_index"]:
+                base = f"<msub><mover><mi>q</mi><mo>˙</mo></mover><mn>{token['rate_index']}</mn></msub>"
+            square = _POWERS.get(token["square"])
+            parts.append(f"<msup>{base}<mn>{square}</mn></msup>" if square else base)
+    return Markup("<mrow>" + "".join(parts) + "</mrow>")

@@ -1,16 +1,13 @@
-"""The paper's figures: what each shows, and how it is drawn, for a manuscript and on the page that goes through them.
-
-Both set the models side by side.
-"""
+"""The paper's figures, each model side by side, for a manuscript and on the page that goes through them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,31 +15,29 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import look_up
+from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas, svg
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Row, Section
 from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look, label_of, with_capital
 from rotor_mbs.report.core.numbers import minus, number, prefixed, with_unit
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.claim_tables import number_table
 from rotor_mbs.report.pages.quantities import VISIBLE, angle_difference, parting
 from rotor_mbs.report.pages.scene_tables import horizon, metric
-from rotor_mbs.report.plots import paths
-from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.runs.files import replace_file
-from rotor_mbs.runs.read import StoredRun, StoredScene, open_results
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene, open_results
 
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
 # The models that are compared, by key, in order from left to right.
 HEADINGS = {"printed": "As printed", "corrected": "Corrected model", "exudyn": "Exudyn"}
 
 
-@dataclass(frozen=True)
-class PaperFigure:
-    """number; kind; panels: the letter ("" where it has none; a torque) and the scene of each."""
+class PaperFigure(NamedTuple):
+    """A figure of the paper."""
 
     number: str
     kind: str
-    panels: tuple[tuple[str, str], ...]
+    panels: tuple[tuple[str, str], ...]  # the letter ("" where it has none; a torque) and the scene of each
 
 
 FIGURES = (
@@ -69,7 +64,7 @@ def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
     for figure in FIGURES:
         panels = tuple(panel for panel in figure.panels if panel[1] in scenes)
         if panels:
-            figures.append(replace(figure, panels=panels))
+            figures.append(figure._replace(panels=panels))
     return tuple(figures)
 
 
@@ -86,10 +81,7 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
 
 
 def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[str, dict[str, dict[str, StoredRun]]]:
-    """The runs of each picture by label, row by row: by letter, then by key of HEADINGS.
-
-    A figure of torques is one row, with the runs of all its scenes in one picture; elsewhere a picture has one run.
-    """
+    """The runs of each picture by label, row by row: by letter, then by key of HEADINGS."""
     rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
     for label, name in figure.panels:
         letter = "" if figure.kind == TORQUES else label
@@ -102,20 +94,20 @@ def panel_runs(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> dict[s
 def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
     """A picture on `axes`: one for paths, else two, position above velocity."""
     if figure.kind == PATHS:
-        paths.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
+        plots.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
         return
-    labels = (histories.ANGLE_AXIS, histories.RATE_AXIS)
+    labels = (plots.ANGLE_AXIS, plots.RATE_AXIS)
     for panel, name, label in zip(axes, ("angles", "rates"), labels, strict=True):
         if figure.kind == MOTION:
             run = next(iter(runs.values()))
-            histories.draw_coordinates(panel, run.array("time"), run.array(name), label)
+            plots.draw_coordinates(panel, run.array("time"), run.array(name), label)
         else:
             series = [
-                histories.Series(run.array("time"), run.array(name)[:, 0], torque_look(place))
+                plots.Series(run.array("time"), run.array(name)[:, 0], torque_look(place))
                 for place, run in enumerate(runs.values())
             ]
-            histories.draw_lines(panel, series, label)
-            histories.set_range(panel, np.concatenate([curve.values for curve in series])[:, None])
+            plots.draw_lines(panel, series, label)
+            plots.set_range(panel, np.concatenate([curve.values for curve in series])[:, None])
     axes[0].set_title("(a) position", loc="left")
     axes[0].tick_params(labelbottom=False)
     axes[1].set_title("(b) angular velocity", loc="left")
@@ -139,18 +131,13 @@ def legend(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> list[tuple
 
 
 def write_figures(results: Path, folder: Path, kind: str, numbers: Iterable[str] = ()) -> list[Path]:
-    """Write figures of the paper for a manuscript.
+    """Write figures of the paper for a manuscript, and return their files.
 
     Parameters
     ----------
     results, folder : the results file; where figNN.pdf and so on are written.
     kind : "pdf", "svg" or "png".
     numbers : of the figures, such as "11"; all that the file has where none is given.
-
-    Returns
-    -------
-    list of Path
-        The files written.
 
     Raises
     ------
@@ -206,26 +193,35 @@ def figures_page(figures: Sequence[Mapping[str, object]], scenes: Mapping[str, S
     return {"figures": figures, "models": Section(tables=[model_table(shown)])}
 
 
-def walk_figure(figure: PaperFigure, scenes: Mapping[str, StoredScene], context: Context) -> dict[str, object]:
+def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> dict[str, object]:
     """The part of the page about one figure."""
-    numbers = [claim for claim in context.claims if claim.published.figure == figure.number]
-    pictures = panel_runs(figure, scenes)
+    scenes = opened.scenes
+    runs_of_panels = panel_runs(figure, scenes)
     is_torques = figure.kind == TORQUES  # all in one picture per model
     panels = []
     for letter, name in [("", figure.panels[0][1])] if is_torques else figure.panels:
+        pictures = []
+        for key, runs in runs_of_panels.get(letter, {}).items():
+            drawn = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
+            if figure.kind != PATHS:
+                drawn.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
+            draw(figure, drawn.axes, runs)
+            heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
+            caption = with_capital(label) if label.startswith(heading.lower()) else f"{heading}: {label}"
+            pictures.append(svg.picture(drawn, f"f{figure.number}{letter}-{key}", caption))
         panels.append({
             "letter": letter,
             "scene": name,
             "href": context.files[name],
             "conditions": _conditions(scenes[name], with_torque=not is_torques),
-            "pictures": [_picture(figure, letter, key, runs) for key, runs in pictures.get(letter, {}).items()],
+            "pictures": pictures,
         })  # fmt: skip
     return {
         "number": figure.number,
         "kind": figure.kind,
         "legend": [LegendEntry(label, look) for label, look in legend(figure, scenes)],
         "panels": panels,
-        "numbers": number_table(numbers),
+        "numbers": number_table([claim for claim in context.claims if claim.published.figure == figure.number]),
     }
 
 
@@ -240,42 +236,31 @@ def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
     for name, scene in scenes.items():
         runs = compared_runs(scene)
         printed, corrected, exudyn = (runs.get(key) for key in HEADINGS)
-        pitches = {key: number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0))) for key, run in runs.items()}
-        turned = {}
-        for key, run in runs.items():
-            rotor = run.array("angles")[:, 0]
-            turned[key] = number(float(rotor[-1] - rotor[0]), 3)
-        row = [name]
+        row = [name, *[""] * (len(head) - 1)]
         if printed is not None and corrected is not None:
             parted, largest = parting(printed, corrected)
-            row += ["never" if parted is None else number(parted, 3), number(largest)]
-        else:
-            row += ["", ""]
+            row[1:3] = "never" if parted is None else number(parted, 3), number(largest)
         if printed is not None:
-            row += [pitches["printed"], prefixed(metric(printed, "energy_gain_J"), "J")]
-            row.append(number(float(printed.array("time")[-1]), 3))
-        else:
-            row += ["", "", ""]
-        row.append(pitches.get("corrected", ""))
+            row[3] = _largest_pitch(printed)
+            row[4] = prefixed(metric(printed, "energy_gain_J"), "J")
+            row[5] = number(float(printed.array("time")[-1]), 3)
+        if corrected is not None:
+            row[6] = _largest_pitch(corrected)
         if exudyn is not None and corrected is not None:
             gap, time = angle_difference(exudyn, corrected), exudyn.array("time")
             known = horizon(scene)
             until = float(time[-1]) if known is None else min(known, float(time[-1]))
-            row += [number(float(gap[time[: len(gap)] <= until].max(initial=0.0))), number(until, 3)]
-        else:
-            row += ["", ""]
-        rows.append([*row, *(turned.get(key, "") for key in HEADINGS)])
+            row[7:9] = number(float(gap[time[: len(gap)] <= until].max(initial=0.0))), number(until, 3)
+        for place, run in zip((9, 10, 11), (printed, corrected, exudyn), strict=True):
+            if run is not None:
+                rotor = run.array("angles")[:, 0]
+                row[place] = number(float(rotor[-1] - rotor[0]), 3)
+        rows.append(row)
     return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
 
 
-def _picture(figure: PaperFigure, letter: str, key: str, runs: Mapping[str, StoredRun]) -> Picture:
-    panels = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
-    if figure.kind != PATHS:
-        panels.figure.subplots_adjust(top=0.93, hspace=0.2)  # room for headings
-    draw(figure, panels.axes, runs)
-    heading, label = HEADINGS[key], label_of(next(iter(runs.values())).method)
-    caption = with_capital(label) if label.startswith(heading.lower()) else f"{heading}: {label}"
-    return svg.picture(panels, f"f{figure.number}{letter}-{key}", caption)
+def _largest_pitch(run: StoredRun) -> str:
+    return number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0)))
 
 
 def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claim_study import HOLDS, ClaimShares
-from rotor_mbs.analysis.claims import ENERGY_RISE, Claim, Finding, Tally, finding
+from rotor_mbs.analysis.claims import ENERGY_RISE, Finding, Tally, finding
+from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
@@ -19,7 +21,6 @@ from rotor_mbs.report.pages.bench import cost_legend, cost_picture
 from rotor_mbs.report.pages.scene import key_picture
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, metric, status_cell, status_text, versions
 from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.report.plots import paths
 from rotor_mbs.runs.read import OpenResults, StoredScene
 
 Scenes = Mapping[str, StoredScene]
@@ -30,24 +31,40 @@ _FAILED = "✗"
 _LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 
 
-def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
+def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
     """The content of the index; what the file has no data for is None or empty. Its last tables are folded."""
     scenes, claims, study = opened.scenes, context.claims, context.study
     shares = None if study is None else study.shares
     facts = finding(scenes, claims)
-    shown = _shown_scene(scenes, claims)
+    # The scene with a published extreme that is no rounding error; else one with both models; else the first.
+    both = [name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1]
+    shown = next(iter([*both, *scenes]))
+    for claim in claims:
+        item = claim.published
+        if item.is_number and not item.rounding and item.of is not None and item.of.scene in scenes:
+            shown = item.of.scene
+            break
     sides = list(run_selection.sides(scenes[shown]).values())
     own_claims = [claim for claim in claims if shown in claim.published.scenes]
     still = None
     for run in sides:
         if "tip" in run:
-            still = picture(paths.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
+            still = picture(plots.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
     benched = next((scene for scene in context.curves if scene in scenes), "")
     curves = context.curves.get(benched, ())
     errata_rows = [
         (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
         for e in context.errata
     ]
+    agreement_head = (
+        "Method", "Runs ok", "Largest angle error up to each scene's horizon (rad)", "Largest energy drift (relative)",
+        "Longest run",
+    )  # fmt: skip
+    agreement_rows = []
+    for row in facts.agreement:
+        errors = [number(row.angle_error), number(row.energy_drift), prefixed(row.longest_s, "s")]
+        agreement_rows.append([method_cell(row.method), _of(row.runs), *errors])
+    agreement = PageTable("", agreement_head, agreement_rows, (1, 2, 3, 4)).without_empty_columns()
     errata_head = ("Erratum", "Equation", "Printed", "Correct", "Reason")
     return {
         "paper": _paper_table(facts, shares),
@@ -57,7 +74,7 @@ def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
         "crest": key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
         "energy": _energy(scenes),
         "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
-        "methods": Section(tables=[_agreement_table(facts)]),
+        "methods": Section(tables=[agreement]),
         "heat": heat_map(scenes, context.files),
         "scenes": Section(tables=[_scene_table(scenes, context.files)]),
         "numbers": Section(
@@ -81,15 +98,6 @@ def index_page(opened: OpenResults, context: Context) -> dict[str, object]:
     }
 
 
-def _shown_scene(scenes: Scenes, claims: Sequence[Claim]) -> str:
-    """The scene with a published extreme that is no rounding error; else one with both models; else the first."""
-    for claim in claims:
-        item = claim.published
-        if item.is_number and not item.rounding and item.of is not None and item.of.scene in scenes:
-            return item.of.scene
-    return next((name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1), next(iter(scenes)))
-
-
 def _paper_table(facts: Finding, shares: ClaimShares | None) -> PageTable:
     """How much of the paper the printed and the corrected equations reproduce, and the energy that both gain."""
     rows: list[Row] = []
@@ -110,29 +118,12 @@ def _of(tally: Tally | None) -> str:
     return "" if tally is None else f"{tally.count} of {tally.of}"
 
 
-def _agreement_table(facts: Finding) -> PageTable:
-    """The errors of each corrected model over all scenes."""
-    head = (
-        "Method", "Runs ok", "Largest angle error up to each scene's horizon (rad)", "Largest energy drift (relative)",
-        "Longest run",
-    )  # fmt: skip
-    rows: list[Row] = [
-        [
-            method_cell(row.method), _of(row.runs), number(row.angle_error), number(row.energy_drift),
-            prefixed(row.longest_s, "s"),
-        ]
-        for row in facts.agreement
-    ]  # fmt: skip
-    return PageTable("", head, rows, (1, 2, 3, 4)).without_empty_columns()
-
-
 def _energy(scenes: Scenes) -> Picture | None:
     """A mark per scene for the printed model's gain, and for each corrected model's drift."""
     rows: dict[str, list[tuple[float, Look]]] = {}
     looks: dict[str, Look] = {}
     for name, scene in scenes.items():
         corrected = run_selection.corrected_runs(scene)
-        marks = []
         for run in scene.methods.values():
             gain, scale = metric(run, "energy_gain_J"), metric(run, "energy_scale_J")
             value = None
@@ -141,10 +132,8 @@ def _energy(scenes: Scenes) -> Picture | None:
             elif run.method in corrected and scale:
                 value = metric(run, "energy_drift_max")
             if value is not None and math.isfinite(value):
-                looks[run.method] = Look(look_of(run.method).colour, "", look_of(run.method).marker)
-                marks.append((value, looks[run.method]))
-        if marks:
-            rows[name.removeprefix("paper/")] = marks
+                looks[run.method] = replace(look_of(run.method), line="")
+                rows.setdefault(name.removeprefix("paper/"), []).append((value, looks[run.method]))
     if run_selection.PRINTED not in looks:
         return None
     caption = "Spurious energy gain as printed, and energy drift of the corrected models"
@@ -167,11 +156,7 @@ def energy_of_scenes(rows: Mapping[str, Sequence[tuple[float, Look]]]) -> Panels
 
 
 def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | None:
-    """Scene by method, the largest angle error before the horizon; None where no run was compared with a reference.
-
-    methods: (label, name); rows: (scene, page, cells), of a cell the number of its shade, the error, the mark of the
-    status, and a text that is read out; key: the marks that occur, with their meaning
-    """
+    """Scene by method, the largest angle error before the horizon; None where no run was compared with a reference."""
     names = dict.fromkeys(name for scene in scenes.values() for name in run_selection.corrected_runs(scene))
     methods = run_selection.in_catalogue_order(names)
     if any(run_selection.PRINTED in scene.methods for scene in scenes.values()):

@@ -1,23 +1,21 @@
-"""Pictures over time: errors with a curve per run, and stored quantities as their declarations say.
-
-Those that are judged against the reference, such as loads, are drawn of the reference, beside the others' errors.
-"""
+"""Pictures over time: errors with a curve per run, and stored quantities as their declarations say."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.report import plots
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
-from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.time_histories import LOWEST, Series
+from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Array
@@ -28,12 +26,12 @@ VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 
 
 class Component(NamedTuple):
-    """group: the picture it is drawn in; label: its line there; place: index of the line's look; values: (n,)."""
+    """A component of a quantity over time."""
 
-    group: str
-    label: str
-    place: int
-    values: Array
+    group: str  # the picture it is drawn in
+    label: str  # its line there
+    place: int  # index of the line's look
+    values: Array  # (n,)
 
 
 def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
@@ -44,11 +42,7 @@ def plotted_quantities(scene: StoredScene) -> list[tuple[Quantity, Plot]]:
 
 
 def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> list[tuple[str, str, Section]]:
-    """(id, heading, section) of each such quantity that one of `runs` has.
-
-    Sizes on a logarithmic axis; a quantity of one component with a curve per run; others with pictures of each run, or
-    of the reference alone where the quantity is judged against it.
-    """
+    """(id, heading, section) of each such quantity that one of `runs` has."""
     sections = []
     for quantity, plot in plotted_quantities(scene):
         own = {method: run for method, run in runs.items() if quantity.name in run}
@@ -60,13 +54,11 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
             shown = error_picture(curves, plot.axis, name, plot.title, horizon) if visible(curves) else None
             section = Section([] if shown is None else [shown], run_legend(visible(curves)))
         elif len(quantity.dimensions) == 1:
-            lines = {
-                method: Series(
-                    run.array("time"), run.array(quantity.name), Look(look_of(method).colour, look_of(method).line, "")
-                )
-                for method, run in own.items()
-            }
-            panels = histories.lines([(plot.axis, list(lines.values()))], horizon)
+            lines = {}
+            for method, run in own.items():
+                look = replace(look_of(method), marker="")
+                lines[method] = Series(run.array("time"), run.array(quantity.name), look)
+            panels = plots.lines([(plot.axis, list(lines.values()))], horizon)
             legend = [LegendEntry(label_of(method), line.look) for method, line in lines.items()]
             section = Section([picture(panels, name, plot.title)], legend)
         else:
@@ -86,7 +78,7 @@ def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, h
             lines = [part for part in parts if part.group == group]
             series = [Series(run.array("time"), part.values, coordinate_look(part.place)) for part in lines]
             caption = with_capital(label_of(run.method)) + (f", {group} axis" if group else "")
-            pictures.append(picture(histories.lines([(plot.axis, series)], horizon), f"{name}-{i}-{k}", caption))
+            pictures.append(picture(plots.lines([(plot.axis, series)], horizon), f"{name}-{i}-{k}", caption))
             legend |= {part.label: LegendEntry(part.label, coordinate_look(part.place)) for part in lines}
     if not is_compared:
         return Section(pictures, list(legend.values()))
@@ -96,7 +88,7 @@ def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, h
         """The largest over blades, at the samples that both have; of vectors the length."""
         values = run.array(quantity.name)
         n = min(len(values), len(exact))
-        return _largest(sizes(quantity, values[:n] - exact[:n]))
+        return _over_components(sizes(quantity, values[:n] - exact[:n]))
 
     others = {method: run for method, run in runs.items() if method != REFERENCE}
     errors = _curves(others, quantity.name, difference)
@@ -106,12 +98,21 @@ def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, h
     )  # fmt: skip
     if shown is not None:
         pictures.append(shown)
-    return Section(pictures, list(legend.values()), [_extremes(quantity, runs[REFERENCE])])
+    time = runs[REFERENCE].array("time")
+    rows = []
+    for part in components(quantity, exact, runs[REFERENCE].labels):
+        row = [f"{part.label} {part.group}".strip()]
+        for k in (int(part.values.argmin()), int(part.values.argmax())):
+            row += [prefixed(float(part.values[k]), quantity.units), number(float(time[k]), 4)]
+        rows.append(row)
+    head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
+    table = PageTable("Extremes in the reference", head, rows, numeric=(1, 2, 3, 4))
+    return Section(pictures, list(legend.values()), [table])
 
 
 def magnitudes(quantity: Quantity, runs: Runs) -> Curves:
     """The largest magnitude of the quantity over its components, of each run that has it."""
-    return _curves(runs, quantity.name, lambda run: _largest(np.abs(run.array(quantity.name))))
+    return _curves(runs, quantity.name, lambda run: _over_components(np.abs(run.array(quantity.name))))
 
 
 def _curves(runs: Runs, name: str, measure: Callable[[StoredRun], Array]) -> Curves:
@@ -120,17 +121,14 @@ def _curves(runs: Runs, name: str, measure: Callable[[StoredRun], Array]) -> Cur
     return {method: Series(runs[method].array("time")[: len(x)], x, look_of(method)) for method, x in values.items()}
 
 
-def _largest(values: Array) -> Array:
+def _over_components(values: Array) -> Array:
     """(n,) of (n, ...): the largest over the components."""
     largest: Array = values.reshape(len(values), -1).max(axis=1)
     return largest
 
 
 def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[Component]:
-    """One by one: with blades and axes, a picture per axis and a line per blade; else one picture.
-
-    labels: of the coordinates, for a quantity that has them.
-    """
+    """One by one: with blades and axes, a picture per axis and a line per blade; else one picture."""
     names = {"coordinate": labels, "axis": ["x", "y", "z"]}
     shown = names.get(quantity.dimensions[1], [f"blade {i + 1}" for i in range(values.shape[1])])[: values.shape[1]]
     first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
@@ -143,19 +141,6 @@ def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) ->
     ]
 
 
-def _extremes(quantity: Quantity, run: StoredRun) -> PageTable:
-    """Smallest and largest value of each component, with their times."""
-    time = run.array("time")
-    rows = []
-    for part in components(quantity, run.array(quantity.name), run.labels):
-        row = [f"{part.label} {part.group}".strip()]
-        for k in (int(part.values.argmin()), int(part.values.argmax())):
-            row += [prefixed(float(part.values[k]), quantity.units), number(float(time[k]), 4)]
-        rows.append(row)
-    head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
-    return PageTable("Extremes in the reference", head, rows, numeric=(1, 2, 3, 4))
-
-
 def error_picture(
     curves: Curves, axis: str, name: str, caption: str, horizon: float | None = None, others: Sequence[Series] = (),
     legend: Sequence[LegendEntry] = (), *, signed: bool = False,
@@ -166,7 +151,7 @@ def error_picture(
     shown = visible(curves)
     exact = [label_of(method) for method in curves if method not in shown]
     notes = [f"No curve, because nowhere above 10⁻¹⁸: {'; '.join(exact)}."] if exact else []
-    panels = histories.errors([*others, *shown.values()], axis, horizon, signed=signed)
+    panels = plots.errors([*others, *shown.values()], axis, horizon, signed=signed)
     return picture(panels, name, caption, notes, legend)
 
 

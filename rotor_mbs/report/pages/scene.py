@@ -2,84 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claim_study import ClaimStudy
 from rotor_mbs.analysis.claims import Claim
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
+from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
-from rotor_mbs.report.core.looks import GREY, Look, coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context, claim_tables, quantities
+from rotor_mbs.report.pages import Context, claim_tables, quantities, scene_tables
 from rotor_mbs.report.pages.bench import cost_section
-from rotor_mbs.report.pages.drive import drive_section
-from rotor_mbs.report.pages.quantities import VISIBLE, parting
-from rotor_mbs.report.pages.scene_tables import failure_table, horizon, method_cell, metric, metrics_table
+from rotor_mbs.report.pages.quantities import VISIBLE, Runs, parting
+from rotor_mbs.report.pages.scene_tables import method_cell, metric
 from rotor_mbs.report.pages.viewer import viewer
-from rotor_mbs.report.plots import paths
-from rotor_mbs.report.plots import time_histories as histories
-from rotor_mbs.report.plots.time_histories import LOWEST, Series
-from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.report.plots import LOWEST, Series
+from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Table, value_at
 from rotor_mbs.solution.trajectory import Array
 
-_MOST_PUBLISHED = 2  # published values on one picture
-_EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
+MAX_PUBLISHED = 2  # published values on one picture
+COMMAND, TAKEN = Look(GREY, ":", ""), Look(VERMILLION, "--", "")
+EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
 
 
-class DrawnRuns(NamedTuple):
-    """The runs of a scene that are drawn: those that have samples.
-
-    sides   the "printed" run, and the one that stands for the "corrected" model
-    all     these, then the other runs of corrected models, by method
-    """
-
-    scene: StoredScene
-    sides: Mapping[str, StoredRun]
-    all: Mapping[str, StoredRun]
-    horizon: float | None
-
-
-def scene_page(scene: StoredScene, context: Context) -> dict[str, object]:
+def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, object]:
     """The content of the page of a scene."""
+    scene = opened.scenes[name]
+    horizon = scene_tables.horizon(scene)
+    # The printed run and the one that stands for the corrected model, then the others of corrected models.
     sides = run_selection.sides(scene)
-    good = {n: run for n, run in run_selection.corrected_runs(scene).items() if run_selection.has_samples(run)}
-    drawn = DrawnRuns(scene, sides, {run.method: run for run in sides.values()} | good, horizon(scene))
+    drawn = {run.method: run for run in sides.values()}
+    for method, run in run_selection.corrected_runs(scene).items():
+        if run_selection.has_samples(run):
+            drawn[method] = run
     pages = ["", *context.files.values(), ""]
-    place = pages.index(context.files[scene.name])
-    claims = [claim for claim in context.claims if scene.name in claim.published.scenes]
-    condition = context.conditions.get(scene.name.rpartition("/")[2])
+    place = pages.index(context.files[name])
+    claims = [claim for claim in context.claims if name in claim.published.scenes]
+    study = context.study
+    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims, study.shares if study else None)]
+    # Where a number is rounding error, what it is under other conditions.
+    if study is not None and any(claim.published.rounding for claim in claims):
+        tables += claim_tables.trial_tables(study.numbers)
+    condition = context.conditions.get(name.rpartition("/")[2])
+    notes = [condition] if condition else []
+    if study is not None and any(not claim.published.is_number for claim in claims):
+        notes.append(claim_tables.study_note(study.shares))
     figures = str(scene.attributes.get("figures", ""))
-    key = key_picture(list(sides.values()), claims, drawn.horizon)
     parsed = scene_of(scene)
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
     return {
-        "name": scene.name,
+        "name": name,
         "title": scene.title,
         "figures": figures and f"{'Figures' if ',' in figures else 'Figure'} {figures} of the paper",
         "toml": str(scene.attributes.get("scene_toml", "")),
         "source": opening_comment(scene),
-        "failures": Section(tables=[failure_table(scene)]),
-        "claims": _claims_section(claims, context.study, [condition] if condition else []),
+        "failures": Section(tables=[scene_tables.failure_table(scene)]),
+        "claims": Section(tables=[table for table in tables if table.rows], notes=notes),
         "viewer": viewer(scene, {label_of(run.method): run for run in sides.values()}),
-        "key": key,
-        "paths": tips_section(scene, list(sides.values()), drawn.horizon),
-        "motion": motion_section(drawn),
-        "difference": difference_section(drawn),
-        "energy": energy_section(drawn),
-        "drive": drive_section(scene, sides.get("corrected")),
-        "cost": cost_section(scene, context.curves.get(scene.name, ())),
-        "quantities": quantities.quantity_sections(scene, drawn.all, drawn.horizon),
-        "metrics": Section(tables=[metrics_table(scene)]),
-        "has_horizon": drawn.horizon is not None,
+        "key": key_picture(list(sides.values()), claims, horizon),
+        "paths": _tips_section(parsed, list(sides.values()), horizon),
+        "motion": _motion_section(list(sides.values()), horizon),
+        "difference": _difference_section(scene, sides, drawn, horizon),
+        "energy": _energy_section(sides, drawn, horizon),
+        "drive": _drive_section(parsed, sides.get("corrected")),
+        "cost": cost_section(scene, context.curves.get(name, ())),
+        "quantities": quantities.quantity_sections(scene, drawn, horizon),
+        "metrics": Section(tables=[scene_tables.metrics_table(scene)]),
+        "has_horizon": horizon is not None,
         "has_printed": any(run.status == "ok" and not is_corrected(run.method) for run in scene.runs.values()),
         "has_zero_pitch": has_zero_pitch,
         "escape_rate": escape_rate(parsed) if has_zero_pitch and parsed is not None else None,
@@ -99,28 +97,6 @@ def opening_comment(scene: StoredScene) -> str:
     return " ".join(lines).strip()
 
 
-def _claims_section(claims: Sequence[Claim], study: ClaimStudy | None, notes: list[str]) -> Section:
-    """The numbers and claims about a scene; where a number is rounding error, what it is under other conditions."""
-    tables = [claim_tables.number_table(claims), claim_tables.claim_table(claims, study.shares if study else None)]
-    if study is not None and any(claim.published.rounding for claim in claims):
-        tables += claim_tables.trial_tables(study.numbers)
-    tables = [table for table in tables if table.rows]
-    if study is not None and any(not claim.published.is_number for claim in claims):
-        notes = [*notes, claim_tables.study_note(study.shares)]
-    return Section(tables=tables, notes=notes)
-
-
-# What it opens with
-
-
-class Mark(NamedTuple):
-    """A published value (rad, rad/s) on one of the panels, with the text beside it."""
-
-    panel: int
-    value: float
-    text: str
-
-
 def key_picture(
     sides: Sequence[StoredRun], claims: Sequence[Claim], horizon: float | None, name: str = "key"
 ) -> Picture | None:
@@ -129,26 +105,29 @@ def key_picture(
     if not runs:
         return None
     labels = runs[0].labels
-    blade = _blade_to_show(runs)
-    shown = [0, blade] if blade else [0]
+    # Beside the rotor the pitch that differs most, or moves most.
+    shown = [0]
+    angles = [run.array("angles") for run in runs]
+    count = min(map(len, angles))
+    for values in ([angles[0][:count] - angles[1][:count]] if len(runs) > 1 else []) + [angles[-1]]:
+        largest = np.abs(values[:, 1:]).max(axis=0, initial=0.0)
+        if largest.size and largest.max() > 1e-6:
+            shown.append(1 + int(largest.argmax()))
+            break
     looks = {}
     for run in runs:  # the printed model is dashed upon the corrected one
         line = "-" if run.method == REFERENCE or is_corrected(run.method) else "--"
         looks[run.method] = Look(look_of(run.method).colour, line, "")
-    panels_of = [
-        (
-            f"{labels[i]} angle (rad)",
-            [Series(run.array("time"), run.array("angles")[:, i], looks[run.method]) for run in reversed(runs)],
-        )
-        for i in shown
-    ]
+    panels_of = []
+    for i in shown:
+        series = [Series(run.array("time"), run.array("angles")[:, i], looks[run.method]) for run in reversed(runs)]
+        panels_of.append((f"{labels[i]} angle (rad)", series))
     marks = []
     for claim in claims:
         item, of = claim.published, claim.published.of
         if item.is_number and of is not None and of.quantity == "angle" and of.coordinate in shown:
             text = f"published {fixed(item.value, item.decimals)} rad"
-            marks.append(Mark(shown.index(of.coordinate), item.value, text))
-    marks = marks[:_MOST_PUBLISHED]
+            marks.append((shown.index(of.coordinate), item.value, text))
     parted = None
     caption = f"{with_capital(label_of(runs[0].method))}: angles over time"
     if len(runs) > 1:
@@ -161,55 +140,40 @@ def key_picture(
     legend += horizon_entry(horizon, runs)
     if marks:
         legend.append(line_entry("published", line=":"))
-    return picture(departure(panels_of, marks, horizon, parted), name, caption, legend=legend)
-
-
-def _blade_to_show(runs: Sequence[StoredRun]) -> int:
-    """The coordinate of the pitch that differs most, or moves most; 0 where no blade pitches."""
-    angles = [run.array("angles") for run in runs]
-    count = min(map(len, angles))
-    candidates = [angles[-1]]
-    if len(angles) > 1:
-        candidates.insert(0, angles[0][:count] - angles[1][:count])
-    for values in candidates:
-        largest = np.abs(values[:, 1:]).max(axis=0, initial=0.0)
-        if largest.size and largest.max() > 1e-6:
-            return 1 + int(largest.argmax())
-    return 0
+    return picture(departure(panels_of, marks[:MAX_PUBLISHED], horizon, parted), name, caption, legend=legend)
 
 
 def departure(
-    panels_of: Sequence[tuple[str, Sequence[Series]]], marks: Sequence[Mark] = (), horizon: float | None = None,
+    panels_of: Sequence[tuple[str, Sequence[Series]]],
+    marks: Sequence[tuple[int, float, str]] = (),
+    horizon: float | None = None,
     parted: float | None = None,
-) -> Panels:  # fmt: skip
-    """A panel per (axis label, curves), one below the other, with published values and the time of parting (s)."""
+) -> Panels:
+    """A panel per (axis label, curves), with published values (panel, value, text) and the time of parting (s)."""
     panels = canvas.panels((1.75,) * len(panels_of), TIME_AXIS)
     for place, (axes, (label, series)) in enumerate(zip(panels.axes, panels_of, strict=True)):
         for curve in series:
-            time, values = histories.thin(curve.time, curve.values)
+            time, values = plots.thin(curve.time, curve.values)
             canvas.curve(axes, time, values, curve.look, 2.4 if curve.look.line == "-" else 1.3)
         shortest = min(len(curve.values) for curve in series)
-        histories.set_range(axes, np.stack([curve.values[:shortest] for curve in series], axis=1))
+        plots.set_range(axes, np.stack([curve.values[:shortest] for curve in series], axis=1))
         axes.set_ylabel(label)
         end = max(float(curve.time[-1]) for curve in series)
-        for mark in marks:
-            if mark.panel == place:
+        for panel, value, text in marks:
+            if panel == place:
                 low, high = axes.get_ylim()
-                axes.set_ylim(min(low, mark.value), max(high, mark.value + 0.12 * (high - low)))
-                axes.axhline(mark.value, color=GREY, linewidth=1.0, linestyle=":")
+                axes.set_ylim(min(low, value), max(high, value + 0.12 * (high - low)))
+                axes.axhline(value, color=GREY, linewidth=1.0, linestyle=":")
                 beside = parted if parted is not None and parted < 0.1 * end else 0.0  # not across its line
-                _text(axes, beside + 0.01 * end, mark.value, mark.text, va="bottom")
-        histories.mark_time(axes, end, horizon)
+                axes.text(beside + 0.01 * end, value, text, color=GREY, ha="left", va="bottom", fontsize=8.5)
+        plots.mark_time(axes, end, horizon)
         if parted is not None and 0.0 < parted < end:
             axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
             if not place:
                 text = f"{VISIBLE:g} rad apart at {parted:.2g} s"
-                _text(axes, parted + 0.01 * end, axes.get_ylim()[1], text, va="top")
+                top = axes.get_ylim()[1]
+                axes.text(parted + 0.01 * end, top, text, color=GREY, ha="left", va="top", fontsize=8.5)
     return panels
-
-
-def _text(axes: Any, x: float, y: float, text: str, va: str) -> None:
-    axes.text(x, y, text, color=GREY, ha="left", va=va, fontsize=8.5)
 
 
 def horizon_entry(horizon: float | None, runs: Iterable[StoredRun]) -> list[LegendEntry]:
@@ -219,37 +183,30 @@ def horizon_entry(horizon: float | None, runs: Iterable[StoredRun]) -> list[Lege
     return [line_entry(f"horizon {with_unit(horizon, 's', 3)}", line="--")]
 
 
-# Its sections
-
-
-def motion_section(drawn: DrawnRuns) -> Section:
+def _motion_section(sides: Sequence[StoredRun], horizon: float | None) -> Section:
     """Angles above rates, as the paper plots them; the printed model beside the corrected one."""
-    runs = [run for run in drawn.sides.values() if "angles" in run or "rates" in run]
+    runs = [run for run in sides if "angles" in run or "rates" in run]
     if not runs:
         return Section()
     pictures = []
     for i, run in enumerate(runs):
         angles, rates = run.get("angles"), run.get("rates")
         notes = []
-        if any(values is not None and histories.is_cut(values) for values in (angles, rates)):
+        if any(values is not None and plots.is_cut(values) for values in (angles, rates)):
             notes.append("Values beyond the axes are cut off.")
-        panels = histories.motion(run.array("time"), angles, rates, drawn.horizon)
+        panels = plots.motion(run.array("time"), angles, rates, horizon)
         pictures.append(picture(panels, f"motion-{i}", with_capital(label_of(run.method)), notes))
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(runs[0].labels)]
-    return Section(pictures, [*legend, *horizon_entry(drawn.horizon, runs)], [range_table(runs)])
+    return Section(pictures, [*legend, *horizon_entry(horizon, runs)], [range_table(runs)])
 
 
 def range_table(runs: Sequence[StoredRun]) -> PageTable:
-    """Extremes of each coordinate in each of the runs, of the samples.
-
-    Of the rotor, where they are stored, those of the integrator's own points, as the published numbers are: a sample
-    need not meet a crest.
-    """
+    """Extremes of each coordinate in each of the runs; of the rotor at the integrator's own points, if stored."""
     labels = runs[0].labels
     head = ["Coordinate"]
     rows = [[label] for label in labels]
     for run in runs:
-        lowest, highest, fastest = (metric(run, name) for name in _EXTREMES)
+        lowest, highest, fastest = (metric(run, name) for name in EXTREMES)
         if "angles" in run:
             head.append(f"{with_capital(label_of(run.method))}: angle (rad)")
             angles = run.array("angles")
@@ -267,14 +224,13 @@ def range_table(runs: Sequence[StoredRun]) -> PageTable:
     return PageTable("Extremes", head, rows, numeric=range(1, len(head)))
 
 
-def tips_section(stored: StoredScene, sides: Sequence[StoredRun], horizon: float | None) -> Section:
+def _tips_section(scene: Scene | None, sides: Sequence[StoredRun], horizon: float | None) -> Section:
     """Paths in space as the paper draws them; offset over azimuth; distance of printed from corrected tips."""
     runs = [run for run in sides if "tip" in run]
     if not runs:
         return Section()
-    scene = scene_of(stored)
     pictures = [
-        picture(paths.paths(run.array("tip")), f"paths-{i}", with_capital(label_of(run.method)))
+        picture(plots.paths(run.array("tip")), f"paths-{i}", with_capital(label_of(run.method)))
         for i, run in enumerate(runs)
     ]
     out_of_plane = [float(np.abs(run.array("tip")[:, :, 1]).max()) for run in runs]
@@ -290,7 +246,7 @@ def tips_section(stored: StoredScene, sides: Sequence[StoredRun], horizon: float
         gaps = np.linalg.norm(first.array("tip")[:count] - second.array("tip")[:count], axis=2)
         series = [Series(time, np.maximum(gap, 1e-6), coordinate_look(1 + i)) for i, gap in enumerate(gaps.T)]
         caption = f"Distance of each printed tip from the corrected one: up to {prefixed(float(gaps.max()), 'm')}"
-        panels = histories.errors(series, "printed − corrected (m)", horizon)
+        panels = plots.errors(series, "printed − corrected (m)", horizon)
         pictures.append(picture(panels, "tip-difference", caption))
     blades = range(1, 1 + runs[0].array("tip").shape[1])
     lines = [LegendEntry(f"blade {i}", coordinate_look(i)) for i in blades]
@@ -320,10 +276,10 @@ def offsets_over_azimuth(angles: Array, tip: Array, phases: Sequence[float]) -> 
     return panels
 
 
-def difference_section(drawn: DrawnRuns) -> Section:
+def _difference_section(scene: StoredScene, sides: Runs, drawn: Runs, horizon: float | None) -> Section:
     """Each run's largest angle difference from the reference, and the uncertainties that are known."""
-    reference = drawn.scene.reference
-    runs = {name: run for name, run in drawn.all.items() if name != REFERENCE}
+    reference = scene.reference
+    runs = {name: run for name, run in drawn.items() if name != REFERENCE}
     curves = quantities.differences(runs, reference)
     if not curves or reference is None:
         return Section()
@@ -338,7 +294,7 @@ def difference_section(drawn: DrawnRuns) -> Section:
         if "angle_uncertainty" not in run:
             continue
         time, uncertainty = run.array("time"), run.array("angle_uncertainty")
-        largest = float(uncertainty[time <= (drawn.horizon or np.inf)].max())
+        largest = float(uncertainty[time <= (horizon or np.inf)].max())
         rows.append([method_cell(method), number(largest), number(float(uncertainty.max()))])
         if uncertainty.max() > LOWEST:
             look = Look(GREY, "-", "") if method == REFERENCE else Look(look_of(method).colour, ":", "")
@@ -346,9 +302,9 @@ def difference_section(drawn: DrawnRuns) -> Section:
             legend.append(LegendEntry(f"{label_of(method)}: its uncertainty", look))
     shown = quantities.error_picture(
         curves, "largest angle difference (rad)", "difference",
-        "Largest difference from the reference, over all angles", drawn.horizon, others,
+        "Largest difference from the reference, over all angles", horizon, others,
     )  # fmt: skip
-    legend += horizon_entry(drawn.horizon, drawn.sides.values())
+    legend += horizon_entry(horizon, sides.values())
     table = PageTable(
         "Uncertainty of the angles, by the method's own estimate (rad)",
         ("Method", "up to the horizon", "whole run"), rows, numeric=(1, 2),
@@ -356,13 +312,13 @@ def difference_section(drawn: DrawnRuns) -> Section:
     return Section([shown] if shown else [], legend, [table] if rows else [])
 
 
-def energy_section(drawn: DrawnRuns) -> Section:
+def _energy_section(sides: Runs, drawn: Runs, horizon: float | None) -> Section:
     """Energy less work from its start, of every run; what each run has and how well it conserves it."""
-    runs = {name: run for name, run in drawn.all.items() if "energy_error" in run}
-    shown, methods = quantities.energy_picture(runs, drawn.horizon)
+    runs = {name: run for name, run in drawn.items() if "energy_error" in run}
+    shown, methods = quantities.energy_picture(runs, horizon)
     if shown is None:
         return Section()
-    legend = [*quantities.run_legend(methods), *horizon_entry(drawn.horizon, drawn.sides.values())]
+    legend = [*quantities.run_legend(methods), *horizon_entry(horizon, sides.values())]
     head = ("Method", "Largest kinetic energy", "Work at the end", "Largest gain", "Drift (relative)")
     rows = []
     for name, run in runs.items():
@@ -371,3 +327,61 @@ def energy_section(drawn: DrawnRuns) -> Section:
         joules = [prefixed(value, "J") for value in (kinetic, work, metric(run, "energy_gain_J"))]
         rows.append([method_cell(name), *joules, number(metric(run, "energy_drift_max"))])
     return Section([shown], legend, [PageTable("", head, rows, numeric=(1, 2, 3, 4)).without_empty_columns()])
+
+
+def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
+    """Torque and power at the shaft; pitches, their commands and the power of their actuators."""
+    if scene is None or run is None or "rates" not in run or "angles" not in run or not len(run.array("time")):
+        return Section()
+
+    def over_time(table: Table) -> Array:
+        return np.array([value_at(table, t) for t in time.tolist()])
+
+    def add_numbers(name: str, values: Array, unit: str, *, with_work: bool = True) -> None:
+        work = prefixed(float(np.trapezoid(values, time)), "J") if with_work else ""
+        rows.append([name, prefixed(float(np.abs(values).max()), unit), prefixed(float(values[-1]), unit), work])
+
+    def add_picture(name: str, caption: str, series: Sequence[tuple[str, Sequence[Series]]]) -> None:
+        panels = plots.lines(series, height=1.3)
+        for axes in panels.axes:  # they have the zero
+            low, high = axes.get_ylim()
+            axes.set_ylim(min(low, 0.0), max(high, 0.0))
+        pictures.append(picture(panels, name, caption))
+
+    time, angles, rates = run.array("time"), run.array("angles"), run.array("rates")
+    pictures: list[Picture] = []
+    legend: list[LegendEntry] = []
+    rows: list[list[str]] = []
+    if scene.has_torque:
+        torque = over_time(scene.rotor_torque)
+        powers = [Series(time, torque * rates[:, 0], coordinate_look(0))]
+        add_numbers("Torque on the rotor", torque, "N m", with_work=False)
+        add_numbers("Its power", powers[0].values, "W")
+        if scene.shaft_damping:
+            powers.append(Series(time, scene.shaft_damping * rates[:, 0] ** 2, TAKEN))
+            add_numbers("Taken by the shaft's damper", powers[1].values, "W")
+            legend.append(LegendEntry("torque on the rotor", coordinate_look(0)))
+            legend.append(LegendEntry("taken by the shaft's damper", TAKEN))
+        torques = [Series(time, torque, coordinate_look(0))]
+        add_picture("drive", "Rotor torque and its power", [("torque (N m)", torques), ("power (W)", powers)])
+    driven = [i for i in range(len(scene.blades)) if any(scene.pitch_load(i))]
+    if driven:
+        pitches = [Series(time, pitch, coordinate_look(1 + i)) for i, pitch in enumerate(angles.T[1:])]
+        powers = []
+        for i in driven:
+            torque, rest = map(over_time, scene.pitch_load(i))
+            stiffness, damping = scene.bearing(i)
+            moment = torque + stiffness * (rest - angles[:, 1 + i]) - damping * rates[:, 1 + i]
+            powers.append(Series(time, moment * rates[:, 1 + i], coordinate_look(1 + i)))
+            if scene.pitch_load(i)[1]:
+                pitches.append(Series(time, rest, COMMAND))
+            ends = (float(np.abs(angles[:, 1 + i]).max()), float(angles[-1, 1 + i]))
+            rows.append([f"Pitch {i + 1}", *(with_unit(angle, "rad", 4) for angle in ends), ""])
+            add_numbers(f"Actuator {i + 1}, power", powers[-1].values, "W")
+        rows_of_panels = [("pitch (rad)", pitches), ("actuators' power (W)", powers)]
+        add_picture("pitch-drive", "Pitches, their commands and actuators", rows_of_panels)
+        legend += [LegendEntry(f"pitch {i + 1}", coordinate_look(1 + i)) for i in range(len(scene.blades))]
+        if any(scene.bearing_rest):
+            legend.append(LegendEntry("command", COMMAND))
+    table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows, numeric=(1, 2, 3))
+    return Section(pictures, legend, [table] if rows else [])

@@ -11,6 +11,7 @@ from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
 
+_ERRORS_OF_RUNS = ("angle_error_max", "angle_error_whole", "tip_error_max")  # against the reference
 # Attributes of a results file that say what made it.
 _VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
 
@@ -56,37 +57,36 @@ def horizon(scene: StoredScene) -> float | None:
 
 def metrics_table(scene: StoredScene) -> PageTable:
     """Every run of the scene."""
-    head = (
-        "Method", "Status", "Angle error to the horizon (rad)", "Angle error, whole run (rad)",
-        "Tip error to the horizon (m)", "Energy drift (relative)", "Angular momentum about the shaft, error (relative)",
-        "Joint gap (m)", "Zero pitch", "Steps", "Evaluations", "Set-up", "Run",
-    )  # fmt: skip
+    head = {
+        "angle_error_max": "Angle error to the horizon (rad)",
+        "angle_error_whole": "Angle error, whole run (rad)",
+        "tip_error_max": "Tip error to the horizon (m)",
+        "energy_drift_max": "Energy drift (relative)",
+        "angular_impulse_error_max": "Angular momentum about the shaft, error (relative)",
+        "constraint_error_max": "Joint gap (m)",
+    }
     rows: list[Row] = []
     for run in run_selection.in_order(scene).values():
         row = [run_cell(run), status_cell(run)]
-        for name in ("angle_error_max", "angle_error_whole", "tip_error_max"):
-            row.append("" if run.method == REFERENCE else number(metric(run, name)))
-        for name in ("energy_drift_max", "angular_impulse_error_max", "constraint_error_max"):
-            row.append(number(metric(run, name)))
-        row.append(_zero_pitch(run))
+        for name in head:
+            is_own_error = run.method == REFERENCE and name in _ERRORS_OF_RUNS
+            row.append("" if is_own_error else number(metric(run, name)))
+        # Whether pitches that are exactly zero in the reference stayed so, and until when.
+        left, rate = metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s")
+        if "zero_pitch_max" not in run.attributes:
+            row.append("")
+        elif left is None:
+            row.append("kept")
+        else:
+            growing = "" if rate is None else f", growing {with_unit(rate, '/s', 3)}"
+            row.append(f"left at {with_unit(left, 's', 3)}{growing}")
         for name in ("steps", "rhs_evaluations"):
             count = metric(run, name)
             row.append("" if count is None else f"{count:.0f}")
-        for name in ("setup_time_s", "run_time_s"):
-            row.append(prefixed(metric(run, name), "s"))
+        row += [prefixed(metric(run, name), "s") for name in ("setup_time_s", "run_time_s")]
         rows.append(row)
-    return PageTable("", head, rows, numeric=(2, 3, 4, 5, 6, 7, 9, 10, 11, 12)).without_empty_columns()
-
-
-def _zero_pitch(run: StoredRun) -> str:
-    """Whether pitches that are exactly zero in the reference stayed so, and until when."""
-    if "zero_pitch_max" not in run.attributes:
-        return ""
-    left, rate = metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s")
-    if left is None:
-        return "kept"
-    text = f"left at {with_unit(left, 's', 3)}"
-    return text if rate is None else f"{text}, growing {with_unit(rate, '/s', 3)}"
+    columns = ("Method", "Status", *head.values(), "Zero pitch", "Steps", "Evaluations", "Set-up", "Run")
+    return PageTable("", columns, rows, numeric=(2, 3, 4, 5, 6, 7, 9, 10, 11, 12)).without_empty_columns()
 
 
 def failure_table(scene: StoredScene) -> PageTable:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, reached_by, suite_runs
+from rotor_mbs.report import plots
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
@@ -17,7 +18,6 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import quantities
 from rotor_mbs.report.pages.scene import opening_comment
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
-from rotor_mbs.report.plots import time_histories as histories
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.text_table import listed
@@ -46,18 +46,29 @@ def stability_pages(opened: OpenResults, main: str, site: Site) -> dict[str, str
     runs, records = suite_runs(opened.path), read_records(opened.path, *_SUITE)
     names = list(dict.fromkeys(run.scene for run in runs))
     files = page_names(names)
-    titles = {name: opened.scenes[name].title for name in names}
-    pages = {main: render("stability", _map(runs, records, files, titles), site, main)}
+    pages = {main: render("stability", _map(runs, records, files, opened.scenes), site, main)}
     for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
-        own = [run for run in runs if run.scene == name]
-        ladders = [record for record in records if record.kind == "stability" and record.scene == name]
-        around = {"previous": files.get(previous, ""), "next": files.get(following, "")}
-        pages[files[name]] = render("stability_scene", _scene_page(opened.scenes[name], own, ladders) | around, site)
+        scene = opened.scenes[name]
+        page = {
+            "name": name,
+            "title": scene.title,
+            "figures": "",
+            "failures": Section(),
+            "source": opening_comment(scene),
+            "toml": str(scene.attributes["scene_toml"]),
+            "outcomes": _outcomes(scene, [run for run in runs if run.scene == name]),
+            "motion": _motion(run_selection.reference_or_corrected_run(scene)),
+            "errors": _errors(scene),
+            "steps": _error_over_step([r for r in records if r.kind == "stability" and r.scene == name]),
+            "previous": files.get(previous, ""),
+            "next": files.get(following, ""),
+        }
+        pages[files[name]] = render("stability_scene", page, site)
     return pages
 
 
 def _map(
-    runs: Sequence[SuiteRun], records: Sequence[Record], files: dict[str, str], titles: dict[str, str]
+    runs: Sequence[SuiteRun], records: Sequence[Record], files: Mapping[str, str], scenes: Mapping[str, StoredScene]
 ) -> dict[str, object]:
     methods = list(dict.fromkeys(run.method for run in runs))
     families: dict[str, list[dict[str, object]]] = {}
@@ -73,84 +84,51 @@ def _map(
             if run.false_success and run.outcome != "false_success":
                 symbol += "!"
             marks.append((run.outcome, symbol, f"{label_of(run.method)}: {text}. {run.message}".strip()))
+        first = next(iter(own.values()))
+        fastest: TableCell | str = "no method"
+        if not first.has_reference:
+            fastest = "no reference"
+        elif all(run.angle_error is None for run in own.values()):
+            fastest = NOT_COMPARED
+        elif reached := reached_by(list(own.values()), scene):
+            fastest = method_cell(reached)
         row: dict[str, object] = {
             "scene": scene,
             "href": file,
-            "title": titles[scene],
+            "title": scenes[scene].title,
             "marks": marks,
-            "fastest": _fastest(list(own.values())),
+            "fastest": fastest,
         }
-        families.setdefault(_family(next(iter(own.values())).family), []).append(row)
-    used = {run.outcome for run in runs}
-    return {
-        "methods": [(label_of(name), name) for name in methods],
-        "families": list(families.items()),
-        "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
-        "summary": advice_lines(runs, label_of, lambda family: f"“{_family(family)}”"),
-        "false_successes": sum(run.false_success for run in runs),
-        "limits": _limits(records),
-        "conservation": _conservation(records),
-    }
-
-
-def _family(name: str) -> str:
-    return _FAMILIES.get(name, name)
-
-
-def _fastest(own: Sequence[SuiteRun]) -> TableCell | str:
-    if not own[0].has_reference:
-        return "no reference"
-    if all(run.angle_error is None for run in own):
-        return NOT_COMPARED
-    method = reached_by(own, own[0].scene)
-    return "no method" if method is None else method_cell(method)
-
-
-def _limits(records: Sequence[Record]) -> Section:
-    rows = []
+        families.setdefault(_FAMILIES.get(first.family, first.family), []).append(row)
+    limits, conserved = [], []
     for record in records:
         facts = record.attributes
         if record.kind == "stability_limits" and math.isfinite(facts["largest_stable_step_s"]):
             step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
             numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
             numbers.append(f"{facts['mode_damping_ratio']:.3g}")
-            rows.append([record.scene, method_cell(record.method), *numbers])
-    head = (
+            limits.append([record.scene, method_cell(record.method), *numbers])
+        drifts = [facts.get(name) for name in _CONSERVED]
+        if record.kind == "symmetry" and any(value is not None for value in drifts):
+            conserved.append([record.scene, method_cell(record.method), *map(number, drifts)])
+    limits_head = (
         "Scene", "Method", "found by bisection (s)", "theory (s)", "found / theory", "step × |λ|", "damping ratio of λ",
     )  # fmt: skip
-    return Section(tables=[PageTable("", head, rows, (2, 3, 4, 5, 6))])
-
-
-def _conservation(records: Sequence[Record]) -> Section:
-    rows = []
-    for record in records:
-        numbers = [record.attributes.get(name) for name in _CONSERVED]
-        if record.kind == "symmetry" and any(value is not None for value in numbers):
-            rows.append([record.scene, method_cell(record.method), *map(number, numbers)])
-    head = ["Scene", "Method", *_CONSERVED.values()]
-    return Section(tables=[PageTable("", head, rows, tuple(range(2, len(head))))])
-
-
-def _scene_page(scene: StoredScene, own: Sequence[SuiteRun], ladders: Sequence[Record]) -> dict[str, object]:
-    corrected = run_selection.corrected_runs(scene)
-    runs = {
-        name: run for name, run in corrected.items() if run_selection.has_samples(run) and len(run.array("time")) > 1
-    }
+    conserved_head = ["Scene", "Method", *_CONSERVED.values()]
+    used = {run.outcome for run in runs}
     return {
-        "name": scene.name,
-        "title": scene.title,
-        "figures": "",
-        "failures": Section(),
-        "source": opening_comment(scene),
-        "toml": str(scene.attributes["scene_toml"]),
-        "outcomes": Section(tables=[_outcome_table(scene, own), _reference_table(scene)]),
-        "motion": _motion(run_selection.reference_or_corrected_run(scene)),
-        "errors": _errors(scene, runs),
-        "steps": _error_over_step(ladders),
+        "methods": [(label_of(name), name) for name in methods],
+        "families": list(families.items()),
+        "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
+        "summary": advice_lines(runs, label_of, lambda family: f"“{_FAMILIES.get(family, family)}”"),
+        "false_successes": sum(run.false_success for run in runs),
+        "limits": Section(tables=[PageTable("", limits_head, limits, range(2, 7))]),
+        "conservation": Section(tables=[PageTable("", conserved_head, conserved, range(2, len(conserved_head)))]),
     }
 
 
-def _outcome_table(scene: StoredScene, own: Sequence[SuiteRun]) -> PageTable:
+def _outcomes(scene: StoredScene, own: Sequence[SuiteRun]) -> Section:
+    """The outcome of each method; what limits the accuracy of any: rounding of the initial state times its growth."""
     rows: list[Row] = []
     for run in own:
         symbol, text = OUTCOMES[run.outcome]
@@ -164,18 +142,15 @@ def _outcome_table(scene: StoredScene, own: Sequence[SuiteRun]) -> PageTable:
         "Method", "Outcome", "angle error (rad)", "energy drift", "run time (s)", "step for 10⁻⁶ rad (s)",
         "reached (s)",
     )  # fmt: skip
-    return PageTable("", head, rows, (2, 3, 4, 5, 6))
-
-
-def _reference_table(scene: StoredScene) -> PageTable:
-    """What limits the accuracy of any method: rounding of the initial state, 1e-16 rad, times the error growth."""
-    rows = []
+    limits = []
     reference = scene.reference
     if reference is not None and run_selection.has_samples(reference) and "error_growth" in reference:
         names = ("angle_uncertainty", "error_growth")
-        rows.append([with_unit(horizon(scene), "s", 4), *(number(float(reference.array(n).max())) for n in names)])
-    head = ("Horizon", "largest uncertainty of the angles (rad)", "error growth by the end")
-    return PageTable("The reference", head, rows, (0, 1, 2))
+        limits.append([with_unit(horizon(scene), "s", 4), *(number(float(reference.array(n).max())) for n in names)])
+    limits_head = ("Horizon", "largest uncertainty of the angles (rad)", "error growth by the end")
+    return Section(
+        tables=[PageTable("", head, rows, (2, 3, 4, 5, 6)), PageTable("The reference", limits_head, limits, (0, 1, 2))]
+    )
 
 
 def _motion(run: StoredRun | None) -> Section:
@@ -189,11 +164,15 @@ def _motion(run: StoredRun | None) -> Section:
     if unresolved:
         notes.append(f"Only the range is meaningful, samples are too far apart: {listed(unresolved)}.")
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(run.labels)]
-    panels = histories.motion(run.array("time"), run.get("angles"), run.get("rates"))
+    panels = plots.motion(run.array("time"), run.get("angles"), run.get("rates"))
     return Section([picture(panels, "motion", f"Angles and rates of {label_of(run.method)}", notes)], legend)
 
 
-def _errors(scene: StoredScene, runs: quantities.Runs) -> Section:
+def _errors(scene: StoredScene) -> Section:
+    runs = {}
+    for name, run in run_selection.corrected_runs(scene).items():
+        if run_selection.has_samples(run) and len(run.array("time")) > 1:
+            runs[name] = run
     pictures = []
     methods: set[str] = set()
     differences = quantities.differences(runs, scene.reference)
@@ -218,5 +197,5 @@ def _error_over_step(ladders: Sequence[Record]) -> Section:
         return Section()
     curves = [(arrays["step"], arrays["angle_error_max"], look_of(name)) for name, arrays in drawn.items()]
     caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
-    shown = picture(histories.error_over_step(curves, TARGET), "steps", caption)
+    shown = picture(plots.error_over_step(curves, TARGET), "steps", caption)
     return Section([shown], quantities.run_legend(drawn))

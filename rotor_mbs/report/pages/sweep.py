@@ -38,13 +38,27 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     ok = statuses == STATUSES.index("ok")
     lines = [with_capital(sweep.attributes["summary"].rstrip(".")) + "."]
     plots = _responses(sweep, ok)
-    if _asked(sweep):
+    if _picture_kind(sweep):
         try:
             panels, caption, line, legend = _asked_picture(sweep)
             plots = [picture(panels, "asked", caption, legend=legend)]
         except (InputError, StoreError) as exc:
             line = f"No picture: {exc}."
         lines.append(line)
+    distributions = []
+    left_out = {*map(parameter_name, sweep.keys), *_COUNTS}
+    for name, column in sweep.columns.items():
+        if column.dimensions != ("run",) or name in left_out or sweep.column(name).dtype.kind != "f":
+            continue
+        values = sweep.column(name)[ok]
+        values = values[np.isfinite(values)]
+        if len(values) < 2 or not np.ptp(values):
+            continue
+        low, middle, high = apart(*map(float, np.quantile(values, (0.05, 0.5, 0.95))))
+        what = f"median {middle}, 5 to 95 % from {low} to {high}"
+        caption = _axis(f"{with_capital(column.long_name)}: {what}", column.units)
+        panels = distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
+        distributions.append(picture(panels, f"of-{name}", caption))
     codes, counts = np.unique(statuses, return_counts=True)
     status_rows = [
         (status_text(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / len(statuses):.1f} %")
@@ -63,7 +77,7 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         "plots": Section(plots),
         "statuses": Section(tables=[PageTable("", ("Status", "Runs", "Share"), status_rows, (1, 2))]),
         "parameters": Section(tables=[PageTable("", head, parameter_rows, (2, 3, 4))]),
-        "distributions": Section(_distributions(sweep, ok)),
+        "distributions": Section(distributions),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
         "versions": versions(sweep.attributes),
     }
@@ -88,7 +102,7 @@ def save_picture(sweep: StoredSweep, path: Path) -> str:
     return f"{path}: {line}"
 
 
-def _asked(sweep: StoredSweep) -> str:
+def _picture_kind(sweep: StoredSweep) -> str:
     """The kind of picture that the sweep's file asks for; "" where it asks for none."""
     try:
         return str(tomllib.loads(str(sweep.attributes.get("sweep_toml", ""))).get("picture", ""))
@@ -98,7 +112,7 @@ def _asked(sweep: StoredSweep) -> str:
 
 def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEntry]]:
     """That picture, its caption, its result in a line, its legend."""
-    if _asked(sweep) == "spread":
+    if _picture_kind(sweep) == "spread":
         spread = spread_of(sweep)
         rate = f"{spread.exponent:.3f} ± {spread.uncertainty:.3f} per s"
         line = (
@@ -135,25 +149,6 @@ def _responses(sweep: StoredSweep, ok: Array) -> list[Picture]:
             pictures.append(
                 picture(panels, f"over-{name}", f"The largest pitch of each run over the {field_name(key)}")
             )
-    return pictures
-
-
-def _distributions(sweep: StoredSweep, ok: Array) -> list[Picture]:
-    """A picture for each number of the runs that ended well."""
-    pictures = []
-    left_out = {*map(parameter_name, sweep.keys), *_COUNTS}
-    for name, column in sweep.columns.items():
-        if column.dimensions != ("run",) or name in left_out or sweep.column(name).dtype.kind != "f":
-            continue
-        values = sweep.column(name)[ok]
-        values = values[np.isfinite(values)]
-        if len(values) < 2 or not np.ptp(values):
-            continue
-        low, middle, high = apart(*map(float, np.quantile(values, (0.05, 0.5, 0.95))))
-        what = f"median {middle}, 5 to 95 % from {low} to {high}"
-        caption = _axis(f"{with_capital(column.long_name)}: {what}", column.units)
-        panels = distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
-        pictures.append(picture(panels, f"of-{name}", caption))
     return pictures
 
 

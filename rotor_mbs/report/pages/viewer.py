@@ -1,8 +1,4 @@
-"""The data of the viewer on a scene's page: the bodies, and each model's angles at equally spaced times.
-
-Angles are sent as differences of 16 bits, so that a coordinate may turn any number of times; the number of frames
-follows from the fastest rate. `templates/viewer.js` draws.
-"""
+"""The data that `templates/viewer.js` draws: the bodies, and each model's angles at equally spaced times."""
 
 from __future__ import annotations
 
@@ -30,16 +26,19 @@ _VISIBLE = 0.1  # of the longest blade
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
-    """What the template needs of at most two runs, by the name to be shown; None without bodies or angles.
-
-    data: JSON, safe inside a script element; models: their names, in the order of the data; notes: where a motion is
-    too fast for the frames; magnified: how many times the tip's distance from the pitch axis is drawn at first
-    """
+    """What the template needs of at most two runs, by the name to be shown; None without bodies or angles."""
     scene = scene_of(stored)
     if scene is None:
         return None
-    motions = {name: _motion(run, 1 + len(scene.blades)) for name, run in runs.items()}
-    moves = {name: motion for name, motion in motions.items() if motion is not None}
+    moves: dict[str, tuple[Array, Array]] = {}
+    for name, run in runs.items():
+        time, angles = run.get("time"), run.get("angles")
+        if time is None or angles is None or angles.shape != (len(time), 1 + len(scene.blades)):
+            continue
+        good = np.isfinite(time) & np.isfinite(angles).all(axis=1)
+        count = len(good) if good.all() else int(good.argmin())
+        if count >= 2:
+            moves[name] = time[:count], angles[:count]
     if not moves:
         return None
     end = max(float(time[-1]) for time, _ in moves.values())
@@ -69,10 +68,7 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
 
 
 def frames(moves: Sequence[tuple[Array, Array]]) -> int:
-    """How many frames the runs (time in s, angles in rad) need: as many as the fastest motion takes, at most MOST.
-
-    All samples where they are not many more than needed: then nothing is interpolated that was not stored.
-    """
+    """How many frames the runs (time in s, angles in rad) need: as many as the fastest motion takes, at most MOST."""
     time = max((time for time, _ in moves), key=lambda time: float(time[-1]))
     rate = max(float((np.abs(np.diff(a, axis=0)).max(axis=1) / np.diff(t)).max()) for t, a in moves)
     needed = min(max(math.ceil(min(rate * float(time[-1]) / _ARC, 1e9)) + 1, FEWEST), MOST)
@@ -87,10 +83,7 @@ def angles_at(time: Array, angles: Array, step: float) -> Array:
 
 
 def magnification(scene: Scene) -> int | None:
-    """How many times a tip's distance from its pitch axis is drawn, so that it is a tenth of the blade; at least 1.
-
-    None where every tip lies on its axis: its pitch cannot be seen.
-    """
+    """How many times a tip's distance from its pitch axis is drawn, so that it is a tenth of the blade; at least 1."""
     offset = max(math.hypot(*blade.tip[:2]) for blade in scene.blades)
     if not offset:
         return None
@@ -117,15 +110,3 @@ def script_json(data: object) -> Markup:
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return Markup(text)
-
-
-def _motion(run: StoredRun, coordinates: int) -> tuple[Array, Array] | None:
-    """Time and angles up to the first sample that is not finite; None where they cannot be drawn."""
-    if "time" not in run or "angles" not in run:
-        return None
-    time, angles = run.array("time"), run.array("angles")
-    if angles.ndim != 2 or angles.shape[1] != coordinates or len(time) != len(angles):
-        return None
-    good = np.isfinite(time) & np.isfinite(angles).all(axis=1)
-    count = len(good) if good.all() else int(good.argmin())
-    return (time[:count], angles[:count]) if count >= 2 else None
