@@ -103,8 +103,8 @@ def sweep_table(
     }
     scales[CHARACTERS] = Column((CHARACTERS,), "1", ""), np.empty(MESSAGE_LENGTH, np.int8)
     labels = {"coordinate": sweep.base.coordinate_labels} if "coordinate" in used else {}
-    filled = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
-    return Table("", runs, known, filled, scales, labels, attributes or {}, flags)
+    computed = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
+    return Table("", runs, known, computed, scales, labels, attributes or {}, flags)
 
 
 @contextmanager
@@ -143,7 +143,7 @@ def open_sweep(
             stored = stored_table(file)
         place, marked = stored.place(number=int(stored.runs[0]) if len(stored.runs) else 0), stored.statuses()
         statuses = place.stored(marked)
-        limit = stored.filled["time_limit_s"]
+        limit = stored.computed["time_limit_s"]
         limits = np.memmap(path, limit.kind, "r", limit.offset, limit.shape) if len(marked) else np.empty(0)
         statuses[(statuses == code_of("timed_out")) & (limits < time_limit_s)] = MISSING
         place.mark_missing(np.flatnonzero((marked != MISSING) & (statuses == MISSING)).tolist())  # readers see it, too
@@ -215,8 +215,8 @@ class StoredSweep:
         table = self._table
         if name == "run":
             return table.runs
-        if name in table.filled:
-            stored = table.filled[name]
+        if name in table.computed:
+            stored = table.computed[name]
             if not all(stored.shape):
                 return np.empty(stored.shape, stored.kind)
             with files.reading(self._path, name):

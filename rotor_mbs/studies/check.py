@@ -16,7 +16,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method,
 from rotor_mbs.runs.freeze import changed_arrays
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING
+from rotor_mbs.runs.table import MISSING, refuse_changed_layout
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -78,6 +78,7 @@ def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) ->
 
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError, InputError."""
+    refuse_changed_layout(path)
     if is_sweep(path):
         return _judge_sweep(StoredSweep(path, allow_damaged_runs=True), bounds)
     try:

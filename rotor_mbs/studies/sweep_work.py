@@ -61,7 +61,8 @@ class Chunk(Task):
     def part(self, start: int, end: int) -> Chunk:
         """Some of its runs."""
         values = self.values[start:end]
-        return replace(self, start=self.start + start, values=values, limit_s=limit_of(len(values), self.time_limit_s))
+        kill_after_s = limit_of(len(values), self.time_limit_s)
+        return replace(self, start=self.start + start, values=values, kill_after_s=kill_after_s)
 
     def failed(self, status: str, message: str) -> Rows:
         """The rows of runs whose process was ended, or that raised."""
