@@ -140,7 +140,7 @@ def test_an_energy_error_that_is_not_the_balance_is_found(copy: Path) -> None:
 def test_settings_and_steps_that_are_not_the_methods_are_found(copy: Path) -> None:
     forge(copy, RUN, lambda row: row["steps"].fill(1))
     assert {check.name for check in failed(judged(copy))} == {"steps"}
-    columns = TableFile(copy).tables["runs"].filled.keys()
+    columns = TableFile(copy).table("runs").filled.keys()
     with h5py.File(copy, "r+") as file:
         file["runs/settings"][1] = '{"step": 0.001}'
         del file["runs"].attrs["digests"]
@@ -176,7 +176,7 @@ FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
 @pytest.mark.parametrize("kind", FOREIGN)
 def test_what_is_not_an_array_of_the_file_is_refused(kind: str, is_sealed: bool, copy: Path, tmp_path: Path) -> None:
     with h5py.File(copy, "r+") as file:
-        scene, columns = file[SCENE], TableFile(copy).tables[SCENE].filled
+        scene, columns = file[SCENE], TableFile(copy).table(SCENE).filled
         del scene["angles"]
         FOREIGN[kind](scene, outside(tmp_path / "outside.bin"))
         if is_sealed and kind not in ("an external link", "a group"):
