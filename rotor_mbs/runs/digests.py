@@ -94,7 +94,7 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
     for name in group:
         is_unfilled = unfilled(name) in known
         label = unfilled(name) if is_unfilled else name
-        if is_unfilled and not with_columns:
+        if is_unfilled and not with_columns and not files.is_link(group, name):
             sums[label] = known[label]
             continue
         sums[label] = ""
