@@ -94,7 +94,7 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
     for name in group:
         is_computed = label_of(name) in known
         label = label_of(name) if is_computed else name
-        if is_computed and not with_columns:
+        if is_computed and not with_columns and not files.is_link(group, name):
             sums[label] = known[label]
             continue
         sums[label] = ""

@@ -274,6 +274,11 @@ def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
             yield from groups_in(item, seen)
 
 
+def is_link(group: Any, name: str) -> bool:
+    """Whether a member of a group stands elsewhere, in this file or another one."""
+    return not isinstance(group.get(name, getlink=True), h5py.HardLink)
+
+
 def is_group(item: Any) -> bool:
     """Whether a member of a file holds others, and is no array."""
     return isinstance(item, h5py.Group)
