@@ -195,7 +195,7 @@ def wrong_scenes(scene: Scene, share: float) -> Iterator[tuple[str, Scene]]:
 @pytest.mark.parametrize(
     ("method", "share", "every"),
     [
-        ("lagrange/dop853", 1e-6, 15),
+        ("lagrange/dop853", 1e-6, 31),
         pytest.param("lagrange/dop853", 1e-6, 1, marks=pytest.mark.full),
         pytest.param("exudyn_tree/rk67", 1e-6, 1, marks=pytest.mark.full),
         pytest.param("mujoco/rk4", 1e-3, 1, marks=pytest.mark.full),
