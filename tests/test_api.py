@@ -15,9 +15,9 @@ SHORT = {"duration": 1.0, "samples": 101}
 
 
 @pytest.fixture(scope="module")
-def study() -> rm.Comparison:
+def study() -> rm.Runs:
     scene = rm.scene("paper/fig08").replace(**SHORT)
-    return rm.compare(scene, ["lagrange/dop853", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+    return rm.run(scene, ["lagrange/dop853", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
 
 
 def test_every_public_name_is_there_and_documented() -> None:
@@ -43,8 +43,8 @@ def test_a_run_is_judged_against_the_shipped_reference() -> None:
 def test_every_function_takes_a_scene_by_its_name(tmp_path: Path) -> None:
     run = rm.run("paper/fig08", "lagrange/dop853")
     assert run.scene == rm.scene("paper/fig08")
-    assert rm.compare("paper/fig08", "lagrange/dop853").scene == run.scene
-    assert rm.compare_data({"time": run.time, "angles": run.angles}, "paper/fig08").agrees
+    assert list(rm.run("paper/fig08", ["lagrange/dop853"])) == ["reference", "lagrange/dop853"]
+    assert rm.compare({"time": run.time, "angles": run.angles}, "paper/fig08").agrees
     assert rm.modes("paper/fig08").scene == "paper/fig08"
     assert rm.sweep("paper/fig08", {"gravity": [0.0]}, methods="lagrange/dop853").statuses == {"ok": 1}
     assert [path.name for path in rm.export("paper/fig08", "csv", tmp_path / "a.csv")] == ["a.csv"]
@@ -77,55 +77,49 @@ def test_wrong_names_and_settings_are_refused_with_what_is_allowed() -> None:
             wrong()
 
 
-def test_labels_units_and_values_of_xarray(study: rm.Comparison) -> None:
+def test_labels_units_and_values_of_xarray(study: rm.Runs) -> None:
     pytest.importorskip("xarray")
     data = study.to_xarray()
     run = study["exudyn_tree/rk67"]
-    chosen = data.angles.sel(solver="exudyn_tree/rk67", coordinate="pitch 1")
+    chosen = data.angles.sel(run="exudyn_tree/rk67", coordinate="pitch 1")
     np.testing.assert_array_equal(chosen, run.angles[:, 1])
-    np.testing.assert_array_equal(data.tip.sel(solver="exudyn_tree/rk67", blade=2, axis="y"), run["tip"][:, 1, 1])
+    np.testing.assert_array_equal(data.tip.sel(run="exudyn_tree/rk67", blade=2, axis="y"), run["tip"][:, 1, 1])
     assert data.angles.attrs["units"] == "rad"
     assert data.time.attrs["units"] == "s"
     assert "method" not in data.dims
-    # The chain alone has joints that can open: NaN for the others, not a missing solver.
-    assert data.constraint_error.sel(solver="lagrange/dop853").isnull().all()
-    assert data.constraint_error.sel(solver="exudyn_chain/generalized_alpha").notnull().all()
+    # The chain alone has joints that can open: NaN for the others, not a missing run.
+    assert data.constraint_error.sel(run="lagrange/dop853").isnull().all()
+    assert data.constraint_error.sel(run="exudyn_chain/generalized_alpha").notnull().all()
 
 
-def test_two_models_differ_by_what_the_plot_and_the_table_show(study: rm.Comparison) -> None:
+def test_two_models_differ_by_what_the_plot_and_the_table_show(study: rm.Runs) -> None:
     drawn = study.plot.error().figure.axes[0]
     labels = [text.get_text() for text in drawn.get_legend().get_texts()]
     assert labels == ["closed form, DOP853", "Exudyn tree, RK67", "Exudyn chain, generalized-α"]
-    for line, run in zip(drawn.get_lines(), study.runs.values(), strict=False):
+    runs = [run for name, run in study.items() if name != "reference"]
+    for line, run in zip(drawn.get_lines(), runs, strict=False):
         assert np.nanmax(line.get_ydata()) == run.metrics["angle_error_whole"]
-    assert all(f"{run.metrics['angle_error_max']:.1e}" in str(study.table()) for run in study.runs.values())
-    assert study.reference is not None
+    assert all(f"{run.metrics['angle_error_max']:.1e}" in str(study.table()) for run in runs)
+    assert study.statuses == {"ok": 4}
 
 
-def test_a_comparison_is_saved_opened_and_rendered(study: rm.Comparison, tmp_path: Path) -> None:
-    path = study.save(tmp_path / "deep" / "study.h5")
-    tree = rm.open(path)
-    assert set(tree) == {f"{study.scene.name}/{name}" for name in (*study.runs, "reference")}
-    for name, run in study.runs.items():
-        again = tree[f"{study.scene.name}/{name}"]
-        assert again.angles.tobytes() == run.angles.tobytes()
-        assert (again.status, again.settings, again.metrics) == (run.status, run.settings, run.metrics)
+def test_runs_are_saved_opened_and_rendered(study: rm.Runs, tmp_path: Path) -> None:
+    file = rm.open(study.save(tmp_path / "deep" / "study.h5"))
+    assert set(file) == {f"{study.scene}/{name}" for name in study}
+    for name, run in study.items():
+        for again in (file[f"{study.scene}/{name}"], file[study.scene][name]):
+            assert again.angles.tobytes() == run.angles.tobytes()
+            assert (again.status, again.settings, again.metrics) == (run.status, run.settings, run.metrics)
     with pytest.raises(KeyError, match="rk67"):
-        tree[f"{study.scene.name}/lagrange/radau"]
+        file[f"{study.scene}/lagrange/radau"]
+    with pytest.raises(rm.InputError, match="of the runs of one scene"):
+        _ = file.plot
     index = study.to_html(tmp_path / "pages")
     assert index.read_text().startswith("<!DOCTYPE html>")
     assert len(list(index.parent.glob("*.html"))) >= 2
 
 
-def test_a_file_of_records_alone_lists_them(tmp_path: Path) -> None:
-    run = rm.run(rm.scene("paper/fig03").replace(duration=0.1, samples=11), "lagrange/dop853")
-    rm.compare_data({"t": run.time, "rotor": run.angles[:, 0]}, run.scene).save(tmp_path / "c.h5")
-    lines = repr(rm.open(tmp_path / "c.h5")).splitlines()
-    assert lines[0].endswith("c.h5: 0 scenes, 0 runs, 1 records")
-    assert lines[1:] == ["  comparison/paper/fig03/data/trajectory"]
-
-
-def test_notebooks_show_a_table_and_a_drawing(study: rm.Comparison) -> None:
+def test_notebooks_show_a_table_and_a_drawing(study: rm.Runs) -> None:
     run = study["lagrange/dop853"]
     html = run._repr_html_()
     assert "<table>" in html
@@ -134,7 +128,7 @@ def test_notebooks_show_a_table_and_a_drawing(study: rm.Comparison) -> None:
     assert "exudyn_tree/rk67" in repr(study)
     lines = repr(run).splitlines()
     assert len(lines) <= 10
-    assert lines[0] == f"{study.scene.name}: {study.scene.title}"
+    assert lines[0] == f"{run.scene.name}: {run.scene.title}"
     assert "angle_error_max" in repr(run)
 
 
@@ -165,5 +159,9 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
         np.testing.assert_array_equal(data.column("angles")[i], single.angles)
     np.testing.assert_array_equal(data.at("angles", 7), data.column("angles")[:, 7])
     assert repr(rm.open(tmp_path / "stiffness.h5")) == f"{tmp_path / 'stiffness.h5'}: 3 runs: 3 ok" == repr(data)
+    assert data[1].status == "ok"
+    np.testing.assert_array_equal(data[1].angles, data.column("angles")[1])
+    by_stiffness = data.to_xarray(unstack=True).angles.sel(bearing_stiffness=1e3)
+    np.testing.assert_array_equal(by_stiffness, data.column("angles")[1])
     with pytest.raises(rm.InputError, match=r"bearing\.stifness"):
         rm.sweep(scene, {"bearing.stifness": values})

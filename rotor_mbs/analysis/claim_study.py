@@ -1,9 +1,7 @@
 """The paper's claims as shares of many runs, and its numbers under other conditions, from reference/claims.json.
 
-The runs are chaotic: what a claim says may hold for one rounding and fail for the next. So it was tested on runs from
-many starts moved by rounding, for several durations, and holds or fails only where nearly all runs say so. The numbers
-were read off runs for other durations, tolerances and ways of writing the first row of (56).
-`tests/support/make_claims.py` computes the file.
+The runs are chaotic: a claim may hold for one rounding and fail for the next. So it was tested on runs from many starts
+moved by rounding, for several durations. `tests/support/make_claims.py` computes the file.
 """
 
 from __future__ import annotations
@@ -13,13 +11,13 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from rotor_mbs.scenario.catalogue import reference_folder
 
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 SURE = 0.95  # share of the deciding runs from which on a claim holds; 1 - SURE: up to which it fails
 DECIDING = 0.5  # share of the runs that must decide
-ENERGY_GAIN = 1e3  # of the energy scale: a run that gains as much decides nothing
 RULE = (
     f"A claim holds where at least {SURE:.0%} of the deciding runs say so for every duration, fails where at most "
     f"{1 - SURE:.0%} do for every duration, and is undecided otherwise, also where fewer than {DECIDING:.0%} of the "
@@ -31,8 +29,8 @@ RULE = (
 class ClaimShare:
     """A claim tested on the runs of one method for one duration (s).
 
-    marks   one for each run, the first from the start as given, the others from moved starts: "y" where the claim
-            holds, "n" where it fails, "-" where the run decides nothing
+    marks: one for each run, the first from the start as given, the others from moved starts: "y" where the claim
+    holds, "n" where it fails, "-" where the run decides nothing.
     """
 
     claim: str
@@ -65,11 +63,7 @@ class ClaimShare:
 
 @dataclass(frozen=True)
 class ClaimShares:
-    """All shares of a study.
-
-    spread   rad, by which starts were moved at most
-    runs     from moved starts, for each claim, method and duration
-    """
+    """All shares of a study; starts were moved by `spread` (rad) at most, in so many runs of each."""
 
     shares: tuple[ClaimShare, ...]
     spread: float
@@ -77,21 +71,17 @@ class ClaimShares:
 
     @property
     def durations(self) -> list[float]:
-        """s, in ascending order."""
         return sorted({share.duration for share in self.shares})
 
     @property
     def claims(self) -> list[str]:
-        """Ids, in order."""
         return list(dict.fromkeys(share.claim for share in self.shares))
 
     @property
     def methods(self) -> list[str]:
-        """In order: the printed equations, the corrected model."""
         return list(dict.fromkeys(share.method for share in self.shares))
 
     def of(self, claim: str, method: str) -> list[ClaimShare]:
-        """By duration; [] where the study does not have the claim."""
         shares = [share for share in self.shares if share.claim == claim and share.method == method]
         return sorted(shares, key=lambda share: share.duration)
 
@@ -101,19 +91,13 @@ class ClaimShares:
         return verdicts.pop() if len(verdicts) == 1 else UNDECIDED
 
     def count(self, method: str) -> dict[str, int]:
-        """How many claims hold, fail, are undecided."""
         verdicts = [self.verdict(claim, method) for claim in self.claims]
         return {verdict: verdicts.count(verdict) for verdict in (HOLDS, FAILS, UNDECIDED)}
 
 
 @dataclass(frozen=True, order=True)
 class Conditions:
-    """What the paper does not print, or what depends on rounding.
-
-    gravity_row   way of writing the first row of (56)
-    duration      s
-    relative_tolerance, absolute_tolerance   of ode45; the latter in rad and rad/s
-    """
+    """What the paper does not print: way of writing the first row of (56), duration (s), tolerances of ode45."""
 
     gravity_row: str
     duration: float
@@ -123,12 +107,10 @@ class Conditions:
 
 @dataclass(frozen=True)
 class NumberTrial:
-    """A published number under some conditions.
+    """A published number, by its id, as read off the printed model's run (rad or rad/s; NaN where there is none).
 
-    number      its id
-    value       rad or rad/s, read off the printed model's run; NaN where there is none
-    reproduced  whether it has the printed digits
-    remainder   N m, the row's value at the start of Fig. 5: zero but for rounding
+    reproduced: whether it has the printed digits. remainder: N m, the row's value at the start of Fig. 5: zero but for
+    rounding.
     """
 
     number: str
@@ -142,9 +124,8 @@ class NumberTrial:
 class NumberTrials:
     """All trials of a study.
 
-    usual        the conditions of the paper's scenes, but for the duration
-    rows         formulas of the tried ways of writing the row by their names, in order
-    rows_of_56   those of them that are the row as printed, multiplied out in one order or another
+    usual: the conditions of the paper's scenes. rows: formulas of the tried ways of writing the row, by name;
+    rows_of_56: those that are the row as printed, multiplied out in one order or another.
     """
 
     trials: tuple[NumberTrial, ...]
@@ -154,51 +135,32 @@ class NumberTrials:
 
     @property
     def numbers(self) -> list[str]:
-        """Ids, in order."""
         return list(dict.fromkeys(trial.number for trial in self.trials))
 
-    @property
-    def conditions(self) -> list[Conditions]:
-        """All that were tried, in order."""
-        return list(dict.fromkeys(trial.conditions for trial in self.trials))
-
     def under(self, conditions: Conditions) -> dict[str, NumberTrial]:
-        """The trials under these conditions, by number."""
         return {trial.number: trial for trial in self.trials if trial.conditions == conditions}
 
     def reproduces_all(self, conditions: Conditions) -> bool:
-        """Whether every number comes out."""
         return sum(trial.reproduced for trial in self.under(conditions).values()) == len(self.numbers)
 
     def of_row(self, row: str) -> list[Conditions]:
         """Those with this way of writing the row and the usual tolerances, by duration."""
         usual = replace(self.usual, gravity_row=row)
-        return sorted(tried for tried in self.conditions if tried == replace(usual, duration=tried.duration))
+        tried = {trial.conditions for trial in self.trials}
+        return sorted(conditions for conditions in tried if conditions == replace(usual, duration=conditions.duration))
 
     def durations_of_all(self, row: str) -> list[float]:
         """s, for which all numbers come out with this way of writing the row and the usual tolerances."""
-        return [tried.duration for tried in self.of_row(row) if self.reproduces_all(tried)]
+        return [conditions.duration for conditions in self.of_row(row) if self.reproduces_all(conditions)]
 
     def with_tolerances(self) -> list[Conditions]:
         """Those of the usual row and duration, by tolerance."""
-        usual = self.usual
-        return sorted(
-            tried
-            for tried in self.conditions
-            if (tried.gravity_row, tried.duration) == (usual.gravity_row, usual.duration)
-        )
+        usual = self.usual.gravity_row, self.usual.duration
+        tried = {trial.conditions for trial in self.trials}
+        return sorted(conditions for conditions in tried if (conditions.gravity_row, conditions.duration) == usual)
 
 
-def count_of_rows(trials: NumberTrials, duration: float) -> tuple[int, int]:
-    """(how many of `rows_of_56` give all numbers for `duration`, in s; how many there are)."""
-    reproducing = [duration in trials.durations_of_all(row) for row in trials.rows_of_56]
-    return sum(reproducing), len(reproducing)
-
-
-@dataclass(frozen=True)
-class ClaimStudy:
-    """Both tables."""
-
+class ClaimStudy(NamedTuple):
     shares: ClaimShares
     numbers: NumberTrials
 
@@ -207,8 +169,6 @@ class ClaimStudy:
 def claim_study() -> ClaimStudy:
     """Read reference/claims.json.
 
-    Examples
-    --------
     >>> study = claim_study()
     >>> study.shares.verdict("fig11-pitches-grow", "printed/ode45")
     'holds'
@@ -219,14 +179,9 @@ def claim_study() -> ClaimStudy:
     shares = ClaimShares(tuple(ClaimShare(**row) for row in data["shares"]), data["spread"], data["runs"])
     trials = []
     for row in data["trials"]:
-        number, reproduced, remainder = (row.pop(name) for name in ("number", "reproduced", "remainder"))
-        value = row.pop("value")
+        number, value, reproduced, remainder = (row.pop(key) for key in ("number", "value", "reproduced", "remainder"))
         value = math.nan if value is None else value
         trials.append(NumberTrial(number, Conditions(**row), value, reproduced, remainder))
-    numbers = NumberTrials(
-        tuple(trials),
-        Conditions(**data["usual"]),
-        {row["name"]: row["formula"] for row in data["rows"]},
-        tuple(row["name"] for row in data["rows"] if row["is_of_56"]),
-    )
-    return ClaimStudy(shares, numbers)
+    rows = {row["name"]: row["formula"] for row in data["rows"]}
+    of_56 = tuple(row["name"] for row in data["rows"] if row["is_of_56"])
+    return ClaimStudy(shares, NumberTrials(tuple(trials), Conditions(**data["usual"]), rows, of_56))

@@ -10,10 +10,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber, published
+from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.catalogue import natural_order
-from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array
 
 # Numbers read off runs
@@ -69,18 +68,9 @@ STATISTICS = {
 
 
 def measure(run: RunArrays, asked: TrajectoryNumber, metrics: Mapping[str, Any] | None = None) -> float | None:
-    """Read a number off a run.
+    """The number in rad or rad/s (reversals and growth: 1); None where the run has no such data or it is undefined.
 
-    Parameters
-    ----------
-    run : its arrays.
-    asked : which number.
-    metrics : of the run; the extremes of the rotor over the integrator's own steps, `rotor_angle_min` and so on, are
-        taken from them, as off a printed figure, and from the samples only where they are not there.
-
-    Returns
-    -------
-    The number in rad or rad/s (reversals and growth: 1); None where the run has no such data or it is undefined.
+    The rotor's extremes are those over the integrator's own steps, as off a printed figure, where `metrics` has them.
     """
     extreme = _rotor_extreme(asked, metrics or {})
     if extreme is not None:
@@ -121,23 +111,11 @@ _RELATIONS: Mapping[str, Callable[[float, float], bool]] = {
 
 
 @dataclass(frozen=True)
-class Reading:
-    """A test and its result. value, limit: read off the runs, None where undefined; holds: None without the data."""
-
-    test: Condition
-    value: float | None
-    limit: float | None
-    holds: bool | None
-
-
-@dataclass(frozen=True)
 class ClaimResult:
-    """The result for one model. holds: None where the file cannot decide; ended_early: scenes whose run did."""
+    """The result for one model: of a number its value, too. holds: None where the file cannot decide."""
 
     holds: bool | None
     value: float | None = None
-    readings: tuple[Reading, ...] = ()
-    ended_early: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -151,33 +129,25 @@ class Claim:
 
 def claims(scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None) -> list[Claim]:
     """Return the numbers and claims that `scenes` can decide for at least one model; of `items`, by default of all."""
-    results = [
-        Claim(
-            item,
-            _result(item, scenes, run_selection.printed_run),
-            _result(item, scenes, run_selection.reference_or_corrected_run),
-        )
-        for item in (published() if items is None else items)
-    ]
-    return [claim for claim in results if claim.printed.holds is not None or claim.corrected.holds is not None]
-
-
-def _result(
-    item: Published, scenes: Mapping[str, StoredScene], choose: Callable[[StoredScene], StoredRun | None]
-) -> ClaimResult:
-    chosen = {name: choose(scenes[name]) for name in sorted(item.scenes) if name in scenes}
-    runs = {name: run for name, run in chosen.items() if run is not None}
-    values = {
-        number: measure(runs[number.scene], number, runs[number.scene].attributes)
-        for number in item.numbers
-        if number.scene in runs
-    }
-    early = tuple(name for name, run in runs.items() if run.status not in COMPLETE)
-    if item.of is not None:
-        value = values.get(item.of)
-        return ClaimResult(None if value is None else rounds_to(value, item.value, item.decimals), value, (), early)
-    readings = readings_of(item, values)
-    return ClaimResult(all_hold(readings), None, readings, early)
+    results = []
+    for item in published() if items is None else items:
+        sides = []
+        for choose in (run_selection.printed_run, run_selection.reference_or_corrected_run):
+            runs = {name: run for name in item.scenes if name in scenes and (run := choose(scenes[name])) is not None}
+            values = {
+                number: measure(runs[number.scene], number, runs[number.scene].attributes)
+                for number in item.numbers
+                if number.scene in runs
+            }
+            value = values.get(item.of) if item.of is not None else None
+            if item.of is None:
+                sides.append(ClaimResult(claim_holds(item, values)))
+            else:
+                holds = None if value is None else rounds_to(value, item.value, item.decimals)
+                sides.append(ClaimResult(holds, value))
+        if any(side.holds is not None for side in sides):
+            results.append(Claim(item, *sides))
+    return results
 
 
 def rounds_to(value: float, printed: float, decimals: int) -> bool:
@@ -185,26 +155,20 @@ def rounds_to(value: float, printed: float, decimals: int) -> bool:
     return f"{value:.{decimals}f}" == f"{printed:.{decimals}f}"
 
 
-def readings_of(item: Published, values: NumberValues) -> tuple[Reading, ...]:
-    """Return the tests of a claim in words, in order, each with what was read off the runs."""
-    readings = []
+def claim_holds(item: Published, values: NumberValues) -> bool | None:
+    """Whether all tests of a claim in words hold for what was read off the runs.
+
+    False as soon as one fails, even where others cannot be decided; None where none fails and one is undecided.
+    """
+    undecided = not item.tests
     for test in item.tests:
         if test.of not in values or (test.than is not None and test.than not in values):
-            readings.append(Reading(test, None, None, None))
+            undecided = True
             continue
-        value, limit = values[test.of], None if test.than is None else values[test.than]
-        against = test.bound if test.than is None else limit
-        holds = value is not None and against is not None and _RELATIONS[test.relation](value, against)
-        readings.append(Reading(test, value, limit, holds))
-    return tuple(readings)
-
-
-def all_hold(readings: Iterable[Reading]) -> bool | None:
-    """False as soon as one fails, even where others cannot be decided; None where none fails and one is undecided."""
-    holds = [reading.holds for reading in readings]
-    if False in holds:
-        return False
-    return None if None in holds or not holds else True
+        value, limit = values[test.of], test.bound if test.than is None else values[test.than]
+        if value is None or limit is None or not _RELATIONS[test.relation](value, limit):
+            return False
+    return None if undecided else True
 
 
 # The finding in numbers
@@ -216,27 +180,18 @@ ENERGY_RISE = 1e-3
 
 @dataclass(frozen=True)
 class Tally:
-    """A count of a total."""
-
     count: int
     of: int
 
 
-@dataclass(frozen=True)
-class PrintedEnergy:
-    """Scenes in which the energy of the printed model rises without work.
-
-    gain          J: the largest gain of a run that reached its end; None where no such run gained
-    ended_early   scenes where the integration ended early, and the gain until then (J)
-    """
+class PrintedEnergy(NamedTuple):
+    """Scenes in which the energy of the printed model rises without work; the largest gain (J) of a complete run."""
 
     rises: Tally
     gain: float | None
-    ended_early: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Agreement:
+class Agreement(NamedTuple):
     """A method's largest errors over its runs that are ok, and its longest run (s).
 
     angle_error rad up to each horizon, energy_drift relative to the energy scale; None without data.
@@ -249,12 +204,8 @@ class Agreement:
     longest_s: float
 
 
-@dataclass(frozen=True)
-class Finding:
-    """How much of the paper is reproduced, what its errata do, how well the corrected models agree.
-
-    Parts are None, or empty, where the file does not have the data.
-    """
+class Finding(NamedTuple):
+    """How much of the paper is reproduced, how well the corrected models agree; None, or empty, without data."""
 
     numbers: Tally | None
     numbers_corrected: Tally | None
@@ -268,11 +219,18 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
     evaluated = list(claims)
     numbers = [claim for claim in evaluated if claim.published.is_number]
     in_words = [claim for claim in evaluated if not claim.published.is_number]
+    runs = {name: run for name in natural_order(scenes) if (run := run_selection.printed_run(scenes[name])) is not None}
+    gains = {name: run.attributes["energy_gain_J"] for name, run in runs.items() if "energy_gain_J" in run.attributes}
+    energy = None
+    if gains:
+        rising = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
+        largest = max((gains[name] for name in rising if runs[name].status == "ok"), default=None)
+        energy = PrintedEnergy(Tally(len(rising), len(gains)), largest)
     return Finding(
         _tally(claim.printed.holds for claim in numbers),
         _tally(claim.corrected.holds for claim in numbers),
         _tally(claim.printed.holds for claim in in_words),
-        _printed_energy(scenes),
+        energy,
         agreement(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values()),
     )
 
@@ -280,17 +238,6 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
 def _tally(results: Iterable[bool | None]) -> Tally | None:
     decided = [holds for holds in results if holds is not None]
     return Tally(sum(decided), len(decided)) if decided else None
-
-
-def _printed_energy(scenes: Mapping[str, StoredScene]) -> PrintedEnergy | None:
-    runs = {name: run for name in natural_order(scenes) if (run := run_selection.printed_run(scenes[name])) is not None}
-    gains = {name: run.attributes["energy_gain_J"] for name, run in runs.items() if "energy_gain_J" in run.attributes}
-    if not gains:
-        return None
-    rising = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
-    largest = max((gains[name] for name in rising if runs[name].status == "ok"), default=None)
-    ended_early = {name: gain for name, gain in gains.items() if runs[name].status not in COMPLETE}
-    return PrintedEnergy(Tally(len(rising), len(gains)), largest, ended_early)
 
 
 def agreement(runs: Iterable[StoredRun]) -> tuple[Agreement, ...]:

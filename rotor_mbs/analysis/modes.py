@@ -63,14 +63,7 @@ def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
     """Names of the multiblade (Coleman) coordinates, and the (blades, blades) matrix from them to the blades' pitches.
 
     Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential (-1)^i], with the
-    blade's mounting angle ψ_i = 2π(i-1)/blades.
-
-    Source: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958.
-
-    Examples
-    --------
-    >>> multiblade(3)[0]
-    ('collective', 'cosine', 'sine')
+    blade's mounting angle ψ_i = 2π(i-1)/blades. Source: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958.
     """
     psi = 2.0 * np.pi * np.arange(blades) / blades
     names, columns = ["collective"], [np.ones(blades)]
@@ -104,7 +97,11 @@ def modes_of(stiffness: Array, damping: Array, *, is_cyclic: bool) -> ModeSet:
         complex
     )
     values.real[np.abs(values.real) < 1e-14 * np.abs(values).max(initial=0.0)] = 0.0  # rounding of undamped modes
-    shapes = [_shape(vectors[:, k], n, first) for k in range(len(values))]
+    shapes = []
+    for vector in vectors.T:
+        positions, rates = vector[: n - first], vector[n - first :]
+        slow = np.linalg.norm(rates) <= 1e-7 * np.linalg.norm(positions)
+        shapes.append(_normalized(np.concatenate([np.zeros(first), positions]) if slow else rates))
     pairs = _pairs(values, shapes, is_cyclic)
     modes = ModeSet(np.array([pair for pair, _ in pairs]), np.array([shape for _, shape in pairs]))
     order = np.argsort(np.nan_to_num(modes.undamped_frequencies), kind="stable")
@@ -120,16 +117,16 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
     n = len(stiffness)
     T = np.eye(n)
     T[1:, 1:] = matrix
-    K, D = (np.asarray(np.linalg.inv(T) @ each @ T, dtype=np.float64) for each in (stiffness, damping))
+    K, D = (np.asarray(np.linalg.inv(T) @ matrix @ T, dtype=np.float64) for matrix in (stiffness, damping))
     together = modes_of(K[:2, :2], D[:2, :2], is_cyclic=True)
-    values, shapes = list(together.eigenvalues), [_padded(shape, n, (0, 1)) for shape in together.shapes]
+    values, shapes = list(together.eigenvalues), [np.append(shape, np.zeros(n - 2)) for shape in together.shapes]
     if abs(shapes[0][0]) < abs(shapes[1][0]) and abs(shapes[0][1]) > 0.0:  # pitch slower than the rotor's decay
         values.reverse()
         shapes.reverse()
     for i in range(2, n):
         root = np.sqrt(complex((0.5 * D[i, i]) ** 2 - K[i, i]))
         values.append(np.array([-0.5 * D[i, i] + root, -0.5 * D[i, i] - root]))
-        shapes.append(_padded(np.ones(1), n, (i,)))
+        shapes.append(np.eye(n, dtype=complex)[i])
     return ModeSet(np.array(values), np.array([_normalized(T @ shape) for shape in shapes]), ("rotor", *names))
 
 
@@ -160,13 +157,11 @@ def whirl_frequencies(frequency: Array, speed: Array, harmonic: Array | int = 1)
 
 
 def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> tuple[Complex, Complex]:
-    """Multipliers of a (2n, 2n) state transition matrix over a turn, the largest first.
+    """Multipliers of a (2n, 2n) state transition matrix over a turn, the largest first: all of them, and the others
+    than those that are 1 for every such motion. It is stable where none of the latter is larger than 1, up to `GROWTH`.
 
-    flow        (2n,) time derivative of the state: an eigenvector for 1
-    gradient    (2n,) derivative of what the motion keeps: a left eigenvector for 1, or zeros where nothing is kept
-
-    Returns all of them, and those that are not 1 for every such motion (a shift in time and, where energy is kept, in
-    speed): the motion is stable where none of these is larger than 1, up to `GROWTH`.
+    flow: (2n,) time derivative of the state, an eigenvector for 1. gradient: (2n,) derivative of what the motion keeps,
+    a left eigenvector for 1, or zeros.
     """
     if not np.isfinite(transition).all():
         nothing = np.full(len(transition), complex(np.nan, np.nan))
@@ -182,23 +177,9 @@ def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> tu
     return values[np.argsort(-np.abs(values))], others[np.argsort(-np.abs(others))]
 
 
-def _shape(vector: Complex, n: int, first: int) -> Complex:
-    """(n,) amplitudes from an eigenvector of positions (without the first `first`) and rates."""
-    positions, rates = vector[: n - first], vector[n - first :]
-    if np.linalg.norm(rates) > 1e-7 * np.linalg.norm(positions):
-        return _normalized(rates)
-    return _normalized(np.concatenate([np.zeros(first), positions]))
-
-
 def _normalized(shape: Complex | Array) -> Complex:
     largest = shape[int(np.argmax(np.abs(shape)))]
     return np.asarray(shape / largest if largest != 0.0 else shape, dtype=complex)
-
-
-def _padded(shape: Complex | Array, n: int, places: tuple[int, ...]) -> Complex:
-    whole = np.zeros(n, dtype=complex)
-    whole[list(places)] = shape
-    return whole
 
 
 def _pairs(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import reference_folder
@@ -112,14 +112,12 @@ class Erratum:
     reaches: tuple[str, ...] = file_key("reaches", _NUMBERS)
 
 
-@dataclass(frozen=True, slots=True)
-class CheckedEntry:
-    """One printed entry against its derivative.
+class CheckedEntry(NamedTuple):
+    """One printed entry against its derivative, as formulas.
 
-    printed, right   formulas; a term that is not there is 0
-    difference       the largest of |printed - right| / max(1, |printed|, |right|) over random states
-    explained_by     the fewest errata with which the paper's derivation gives what is printed, where without any it
-                     gives what is right, as "E1, E2"; "" where the entry agrees, and where nothing explains it
+    difference: the largest of |printed - right| / max(1, |printed|, |right|) over random states. explained_by: the
+    fewest errata with which the paper's derivation gives what is printed, as "E1, E2"; "" where it agrees, or where
+    nothing explains it.
     """
 
     equation: str
@@ -144,20 +142,30 @@ class _ErrataFile:
 
 def published() -> tuple[Published, ...]:
     """All numbers and claims, in the order of the file. Raises InputError with every error of the file."""
-    file: _PublishedFile = _read("published.toml", _PublishedFile)
-    return file.published
+    return _read("published.toml", _PublishedFile).published
 
 
 def conditions() -> dict[str, str]:
     """What had to be found out to reproduce the numbers: by subject (gravity, duration) or scene (fig05)."""
-    file: _PublishedFile = _read("published.toml", _PublishedFile)
-    return file.conditions
+    return _read("published.toml", _PublishedFile).conditions
 
 
 def errata() -> tuple[Erratum, ...]:
     """The errata, in the order of the file. Raises InputError with every error of the file."""
-    file: _ErrataFile = _read("errata.toml", _ErrataFile)
-    return file.erratum
+    return _read("errata.toml", _ErrataFile).erratum
+
+
+_File = TypeVar("_File", _PublishedFile, _ErrataFile)
+
+
+def _read(name: str, cls: type[_File]) -> _File:
+    path = reference_folder() / name
+    text, tables = read_toml(path)
+    try:
+        content: _File = table_of(cls).read(tables)
+    except TableError as error:
+        raise error.in_file(text, shown_path(path)) from error
+    return content
 
 
 def checked_entries() -> list[CheckedEntry]:
@@ -166,24 +174,7 @@ def checked_entries() -> list[CheckedEntry]:
     `tests/support/printed_entries.py` computes the file, and a test compares it with the derivation.
     """
     with (reference_folder() / "errata-check.csv").open(encoding="utf-8", newline="") as file:
-        return [
-            CheckedEntry(
-                row["equation"],
-                row["entry"],
-                row["printed"],
-                row["right"],
-                float(row["difference"]),
-                row["agrees"] == "True",
-                row["explained_by"],
-            )
-            for row in csv.DictReader(file)
-        ]
-
-
-def _read(name: str, cls: type) -> Any:
-    path = reference_folder() / name
-    text, tables = read_toml(path)
-    try:
-        return table_of(cls).read(tables)
-    except TableError as error:
-        raise error.in_file(text, shown_path(path)) from error
+        rows: list[dict[str, Any]] = list(csv.DictReader(file))
+    for row in rows:
+        row["difference"], row["agrees"] = float(row["difference"]), row["agrees"] == "True"
+    return [CheckedEntry(**row) for row in rows]

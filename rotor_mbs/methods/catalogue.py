@@ -1,7 +1,5 @@
-"""All methods by the names used everywhere: built-in ones, and those of installed packages (entry points).
-
-A model's code is imported when one of its methods is first used; its engine, when a solver is built.
-"""
+"""All methods by name: built-in ones, and those of installed packages (entry points). A model's code is imported when
+one of its methods is first used; its engine, when a solver is built."""
 
 from __future__ import annotations
 
@@ -12,8 +10,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 
 from rotor_mbs.errors import InputError, nearest
-from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.ladders import Ladder
+from rotor_mbs.methods.base import Ladder, Method
 
 REFERENCE = "reference"
 GROUP = "rotor_mbs.methods"
@@ -72,10 +69,8 @@ def _unknown(name: str) -> str:
 
 
 def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """By method, those of the `given` settings that it has.
-
-    Raises InputError for a setting that none of them has, and for a value that one of them does not allow.
-    """
+    """By method, those of the `given` settings that it has. Raises InputError for a setting that none of them has, and
+    for a value that one of them does not allow."""
     if len(names) == 1:
         find_method(names[0]).settings.of(names[0], given)
     own = {name: find_method(name).settings.allowed() for name in names}
@@ -123,7 +118,7 @@ def ladders(names: Sequence[str] = ()) -> tuple[Ladder, ...]:
 
 def label_of(curve: str) -> str:
     """How a method, or a variant of one by the name of its curve, is called; its name where it is not known here."""
-    method = _method_or_variant(curve)
+    method = look_up(curve) or next((ladder for ladder in ladders() if ladder.curve == curve), None)
     return method.label if method else curve
 
 
@@ -132,17 +127,12 @@ def model_label(model: str) -> str:
     return next((method.model_label for method in methods() if method.model == model), model)
 
 
-def _method_or_variant(curve: str) -> Method | Ladder | None:
-    return look_up(curve) or next((ladder for ladder in ladders() if ladder.curve == curve), None)
-
-
 def _load(place: str) -> tuple[Method, ...]:
     module, _, name = place.partition(":")
     return _as_methods(getattr(import_module(module), name))
 
 
 def _as_methods(loaded: object) -> tuple[Method, ...]:
-    """A Method or several of them as a tuple. Raises TypeError for anything else."""
     several = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
     if not several or not all(isinstance(method, Method) for method in several):
         raise TypeError(f"{loaded!r:.60} is no Method and no sequence of them")

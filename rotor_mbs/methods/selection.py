@@ -1,7 +1,4 @@
-"""Which method to take for a scene where none is named, and why, in one line.
-
-The rule is drawn from the stability suite (`rotor-mbs stability`): what holds on which family of scenes.
-"""
+"""Which method to take for a scene where none is named, and why; the rule is drawn from the stability suite."""
 
 from __future__ import annotations
 
@@ -21,17 +18,8 @@ _NEARLY_SINGULAR = 1e-3
 
 
 def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
-    """The methods for `scene`, the recommended one first, and why, in one line.
-
-    Parameters
-    ----------
-    defaults : names of the default methods, see `catalogue.default_methods`
-
-    Raises
-    ------
-    MethodRefusal
-        With the reason, where no motion exists to be followed.
-    """
+    """The methods for `scene`, the recommended one of the `defaults` first, and why, in one line. Raises MethodRefusal
+    with the reason where no motion exists to be followed."""
     reason = singular_reason(scene)
     if reason:
         raise MethodRefusal(f"{scene.name}: refused: {reason}; name a method with -m to see what it makes of it")

@@ -13,25 +13,15 @@ from rotor_mbs.errors import InputError, nearest
 
 @dataclass(frozen=True)
 class Allowed:
-    """What a setting may be: one of `options`, or a finite number within the limits.
+    """What a setting may be: one of `options`, or a finite number within the limits."""
 
-    Attributes
-    ----------
-    unit : SI unit of a number, "" where it has none.
-    above : exclusive lower limit.
-    at_least, at_most : inclusive limits.
-    whole : whole numbers only.
-    options : the allowed values of a choice; () for a number.
-    doc : one line on what the setting does.
-    """
-
-    unit: str = ""
-    above: float = -math.inf
-    at_least: float = -math.inf
+    unit: str = ""  # SI unit of a number, "" where it has none
+    above: float = -math.inf  # exclusive lower limit
+    at_least: float = -math.inf  # inclusive limits
     at_most: float = math.inf
-    whole: bool = False
-    options: tuple[object, ...] = ()
-    doc: str = ""
+    whole: bool = False  # whole numbers only
+    options: tuple[object, ...] = ()  # the allowed values of a choice; () for a number
+    doc: str = ""  # one line on what the setting does
 
     def convert(self, value: object) -> object:
         """The value as it is stored. Raises ValueError where it is not allowed."""
@@ -75,12 +65,10 @@ def number(
 
 
 def step(default: float) -> Any:
-    """The setting `step` of a method with fixed steps, s."""
     return number(default, unit="s", above=0.0, doc="time step; shortened to fit the sample interval")
 
 
 def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
-    """A field of a `Settings` class that is one of `options`."""
     return field(default=default, metadata={"allowed": Allowed(options=tuple(options), doc=doc)})
 
 
@@ -99,14 +87,8 @@ class Settings:
 
     @classmethod
     def of(cls, method: str, given: Mapping[str, object]) -> Self:
-        """The settings of `method` with the `given` values in place of defaults.
-
-        Raises
-        ------
-        InputError
-            In one line that lists all settings, for an unknown name, a wrong type, a number that is not finite, or one
-            out of range.
-        """
+        """The settings of `method` with the `given` values in place of defaults. Raises InputError, one line that lists
+        all settings, for an unknown name or a value that is not allowed."""
         known, values, problems = cls.allowed(), {}, []
         for name, value in given.items():
             if name not in known:
@@ -123,12 +105,10 @@ class Settings:
 
     @classmethod
     def allowed(cls) -> dict[str, Allowed]:
-        """What each setting may be, by its name."""
         return {setting.name: setting.metadata.get("allowed", Allowed()) for setting in fields(cls)}
 
     @classmethod
     def describe(cls) -> str:
-        """All settings with ranges and defaults, in one line."""
         defaults = cls().as_dict()
         texts = [f"{name} ({allowed}; default {defaults[name]})" for name, allowed in cls.allowed().items()]
         return ", ".join(texts) or "none"

@@ -23,29 +23,10 @@ def solve(
     budget_s: float = float("inf"),
     time_limit_s: float = float("inf"),
 ) -> Solution:
-    """Run a method on a scene: build once, integrate once or more often, observe once.
-
-    Parameters
-    ----------
-    settings : those that differ from the method's defaults
-    repeats, budget_s : integrate up to so often, as long as the sum of the times in s stays within the budget; the
-        garbage collector is off
-    time_limit_s : s, for the integrations together; building (which may compile code) does not count
-
-    Returns
-    -------
-    Solution
-        Not yet judged. A failure of the engine is in it, not an exception.
-
-    Raises
-    ------
-    InputError
-        For an unknown method or setting.
-    MethodRefusal
-        As `Method.build` does.
-    OutOfTimeError
-        Where a method cannot keep the samples it reached.
-    """
+    """Build once, integrate up to `repeats` times within `budget_s`, the garbage collector off, and observe once;
+    `settings` that differ from the defaults; `time_limit_s` is for the integrations together. The Solution is not yet
+    judged, and holds a failure of the engine. Raises InputError for an unknown method or setting, MethodRefusal,
+    OutOfTimeError where a method cannot keep the samples it reached."""
     method = find_method(method) if isinstance(method, str) else method
     chosen = method.settings.of(method.name, settings)
     start = time.perf_counter()

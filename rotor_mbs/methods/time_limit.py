@@ -1,9 +1,5 @@
-"""A time limit that a run ends by itself, with what it reached.
-
-An engine that looks for signals (Exudyn at every step, anything in Python) is interrupted by an exception; one that
-would lose its samples that way asks `is_over` between steps instead, inside `polled`. What does neither is ended from
-outside by the runner and leaves nothing. Needs a main thread and SIGALRM (not Windows); elsewhere only asking works.
-"""
+"""A time limit that a run ends by itself, with what it reached: by an exception, or inside `polled` by asking `is_over`
+between steps, where samples would be lost. The signal needs a main thread and SIGALRM (not Windows)."""
 
 from __future__ import annotations
 
@@ -66,11 +62,8 @@ def polled() -> Iterator[None]:
 
 
 def step_callback() -> Callable[[object], bool] | None:
-    """Called with anything after every step, it returns whether to go on; None where there is no limit.
-
-    For use inside `polled`. To look at the clock after every step costs a fast integrator an eighth of its run time;
-    where there is a signal, only what the signal has set is read.
-    """
+    """Called with anything after every step, it returns whether to go on; None where there is no limit; for use inside
+    `polled`."""
     if math.isinf(_State.end):
         return None
     if _State.has_signal:

@@ -17,7 +17,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from rotor_mbs.models.ode45_settings import Ode45Settings as Ode45Settings
+from rotor_mbs.models.equations import Ode45Settings as Ode45Settings
 from rotor_mbs.solution.trajectory import Array
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
@@ -62,33 +62,22 @@ _INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INT
 
 @dataclass(frozen=True, slots=True)
 class Ode45Result:
-    """Every accepted step with its stages, so that the solution can be read off at any time it reached.
+    """Every accepted step with its stages, so that the solution can be read off at any time it reached."""
 
-    Attributes
-    ----------
-    time, state : (k + 1,), (k + 1, n)
-    stages : (k, 7, n) derivatives
-    success, message : whether the end was reached, and why not
-    evaluations : of the right-hand side
-    """
-
-    time: Array
+    time: Array  # (k + 1,), (k + 1, n)
     state: Array
-    stages: Array
-    success: bool
+    stages: Array  # (k, 7, n) derivatives
+    success: bool  # whether the end was reached, and why not
     message: str
-    evaluations: int
+    evaluations: int  # of the right-hand side
 
     @property
     def steps(self) -> int:
-        """How many steps were accepted."""
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:
-        """(len(times), n): the pair's quartic interpolant at any order of times within [0, time[-1]].
-
-        Raises ValueError for a time beyond what was reached.
-        """
+        """(len(times), n): the pair's quartic interpolant at any times; raises ValueError for one beyond what was
+        reached."""
         if np.any(times < self.time[0]) or np.any(times > self.time[-1]):
             raise ValueError(f"the solution covers [{self.time[0]:g}, {self.time[-1]:g}] only")
         if self.steps == 0:
@@ -115,18 +104,8 @@ class Ode45Result:
 def ode45(
     f: RightHandSide, t_end: float, initial_state: Sequence[float], rel_tol: float = 1e-3, abs_tol: float = 1e-6
 ) -> Ode45Result:
-    """Solve y' = f(t, y) over [0, t_end], t_end > 0, in plain floats.
-
-    Parameters
-    ----------
-    f : returns NaN where it is not defined; such a step is a failed one
-    rel_tol, abs_tol : of the local error of each component
-
-    Returns
-    -------
-    Ode45Result
-        Where a step would have to be shorter than 16 units in the last place of t: success False, and what was reached.
-    """
+    """Solve y' = f(t, y) over [0, t_end], t_end > 0, in plain floats; f returns NaN where it is not defined. Where a
+    step would have to be shorter than 16 units in the last place of t: success False, and what was reached."""
     threshold = abs_tol / rel_tol
     t, y = 0.0, [float(value) for value in initial_state]
     k1 = f(t, y)
@@ -191,10 +170,8 @@ def after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -
 def _attempt(
     f: RightHandSide, t: float, y: list[float], k1: list[float], h: float, threshold: float
 ) -> tuple[list[float], tuple[list[float], ...], float]:
-    """One step of the pair: new state, the seven stages, error relative to the state (inf where it is not a number).
-
-    Lists of floats: for the few equations of a rotor twice as fast as NumPy arrays.
-    """
+    """One step: new state, the seven stages, error relative to the state (inf where it is not a number). Lists of
+    floats: for the few equations of a rotor twice as fast as NumPy arrays."""
     k2 = f(t + _C2 * h, [a + h * (_A21 * p) for a, p in zip(y, k1, strict=True)])
     k3 = f(t + _C3 * h, [a + h * (_A31 * p + _A32 * q) for a, p, q in zip(y, k1, k2, strict=True)])
     k4 = f(t + _C4 * h, [a + h * (_A41 * p + _A42 * q + _A43 * r) for a, p, q, r in zip(y, k1, k2, k3, strict=True)])

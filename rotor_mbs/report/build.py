@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.analysis import published, run_selection
+from rotor_mbs.analysis.campbell import read_modes
 from rotor_mbs.analysis.claim_study import claim_study
 from rotor_mbs.analysis.claims import claims
-from rotor_mbs.analysis.mode_records import read_modes
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import errata_methods

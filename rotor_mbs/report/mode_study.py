@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence, mode_rows
-from rotor_mbs.analysis.mode_records import linear_dataset, to_records
+from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence, linear_dataset, mode_rows, to_records
 from rotor_mbs.analysis.modes import GROWTH, multiblade
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas

@@ -120,7 +120,10 @@ def open_file(path: Path) -> Iterator[Any]:
         if written_by != FORMAT:
             raise StoreError(f"{path}: its attribute format is {written_by!r}; allowed: a file that rotor-mbs wrote")
         if version != FORMAT_VERSION:
-            raise StoreError(f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}")
+            raise StoreError(
+                f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: the same command "
+                "with another output file, which computes the runs anew"
+            )
         yield file
 
 
@@ -170,7 +173,7 @@ def values_of(dataset: Any) -> NDArray[Any]:
         raise StoreError(f"{place} is no array")
     _refuse_outside(dataset)
     kept = dataset.id.get_storage_size()
-    if kept > Path(dataset.file.filename).stat().st_size or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
+    if kept > dataset.file.id.get_filesize() or dataset.nbytes > max(_UNPACKED_BYTES, _UNPACKED * kept):
         raise StoreError(f"{place} claims {dataset.nbytes:.2g} bytes and has {kept:.2g}")
     values: NDArray[Any] = dataset[()]
     return values
@@ -259,12 +262,16 @@ def dimensions_of(dataset: Any) -> list[str]:
     return [CHARACTERS if name.startswith(_WITHOUT_VALUES) else name for name in names]
 
 
-def groups_in(file: Any) -> Iterator[Any]:
-    """An open file and every group below it. Raises StoreError at a link."""
-    yield file
-    for _, item in members(file):
+def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
+    """A group and every one below it. Raises StoreError at a link, and at a second name of a group."""
+    seen = set() if seen is None else seen
+    if group in seen:
+        raise StoreError(f"{group.file.filename}: {group.name} is another name of a group; allowed: one name of each")
+    seen.add(group)
+    yield group
+    for _, item in members(group):
         if is_group(item):
-            yield from groups_in(item)
+            yield from groups_in(item, seen)
 
 
 def is_group(item: Any) -> bool:

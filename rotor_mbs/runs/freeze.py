@@ -15,7 +15,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.digests import array_digest
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import OpenResults, open_results
-from rotor_mbs.runs.results import Asked, fit, runs_table, scene_table
+from rotor_mbs.runs.results import Asked, fit, repeat, runs_table, scene_table
 from rotor_mbs.runs.table import blank_rows
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import code_of
@@ -51,6 +51,7 @@ def write_references(
         for name, values in arrays.items():
             if name in row:
                 row[name][0, : len(values)] = values
+        repeat(row)
         place.write(place.first, row)
     write_digests(target)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs import digests, files
-from rotor_mbs.runs.results import OF_METHODS, RUNS, TableFile
+from rotor_mbs.runs import files
+from rotor_mbs.runs.results import OF_METHODS, REPEATED, RUNS, TableFile
 from rotor_mbs.runs.table import MISSING, Place, Rows, checksums, text_of
 from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import STATUSES
@@ -60,7 +60,8 @@ class StoredRun:
     @functools.cached_property
     def is_damaged(self) -> bool:
         """Whether its row is not what was written."""
-        row = self._place.read(file=self._file)
+        with files.reading(f"{self._place.path}: {self.scene}/{self.method}"):
+            row = self._place.read(file=self._file)
         return bool((checksums(self._place.first, row, self._place.row) != row["crc32"]).any())
 
     @functools.cached_property
@@ -69,7 +70,7 @@ class StoredRun:
         facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
         facts |= {name: text_of(self._row[name]) for name in _TEXTS}
         for name, value in self._row.items():
-            if name in ("status", "crc32", *_TEXTS) or np.ndim(value):
+            if name in ("status", "crc32", *REPEATED.values(), *_TEXTS) or np.ndim(value):
                 continue
             number = value.item()
             if (isinstance(number, int) and number >= 0) or (isinstance(number, float) and number == number):
@@ -159,10 +160,14 @@ class OpenResults:
 
 
 @contextmanager
-def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
+def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
     """An open results file. A run is compared with its checksum when it is read, but for verify=False.
 
     A file that replaces it meanwhile is not seen.
+
+    Parameters
+    ----------
+    only : names of the scenes that are read, by default all.
 
     Raises
     ------
@@ -174,10 +179,10 @@ def open_results(path: Path, *, verify: bool = True) -> Iterator[OpenResults]:
     for _ in range(_ATTEMPTS):
         with path.open("rb") as file:
             stored = TableFile(path)
-            if any(table.inode != os.fstat(file.fileno()).st_ino for table in stored.tables.values()):
+            if stored.groups and stored.table(stored.groups[0]).inode != os.fstat(file.fileno()).st_ino:
                 continue
             with files.reading(path):
-                scenes = {scene.name: scene for scene in _scenes(stored, file, verify)}
+                scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
             yield OpenResults(path, attributes, {name: scenes[name] for name in natural_order(scenes)})
             return
     raise StoreError(f"{path}: is being replaced by another process")
@@ -197,31 +202,26 @@ def is_sweep(path: Path) -> bool:
         return "run" in file
 
 
-def damages(path: Path) -> dict[str, list[str]]:
-    """Parts of a results file's groups that are not what was laid out, by group; the root is "file"."""
-    with files.open_file(path) as file, files.reading(path):
-        places = {(str(group.name).strip("/") or "file"): digests.damages_of(group) for group in files.groups_in(file)}
-    return {place: parts for place, parts in places.items() if parts}
-
-
-def _scenes(stored: TableFile, file: IO[bytes], verify: bool) -> Iterator[StoredScene]:
-    if RUNS not in stored.tables:
+def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None) -> Iterator[StoredScene]:
+    if RUNS not in stored.groups:
         return
-    runs = stored.tables[RUNS]
+    runs = stored.table(RUNS)
     file.seek(runs.filled["status"].offset)
     statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
-    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"][1]}
+    by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"]}
     for i, run in enumerate(runs.runs.tolist()):
         if statuses[i] == MISSING:
             continue
         known = stored.known(RUNS, i)
         scene = str(known["scene"])
-        arrays = stored.tables[scene]
-        scales = {name: values for name, (_, values) in arrays.scales.items()}
+        if only is not None and scene not in only:
+            continue
+        arrays = stored.table(scene)
+        scales = arrays.known
         labels = tuple(map(str, arrays.labels.get("coordinate", ())))
         by_scene[scene].append(
             StoredRun(scene, str(known["method_name"]), known, scales, labels, stored.place(run), file, verify)
         )
     for scene, found in by_scene.items():
         if found:
-            yield StoredScene(scene, dict(stored.tables[scene].attributes), {run.method: run for run in found})
+            yield StoredScene(scene, dict(stored.table(scene).attributes), {run.method: run for run in found})

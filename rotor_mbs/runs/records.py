@@ -121,7 +121,7 @@ class Record:
     name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
     attributes : plain values.
     arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
-    columns : what the arrays are, scales first; for writing alone.
+    columns : what the arrays are, scales first; of groups of arrays alone.
     """
 
     kind: str
@@ -196,7 +196,7 @@ def read_records(path: Path, *kinds: str) -> list[Record]:
 
 def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
     """The rows of a table that belong to one curve, one ladder, or one method and scene."""
-    stored = file.tables[kind]
+    stored = file.table(kind)
     rows: dict[tuple[str, str], list[int]] = {}
     for i in range(len(stored.runs)):
         known = file.known(kind, i)
@@ -260,5 +260,14 @@ def _group_records(file: Any, kind: str) -> Iterator[Record]:
         if damages:
             raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")
         parts = path.removeprefix(f"{kind}/").split("/")
-        arrays = {name: files.values_of(item) for name, item in group.items() if not files.is_group(item)}
-        yield Record(kind, "/".join(parts[:-2]), "/".join(parts[-2:]), files.attributes_of(group), arrays)
+        datasets = {name: item for name, item in group.items() if not files.is_group(item)}
+        arrays = {name: files.values_of(item) for name, item in datasets.items()}
+        columns = {name: _column_of(name, item) for name, item in datasets.items()}
+        scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
+        scene, name = "/".join(parts[:-2]), "/".join(parts[-2:])
+        yield Record(kind, scene, name, files.attributes_of(group), arrays, scales_first)
+
+
+def _column_of(name: str, dataset: Any) -> Column:
+    dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
+    return Column(dimensions, str(dataset.attrs["units"]), str(dataset.attrs["long_name"]), dataset.dtype.str)

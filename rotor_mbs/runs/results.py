@@ -1,13 +1,14 @@
 """Results files as they are written: a row per run in the table /runs, its arrays in a table of its scene.
 
 /runs           run (text), scene, method_name, settings, versions; status, message, metrics, times
-/paper/fig11    run (text), time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
+/paper/fig11    run (text), status, samples, time, coordinate, ...; angles (run, time, coordinate), tip, energies, loads
                 error_growth, angle_uncertainty (time): of the reference
 /bench, /stability ...   tables of other studies, each row with a status of its own
 """
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,7 +22,7 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.runs import files, table
 from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column
-from rotor_mbs.runs.table import Place, Rows, StoredTable, Table, blank_rows, characters, text_of
+from rotor_mbs.runs.table import STATUS_REPEATED, Place, Rows, StoredTable, Table, blank_rows, characters, text_of
 from rotor_mbs.runs.versions import machine, row_versions, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -68,6 +69,8 @@ _COMPUTED = {
     "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, at the integrator's own output points"),
     "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate either way, at the integrator's own output points"),
 }
+# What a scene's table repeats of /runs, by its name there; in a row it has this name.
+REPEATED = {"status": STATUS_REPEATED, "samples": "samples_repeated"}
 _CHECKSUM = Column(("run",), "1", "CRC-32 of the row in all computed columns", "<u4")
 _TEXTS = {
     "scene": "scene",
@@ -189,7 +192,8 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
         "axes": ["run", "time", "coordinate"],
     }
     labels = {"coordinate": scene.coordinate_labels} if "coordinate" in used else {}
-    return Table(scene.name, [run.method for run in runs], {}, filled, scales, labels, attributes)
+    repeated = {name: _COMPUTED[name] for name in REPEATED}
+    return Table(scene.name, [run.method for run in runs], {}, repeated | filled, scales, labels, attributes)
 
 
 def results_tables(asked: Sequence[Asked]) -> list[Table]:
@@ -208,32 +212,44 @@ def results_tables(asked: Sequence[Asked]) -> list[Table]:
 
 
 class TableFile:
-    """A file of tables whose rows are read and written by their places.
+    """A file of tables whose rows are read and written by their places. Tables are read when they are asked for.
 
     Attributes
     ----------
     path : of the file.
-    tables : by group.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.tables = table.stored_tables(path)
+        self._tables: dict[str, StoredTable] = {}
+
+    def table(self, group: str) -> StoredTable:
+        """A table. Raises StoreError where the file has none of that name, or what was laid out has changed."""
+        if group not in self._tables:
+            with files.open_file(self.path) as file, files.reading(self.path):
+                self._tables[group] = table.stored_table(file, group)
+        return self._tables[group]
+
+    @functools.cached_property
+    def groups(self) -> list[str]:
+        """The names of its tables."""
+        return table.table_groups(self.path)
 
     def place(self, run: str, group: str = RUNS) -> Place:
         """Where a row is; of a run, together with its arrays."""
-        stored = self.tables[group]
+        stored = self.table(group)
         row = stored.runs.tolist().index(run)
         place = stored.place(row)
         if group != RUNS:
             return place
-        scene = str(stored.known["scene"][1][row])
-        arrays = self.tables[scene]
+        scene = str(stored.known["scene"][row])
+        arrays = self.table(scene)
         label = run.removeprefix(f"{scene}/")
         others = arrays.place(arrays.runs.tolist().index(label))
-        offsets, kinds = dict(others.offsets), [(name, others.row[name]) for name in others.row.names or ()]
+        offsets = {REPEATED.get(name, name): offset for name, offset in others.offsets.items()}
+        kinds = [(REPEATED.get(name, name), others.row[name]) for name in others.row.names or ()]
         for name, column in arrays.filled.items():
-            if label == REFERENCE and "run" not in column.column.dimensions:
+            if label == REFERENCE and not column.is_of_runs:
                 offsets[name] = column.offset
                 kinds.append((name, np.dtype((column.kind, column.shape))))
         own = [(name, place.row[name]) for name in place.row.names or ()]
@@ -241,7 +257,7 @@ class TableFile:
 
     def known(self, group: str, row: int) -> dict[str, Any]:
         """What the design says of a row."""
-        return {name: values[row] for name, (_, values) in self.tables[group].known.items()}
+        return {name: values[row] for name, values in self.table(group).known.items()}
 
     def missing(self, asked: Sequence[Asked], time_limit_s: float) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
         """The runs that are to be computed, and those that are stored with their status and message.
@@ -268,9 +284,7 @@ class TableFile:
         return list(missing.values()), kept
 
 
-def fit(
-    path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = (), *, fresh: bool = False
-) -> TableFile:
+def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = ()) -> TableFile:
     """Make the file hold the rows of `wanted` tables, beside those that it has.
 
     Where it has all of them as they are asked for, nothing is written. Else a file is laid out beside it, the rows that
@@ -280,7 +294,6 @@ def fit(
     Parameters
     ----------
     dropped : (group, run) of rows that go.
-    fresh : whether all wanted rows are to be missing afterwards.
 
     Raises
     ------
@@ -289,94 +302,85 @@ def fit(
     StoreError
         Where the file cannot be read or written, or is a sweep's.
     """
+    if path.is_symlink():  # a link stays one
+        path = path.resolve()
     if not path.exists():
         _write_tables(path, wanted, [])
         return TableFile(path)
-    old = TableFile(path)
-    if "" in old.tables:
+    old, new = TableFile(path), {made.group: made for made in wanted}
+    if "" in old.groups:
         raise StoreError(f"{path}: holds the dataset of a sweep; allowed: another output file")
-    _refuse_losses(old, wanted)
-    merged, kept = _merged(old, wanted, set(dropped), fresh=fresh)
-    is_same = merged.keys() == old.tables.keys() and all(
-        list(made.runs) == old.tables[group].runs.tolist() and made.filled.keys() == old.tables[group].filled.keys()
+    with files.open_file(path) as file, files.reading(path):
+        stored = {group: table.as_table(file, group) for group in old.groups}
+    _refuse_losses(path, stored.get(RUNS), new.get(RUNS))
+    merged: dict[str, Table] = {}
+    kept: list[tuple[str, str]] = []
+    for group in dict.fromkeys((*stored, *new)):
+        before, made = stored.get(group), new.get(group)
+        base = made or stored[group]
+        if "crc32" not in base.filled:
+            continue
+        rows = {run: row for run, row in _known_rows(before).items() if (group, run) not in dropped}
+        asked = _known_rows(made)
+        kept += [(group, run) for run in rows if run not in asked or _is_same(rows[run], asked[run])]
+        rows |= asked
+        if rows:
+            runs = sorted(rows, key=_order) if group == RUNS else list(rows)
+            known = {name: (column, [rows[run][name] for run in runs]) for name, (column, _) in base.known.items()}
+            merged[group] = replace(base, runs=runs, known=known, filled=_joined(before, made))
+    methods: dict[str, list[str]] = {}  # by scene
+    if RUNS in merged:
+        for run, scene in zip(merged[RUNS].runs, merged[RUNS].known["scene"][1], strict=True):
+            methods.setdefault(scene, []).append(str(run).removeprefix(f"{scene}/"))
+    for scene, own in methods.items():
+        before, made = stored.get(scene), new.get(scene)
+        if before is not None and made is not None and before.attributes["scene_hash"] != made.attributes["scene_hash"]:
+            before = None
+        merged[scene] = replace(made or stored[scene], runs=own, filled=_joined(before, made))
+    is_same = merged.keys() == stored.keys() and all(
+        list(made.runs) == list(stored[group].runs) and made.filled.keys() == stored[group].filled.keys()
         for group, made in merged.items()
     )
-    if not is_same or len(kept) < sum(len(stored.runs) for stored in _with_status(old)):
-        rows = [(group, run, old.place(run, group).read()) for group, run in kept if old.place(run, group).is_stored]
-        _write_tables(path, list(merged.values()), rows)
-        return TableFile(path)
-    return old
+    if is_same and len(kept) == sum(len(made.runs) for made in stored.values() if "crc32" in made.filled):
+        return old
+    places = [(group, run, old.place(run, group)) for group, run in kept]
+    rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
+    _write_tables(path, list(merged.values()), rows_kept)
+    return TableFile(path)
 
 
-def _refuse_losses(old: TableFile, wanted: Sequence[Table]) -> None:
+def _refuse_losses(path: Path, stored: Table | None, asked: Table | None) -> None:
     """Raises InputError where stored runs of a scene with other numbers would be dropped and not computed again."""
-    made = next((table_ for table_ in wanted if table_.group == RUNS), None)
-    if made is None or RUNS not in old.tables:
-        return
-    hashes = dict(zip(made.known["scene"][1], made.known["scene_hash"][1], strict=True))
-    lost = []
-    for i, run in enumerate(old.tables[RUNS].runs.tolist()):
-        known = old.known(RUNS, i)
-        scene = known["scene"]
-        if hashes.get(scene, known["scene_hash"]) != known["scene_hash"] and run not in made.runs:
-            lost.append(
-                f"{old.path}: {scene}: has {known['method_name']} of a scene of that name with other numbers, which "
-                "this call would drop; allowed: another output file, or a call that has this method too"
-            )
+    wanted = _known_rows(asked)
+    hashes = {row["scene"]: row["scene_hash"] for row in wanted.values()}
+    lost = [
+        f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other numbers, which this call "
+        "would drop; allowed: another output file, or a call that has this method too"
+        for run, row in _known_rows(stored).items()
+        if hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"] and run not in wanted
+    ]
     if lost:
         raise InputError(lost)
 
 
-def _with_status(file: TableFile) -> list[StoredTable]:
-    return [stored for stored in file.tables.values() if "status" in stored.filled]
+def _known_rows(made: Table | None) -> dict[str, dict[str, Any]]:
+    """By run, what the design says of it."""
+    if made is None:
+        return {}
+    columns = {name: list(values) for name, (_, values) in made.known.items()}
+    return {str(run): {name: values[i] for name, values in columns.items()} for i, run in enumerate(made.runs)}
 
 
-def _merged(
-    old: TableFile, wanted: Sequence[Table], dropped: set[tuple[str, str]], *, fresh: bool
-) -> tuple[dict[str, Table], list[tuple[str, str]]]:
-    """The tables by group, and (group, run) of the rows that stay."""
-    new = {made.group: made for made in wanted}
-    kept: list[tuple[str, str]] = []
-    merged: dict[str, Table] = {}
-    for stored in _with_status(old):
-        group = stored.group
-        made = new.get(group)
-        rows = {run: old.known(group, i) for i, run in enumerate(stored.runs.tolist()) if (group, run) not in dropped}
-        asked = {} if made is None else {run: _known_of(made, i) for i, run in enumerate(made.runs)}
-        kept += [(group, run) for run in rows if run not in asked or (rows[run] == asked[run] and not fresh)]
-        rows |= asked
-        runs = sorted(rows, key=_order) if group == RUNS else list(rows)
-        if not runs:
-            continue
-        base = stored.as_table()
-        columns = {name: column for name, (column, _) in (made or base).known.items()}
-        known = {name: (column, [rows[run][name] for run in runs]) for name, column in columns.items()}
-        merged[group] = replace(base, runs=runs, known=known, filled=_joined(base, made))
-    merged |= {group: made for group, made in new.items() if "status" in made.filled and group not in merged}
-    scenes = dict.fromkeys(str(scene) for scene in merged[RUNS].known["scene"][1]) if RUNS in merged else {}
-    for scene in scenes:
-        labels = [run.removeprefix(f"{scene}/") for run in merged[RUNS].runs if _scene_of(merged[RUNS], run) == scene]
-        before, asked_for = old.tables.get(scene), new.get(scene)
-        base = before.as_table() if before is not None and _same_scene(before, asked_for) else new[scene]
-        merged[scene] = replace(asked_for or base, runs=labels, filled=_joined(base, asked_for))
-    return merged, kept
+def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
+    """Whether a row is as it is asked for; a number that it does not have is NaN in both."""
+    return stored.keys() == asked.keys() and all(
+        value == asked[name] or (value != value and asked[name] != asked[name]) for name, value in stored.items()
+    )
 
 
-def _same_scene(stored: StoredTable, made: Table | None) -> bool:
-    return made is None or bool(stored.attributes["scene_hash"] == made.attributes["scene_hash"])
-
-
-def _scene_of(runs: Table, run: str) -> str:
-    return str(runs.known["scene"][1][list(runs.runs).index(run)])
-
-
-def _known_of(made: Table, row: int) -> dict[str, Any]:
-    return {name: values[row] for name, (_, values) in made.known.items()}
-
-
-def _joined(base: Table, made: Table | None) -> dict[str, Column]:
+def _joined(before: Table | None, made: Table | None) -> dict[str, Column]:
     """The computed columns of both, the checksum last."""
-    columns = {**base.filled, **(made.filled if made is not None else {})}
+    columns = {**(before.filled if before else {}), **(made.filled if made else {})}
     checksum = columns.pop("crc32", None)
     return columns if checksum is None else {**columns, "crc32": checksum}
 
@@ -397,10 +401,10 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
     with table.laid_out(path, tables, attributes) as temporary:
         file = TableFile(temporary)
         given = {(group, run): values for group, run, values in rows}
-        for stored in _with_status(file):
-            for run in stored.runs.tolist():
-                place = file.place(run, stored.group)
-                values = given.get((stored.group, run))
+        for made in tables:
+            for run in made.runs if "crc32" in made.filled else ():
+                place = file.place(str(run), made.group)
+                values = given.get((made.group, str(run)))
                 if values is None:
                     place.clear()
                 else:
@@ -415,7 +419,7 @@ def _description(tables: Sequence[Table]) -> dict[str, object]:
     scenes = set(runs.known["scene"][1]) if runs is not None else set()
     count = len(runs.runs) if runs is not None else 0
     summary = f"{count} runs of {len(scenes)} scenes: trajectories, energies, status and errors of each"
-    others = sorted(made.group for made in tables if made.group != RUNS and "status" in made.filled)
+    others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.filled)
     if others:
         summary += f"; tables {', '.join(others)}"
     return {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}
@@ -456,4 +460,11 @@ def row_of_run(run: Solution, place: Place, facts: Mapping[str, object]) -> Rows
         column = name if run.method == REFERENCE else OF_METHODS.get(name, name)
         if column in row:
             row[column][0, : len(array)] = array
+    repeat(row)
     return row
+
+
+def repeat(row: Rows) -> None:
+    """Put status and samples where the table of the scene has them, too."""
+    for name, repeated in REPEATED.items():
+        row[repeated][:] = row[name]

@@ -25,7 +25,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column
 from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, lay_out, stored_table
+from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, columns_of, lay_out, stored_table
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.sweep import Sweep
 from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
@@ -117,11 +117,11 @@ def open_sweep(
     ----------
     attributes : of the file; `sweep_identity` is a hash of all that the design says.
     time_limit_s : runs that a shorter limit ended are missing.
-    fresh : whether all runs are.
+    fresh : whether all runs are to be computed; what is stored of one stays until it is.
 
     Returns
     -------
-    Where its runs are, and (runs,) their statuses, MISSING where none is stored.
+    Where its runs are, and (runs,) their statuses, MISSING where they are to be computed.
 
     Raises
     ------
@@ -132,7 +132,8 @@ def open_sweep(
     """
     with writing(output):
         path = output.resolve() if output.is_symlink() else output  # a link stays one
-        if not path.exists():
+        is_new = not path.exists()
+        if is_new:
             lay_out(path, [table], attributes)
         with files.open_file(path) as file, files.reading(path):
             if files.plain(file.attrs.get(IDENTITY)) != attributes[IDENTITY]:
@@ -142,16 +143,16 @@ def open_sweep(
             stored = stored_table(file)
         place, marked = stored.place(number=int(stored.runs[0]) if len(stored.runs) else 0), stored.statuses()
         statuses = place.stored(marked)
-        if fresh:
-            statuses[:] = MISSING
         limit = stored.filled["time_limit_s"]
         limits = np.memmap(path, limit.kind, "r", limit.offset, limit.shape) if len(marked) else np.empty(0)
         statuses[(statuses == code_of("timed_out")) & (limits < time_limit_s)] = MISSING
         place.mark_missing(np.flatnonzero((marked != MISSING) & (statuses == MISSING)).tolist())  # readers see it, too
+        if fresh:
+            statuses[:] = MISSING
         try:
             yield place, statuses
         finally:
-            if (statuses == MISSING).all():
+            if is_new and (statuses == MISSING).all():
                 path.unlink(missing_ok=True)  # a sweep that stored nothing leaves nothing
 
 
@@ -178,12 +179,12 @@ class StoredSweep:
             if IDENTITY not in self.attributes:
                 raise StoreError(f"{path}: no sweep's dataset; allowed: a file that `rotor-mbs sweep` wrote")
             self._table: StoredTable = stored_table(file)
+            columns = columns_of(file)
         table = self._table
         self.columns: dict[str, Column] = {
             "run": Column(("run",), "1", "run number, from 0"),
-            **{name: column for name, (column, _) in {**table.scales, **table.known}.items() if name != CHARACTERS},
-            **{name: stored.column for name, stored in table.filled.items()},
         }
+        self.columns |= {name: column for name, column in columns.items() if name not in (CHARACTERS, "run")}
         self.keys: list[str] = self.attributes["parameter_keys"]
         first = int(table.runs[0]) if len(table.runs) else 0
         with files.reading(path):
@@ -221,6 +222,6 @@ class StoredSweep:
             with files.reading(self._path, name):
                 values: NDArray[Any] = np.memmap(self._path, stored.kind, "r", stored.offset, stored.shape)
             return values
-        if name in table.known or name in table.scales:
-            return {**table.scales, **table.known}[name][1]
+        if name in table.known:
+            return table.known[name]
         raise StoreError(f"{self._path}: does not hold {name}; allowed: a sweep whose outputs have it")

@@ -37,12 +37,14 @@ from rotor_mbs.solution.status import STATUSES
 Rows = dict[str, NDArray[Any]]
 
 MISSING = -1  # status of a row that is not stored
+STATUS_REPEATED = "status_repeated"  # in a row, the status for a second table
 CHARACTER = "S1"  # kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
 STATUS_FLAGS = {
     "flag_values": np.arange(MISSING, len(STATUSES), dtype=np.int8),
     "flag_meanings": " ".join(("missing", *STATUSES)),
 }
 _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
+_OF_REFERENCE = "columns_of_the_reference"  # the attribute with the names of those that have no value a run
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
 
 
@@ -101,7 +103,7 @@ class Place:
     row: np.dtype[np.void]
 
     def write(self, first: int, rows: Rows) -> None:
-        """Store the rows from number `first` on, their statuses last.
+        """Store the rows from number `first` on, their statuses last; meanwhile they are missing.
 
         Raises
         ------
@@ -109,17 +111,21 @@ class Place:
             Where the file cannot be written, or is another one by now.
         """
         columns = rows | {"crc32": checksums(first, rows, self.row)}
-        status = columns.pop("status")
+        statuses = {name: columns.pop(name) for name in (STATUS_REPEATED, "status") if name in columns}
         with saving(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: is another file by now")
+            for name, status in statuses.items():
+                file.seek(self.offsets[name] + first - self.first)
+                file.write(np.full(len(status), MISSING, np.int8).data)
             for name, values in columns.items():
                 file.seek(self.offsets[name] + (first - self.first) * self.row[name].itemsize)
                 file.write(np.ascontiguousarray(values).data)
             file.flush()
             os.fsync(file.fileno())
-            file.seek(self.offsets["status"] + first - self.first)
-            file.write(np.ascontiguousarray(status, np.int8).data)
+            for name, status in statuses.items():
+                file.seek(self.offsets[name] + first - self.first)
+                file.write(np.ascontiguousarray(status, np.int8).data)
 
     def read(self, count: int = 1, start: int = 0, file: IO[bytes] | None = None) -> Rows:
         """(count, ...) The columns of the rows from `start` on; file: one that is open.
@@ -169,8 +175,10 @@ class Place:
         """Take back the statuses of some rows, counted from the first, before they are computed again."""
         with saving(self.path), self.path.open("r+b") as file:
             for row in rows:
-                file.seek(self.offsets["status"] + row)
-                file.write(np.int8(MISSING).tobytes())
+                for name in ("status", STATUS_REPEATED):
+                    if name in self.offsets:
+                        file.seek(self.offsets[name] + row)
+                        file.write(np.int8(MISSING).tobytes())
             file.flush()
             os.fsync(file.fileno())
 
@@ -272,6 +280,9 @@ def _put_table(file: Any, table: Table) -> None:
         dataset = files.put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
         if name == "status":
             files.put_attributes(dataset, STATUS_FLAGS)
+    of_reference = [name for name, column in table.filled.items() if "run" not in column.dimensions]
+    if of_reference:
+        files.put_attributes(group, {_OF_REFERENCE: of_reference})
     digests.seal(group, later=table.filled.keys())
 
 
@@ -279,12 +290,12 @@ def _put_table(file: Any, table: Table) -> None:
 
 
 class StoredColumn(NamedTuple):
-    """A computed column in a file: what it is, the type of its values, its shape, and where it begins."""
+    """A computed column in a file: the type of its values, its shape, where it begins; whether it has a value a run."""
 
-    column: Column
     kind: np.dtype[Any]
     shape: tuple[int, ...]
     offset: int
+    is_of_runs: bool
 
 
 @dataclass(frozen=True)
@@ -295,8 +306,8 @@ class StoredTable:
     ----------
     path, inode, group : where it stands.
     runs : (rows,) texts or numbers of the rows.
-    known : by name, column and values of what the design says of each row.
-    scales : by name, column and values of the other dimensions; labels of their entries.
+    known : by name, the values of scales and of what the design says of each row.
+    labels : texts for the entries of a scale.
     filled : the computed columns by name, in the order of the checksum.
     attributes : of the group.
     """
@@ -305,8 +316,7 @@ class StoredTable:
     inode: int
     group: str
     runs: NDArray[Any]
-    known: Mapping[str, tuple[Column, NDArray[Any]]]
-    scales: Mapping[str, tuple[Column, NDArray[Any]]]
+    known: Mapping[str, NDArray[Any]]
     labels: Mapping[str, Sequence[str]]
     filled: Mapping[str, StoredColumn]
     attributes: Mapping[str, Any]
@@ -317,66 +327,87 @@ class StoredTable:
 
     def place(self, row: int = 0, number: int | None = None) -> Place:
         """Where the rows from `row` on are; `number` is what the checksum of the first begins with."""
-        columns = {name: stored for name, stored in self.filled.items() if "run" in stored.column.dimensions}
+        columns = {name: stored for name, stored in self.filled.items() if stored.is_of_runs}
         kinds = np.dtype([(name, stored.kind, stored.shape[1:]) for name, stored in columns.items()])
         offsets = {name: stored.offset + row * kinds[name].itemsize for name, stored in columns.items()}
         return Place(self.path, self.inode, row if number is None else number, offsets, kinds)
-
-    def as_table(self) -> Table:
-        """What would lay it out anew."""
-        filled = {name: stored.column._replace(kind=stored.kind.str) for name, stored in self.filled.items()}
-        attributes = {name: value for name, value in self.attributes.items() if self.group}
-        return Table(self.group, self.runs.tolist(), self.known, filled, self.scales, self.labels, attributes)
 
 
 def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
-    changed = [part for part in digests.damages_of(item) if part != files.DIGESTS]
-    if changed:
-        raise StoreError(f"{path}: {group or 'file'}: {', '.join(changed)} changed after the file was laid out")
+    _refuse_changes(item, group)
     filled_names = digests.unfilled_in(digests.stored_digests(item.attrs))
-    known: dict[str, tuple[Column, NDArray[Any]]] = {}
-    scales: dict[str, tuple[Column, NDArray[Any]]] = {}
+    attributes = files.attributes_of(item)
+    of_reference = attributes.pop(_OF_REFERENCE, [])
+    known: dict[str, NDArray[Any]] = {}
     labels: dict[str, Sequence[str]] = {}
     filled: dict[str, StoredColumn] = {}
     for name, dataset in item.items():
         if files.is_group(dataset):
             continue
-        if files.is_dimension_only(dataset):
-            scales[name] = (Column((name,), "1", ""), np.empty(len(dataset), np.int8))
-            continue
-        dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
-        column = Column(dimensions, str(dataset.attrs["units"]), str(dataset.attrs["long_name"]), dataset.dtype.str)
         if name in filled_names:
+            if dataset.shape is None or dataset.dtype.kind not in "fiuS":
+                raise StoreError(f"{path}: {dataset.name} is no array of numbers or characters")
             offset = dataset.id.get_offset()
             if offset is None and dataset.size:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
-            filled[name] = StoredColumn(column, dataset.dtype, dataset.shape, offset or 0)
-        elif dimensions == (name,):
-            scales[name] = (column, _values(dataset))
+            filled[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
+        elif name != files.CHARACTERS:
+            known[name] = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
             if "labels" in dataset.attrs:
                 labels[name] = files.plain(dataset.attrs["labels"])
-        else:
-            known[name] = (column, _values(dataset))
-    _, runs = scales.pop("run")
-    attributes = files.attributes_of(item)
-    return StoredTable(path, path.stat().st_ino, group, runs, known, scales, labels, filled, attributes)
+    runs = known.pop("run")
+    return StoredTable(path, path.stat().st_ino, group, runs, known, labels, filled, attributes)
 
 
-def _values(dataset: Any) -> NDArray[Any]:
-    return files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
+def _refuse_changes(item: Any, group: str) -> None:
+    changed = digests.damages_of(item, with_columns=False)
+    if changed:
+        place = f"{item.file.filename}: {group or 'file'}"
+        raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")
 
 
-def stored_tables(path: Path) -> dict[str, StoredTable]:
-    """All tables of a file by their group. Raises StoreError where it is damaged or another program's."""
+def as_table(file: Any, group: str) -> Table:
+    """What would lay out a table of an open file anew."""
+    stored, item = stored_table(file, group), file[group] if group else file
+    columns = columns_of(item)
+    scales: dict[str, tuple[Column, NDArray[Any]]] = {}
+    if files.CHARACTERS in item:
+        scales[files.CHARACTERS] = Column((files.CHARACTERS,), "1", ""), np.empty(len(item[files.CHARACTERS]), np.int8)
+    known: dict[str, tuple[Column, NDArray[Any]]] = {}
+    for name, values in stored.known.items():
+        (scales if columns[name].dimensions == (name,) else known)[name] = columns[name], values
+    filled = {name: columns[name] for name in stored.filled}
+    attributes = {name: value for name, value in stored.attributes.items() if group}
+    return Table(group, stored.runs.tolist(), known, filled, scales, stored.labels, attributes)
+
+
+def columns_of(group: Any) -> dict[str, Column]:
+    """What the datasets of an open group are, by name."""
+    columns = {}
+    for name, dataset in group.items():
+        if not files.is_group(dataset) and not files.is_dimension_only(dataset):
+            dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
+            units, long_name = str(dataset.attrs["units"]), str(dataset.attrs["long_name"])
+            columns[name] = Column(dimensions, units, long_name, dataset.dtype.str)
+    return columns
+
+
+def table_groups(path: Path) -> list[str]:
+    """The groups of a file that are tables. Raises StoreError where it is another program's."""
     with files.open_file(path) as file, files.reading(path):
-        return {group: stored_table(file, group) for group in _groups_with_runs(file, "")}
+        _refuse_changes(file, "")
+        return list(_groups_with_runs(file, "", set()))
 
 
-def _groups_with_runs(group: Any, path: str) -> Iterator[str]:
+def _groups_with_runs(group: Any, path: str, seen: set[Any]) -> Iterator[str]:
+    if group in seen:
+        raise StoreError(f"{group.file.filename}: {path} is another name of a group; allowed: one name of each")
+    seen.add(group)
     if "run" in group:
         yield path
+        return
     for name, item in files.members(group):
         if files.is_group(item):
-            yield from _groups_with_runs(item, f"{path}/{name}" if path else name)
+            yield from _groups_with_runs(item, f"{path}/{name}" if path else name, seen)

@@ -1,7 +1,4 @@
-"""The bounds that results are judged by: reference/accuracy.toml, and a user's own file before it.
-
-A run's status and the verdicts of `check` read the same entries.
-"""
+"""The bounds that statuses and `check` judge by: reference/accuracy.toml, and a user's own file before it."""
 
 from __future__ import annotations
 
@@ -33,19 +30,17 @@ _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest value that passes, in the check's own unit, for methods that `method` (a pattern with *) fits.
-
-    scenes   the shipped scenes it is for, patterns with | between them; "*" for any scene, a user's own too
-    fault, known_fault   the value that a known fault gives, and which one: what the bound must stay below; a user's
-                         bound may leave them out (infinity, "")
-    """
+    """The largest value that passes, in the check's own unit, for methods that `method` (a pattern with *) fits."""
 
     check: str = file_key("check", keys.choice(CHECKS))
     method: str = file_key("method", _PATTERN)
     value: float = file_key("value", _BOUND)
     reason: str = file_key("reason", _SENTENCE)
+    # the value that a known fault gives, and which one: what the bound must stay below; a user's bound may leave them
+    # out (infinity, "")
     fault: float = file_key("fault", _BOUND, default=math.inf)
     known_fault: str = file_key("known_fault", _SENTENCE, default="")
+    # the shipped scenes it is for, patterns with | between them; "*" for any scene, a user's own too
     scenes: str = file_key("scenes", _PATTERN, default="*")
 
 
@@ -56,10 +51,8 @@ class _BoundsFile:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds in the order in which they are tried: the first entry whose check, method and scene fit counts.
-
-    scene   the shipped scene that they are for; "" for any
-    """
+    """The first entry whose check, method and scene fit counts; scene: the shipped one that they are for, "" for
+    any."""
 
     entries: Sequence[Bound]
     scene: str = ""
@@ -84,12 +77,7 @@ class Bounds:
         return None
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
-        """Bounds that try `entries` first, then these.
-
-        >>> bounds = Bounds([Bound("energy", "*", 1e-6, "default")])
-        >>> bounds.with_entries([Bound("energy", "mine/*", 1e-3, "explicit")]).of("energy", "mine/euler").value
-        0.001
-        """
+        """Bounds that try `entries` first, then these."""
         return replace(self, entries=[*entries, *self.entries])
 
 

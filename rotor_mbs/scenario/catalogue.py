@@ -52,11 +52,6 @@ def natural_key(name: str) -> list[tuple[int, int, str]]:
 
 
 def natural_order(names: Iterable[str]) -> list[str]:
-    """The names, sorted by `natural_key`.
-
-    >>> natural_order(["fig15-10kNm", "fig15-1kNm", "fig05"])
-    ['fig05', 'fig15-1kNm', 'fig15-10kNm']
-    """
     return sorted(names, key=natural_key)
 
 
@@ -66,18 +61,14 @@ def list_scenes() -> list[tuple[str, str]]:
 
 
 def list_sweeps() -> list[tuple[str, str]]:
-    """Name and title of every shipped sweep."""
     paths = sorted(sweeps_folder().glob("*.toml"), key=lambda path: natural_key(path.name))
     return [(f"{sweeps_folder().name}/{path.stem}", _title(path)) for path in paths]
 
 
 def find_scenes(arguments: Sequence[str]) -> list[Scene]:
-    """The scenes that the arguments mean, in their order, each once.
-
-    An argument is the name of a shipped scene (`paper/fig05`), a shipped folder (`paper`), a path to a TOML file, or a
-    path to a folder of TOML files; a shipped name goes before a path (write ./paper for a folder of one's own).
-    Raises InputError with all errors of all arguments and files.
-    """
+    """The scenes that names, folders and paths of TOML files mean, in their order, each once; a shipped name goes
+    before a path (write ./paper for a folder of one's own). Raises InputError with all errors of all arguments and
+    files."""
     from rotor_mbs.scenario.scene_file import load_scene
 
     problems: list[str] = []
@@ -138,7 +129,6 @@ def _title(path: Path) -> str:
 
 
 def _files(argument: str) -> list[Path]:
-    """The files that one argument means."""
     shipped = _shipped()
     if argument in shipped:
         return [shipped[argument]]

@@ -38,13 +38,7 @@ class ExpressionError(ValueError):
 
 
 def evaluate(text: str) -> float:
-    """The finite double that `text` stands for; every step is rounded as Python's floats are.
-
-    `deg` converts degrees to radians. Raises ExpressionError, a ValueError, which says what is allowed.
-
-    >>> evaluate("hypot(3, 4)/2")
-    2.5
-    """
+    """The finite double that `text` stands for, every step rounded as Python's floats are. Raises ExpressionError."""
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"an expression of {len(text)} characters is longer than {MAX_LENGTH}")
     forbidden = _FORBIDDEN.search(text)
@@ -81,7 +75,6 @@ def _value(node: ast.expr, depth: int) -> float:
 
 
 def _applied(called: str, function: Callable[..., float], *arguments: float) -> float:
-    """The finite value of the call; ExpressionError where there is none."""
     try:
         value = function(*arguments)
     except (ArithmeticError, ValueError):

@@ -1,7 +1,5 @@
-"""Keys of input files: what a value may be, and tables read by the keys that a dataclass declares.
-
-Reading a value returns what the program keeps of it, or raises TableError with all that is wrong in it.
-"""
+"""Keys of input files: what a value may be, and tables read by the keys that a dataclass declares. Reading returns what
+the program keeps, or raises TableError with all that is wrong."""
 
 from __future__ import annotations
 
@@ -26,39 +24,19 @@ _UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")  # Unicode categories: controls, d
 
 @dataclass(frozen=True)
 class Kind:
-    """What a value of a file may be.
+    """What a value of a file may be."""
 
-    read         from the value; where `in_context`, from the value and the values of the keys before it, by field
-    allowed      what a message says is allowed; {unit} stands for the key's unit
-    per_blade    the file may have one value for all blades
-    over_time    a value may be a table over time
-    """
-
+    # from the value; where `in_context`, from the value and the values of the keys before it, by field
     read: Callable[..., Any]
-    allowed: str
+    allowed: str  # what a message says is allowed; {unit} stands for the key's unit
     in_context: bool = False
-    per_blade: bool = False
-    over_time: bool = False
+    per_blade: bool = False  # the file may have one value for all blades
+    over_time: bool = False  # a value may be a table over time
 
 
 def file_key(path: str, kind: Kind, unit: str = "1", note: str = "", *, default: Any = MISSING, **more: Any) -> Any:
-    """A field of a dataclass that is a key of a file.
-
-    Parameters
-    ----------
-    path
-        The key, with a dot where it is in a table; "" for a field that is not in the file.
-    kind
-        What its value may be.
-    unit
-        Unit of its numbers.
-    note
-        What else a user has to know, after what is allowed.
-    default
-        Of the field and of the key.
-    more
-        optional: the default of the key where the field has none; and what the class adds.
-    """
+    """A field of a dataclass that is the key `path` of a file ("": not in the file); note: what a user has to know
+    after what is allowed; more: `optional`, the default of a key whose field has none, and what the class adds."""
     shown_unit = "" if unit == "1" else f" ({unit.replace('^2', '²')})"
     allowed = kind.allowed.replace("{unit}", shown_unit) + note
     metadata = {"key": path, "kind": kind, "unit": unit, "allowed": allowed, **more}
@@ -73,7 +51,6 @@ def wrong(what: str, allowed: str = "") -> TableError:
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
-    """ "1 blade", "3 blades"."""
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
 
 
@@ -108,7 +85,6 @@ def read_number(value: object) -> float:
 
 
 def read_text(value: object) -> str:
-    """A text that is not blank."""
     if not isinstance(value, str):
         raise wrong(f"{shown(value)} is not text")
     if not value.strip():
@@ -184,7 +160,6 @@ def whole(lowest: int, highest: int, allowed: str = "") -> Kind:
 
 
 def choice(names: Sequence[str]) -> Kind:
-    """One of the names."""
 
     def read(value: object) -> str:
         if not isinstance(value, str):
@@ -214,7 +189,6 @@ def _read_entries(read: Callable[[Any], Any], entries: Iterable[tuple[str | int,
 
 
 def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -> Kind:
-    """A list, kept as a tuple."""
 
     def read(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list):
@@ -227,7 +201,6 @@ def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -
 
 
 def dict_of(kind: Kind, allowed: str) -> Kind:
-    """A table with any keys."""
 
     def read(value: object) -> dict[str, Any]:
         if not isinstance(value, dict):
@@ -260,10 +233,8 @@ def declared_keys(cls: Any) -> dict[str, Mapping[str, Any]]:
 def read_keys(
     keys: Mapping[str, Mapping[str, Any]], tables: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[KeyProblem]]:
-    """The values by field, without those that have an error, and everything that is wrong.
-
-    A table with a single key must have it where the table is there.
-    """
+    """The values by field, without those that have an error, and everything that is wrong. A table with a single key
+    must have it where the table is there."""
     values: dict[str, Any] = {}
     problems: list[KeyProblem] = []
     names: dict[str, list[str]] = {"": []}  # of the keys by table, "" for the top

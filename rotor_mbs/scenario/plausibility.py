@@ -1,7 +1,4 @@
-"""Numbers of a scene that are allowed and yet look like a slip: degrees for radians, millimetres for metres, tonnes.
-
-Limits are far outside what rotors of turbines, models of them and toys have.
-"""
+"""Numbers of a scene that are allowed and yet look like a slip: degrees for radians, millimetres for metres, tonnes."""
 
 from __future__ import annotations
 
@@ -20,12 +17,7 @@ USUAL_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
 
 
 def doubts(scene: Scene) -> list[str]:
-    """A line for each number that looks like a slip: key, value, and what may have been meant; [] where all is well.
-
-    >>> from rotor_mbs.scenario.catalogue import find_scenes
-    >>> doubts(find_scenes(["paper/fig11"])[0].replace(**{"initial.angles[0]": 30}))
-    ['initial.angles[0]: 30 rad are 4.8 turns; degrees? write "deg(30)"']
-    """
+    """A line for each number that looks like a slip: key, value, and what may have been meant; [] where all is well."""
     lines = []
     # Where one is more than a turn, other whole numbers are in degrees, too.
     in_degrees = any(abs(angle) > TURN for angle in scene.initial_angles)

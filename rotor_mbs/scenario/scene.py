@@ -1,8 +1,5 @@
-"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers. All that every model gets.
-
-A key of the scene file is one field of Scene or Blade, which says what its value may be, its unit, and which part of a
-scene it is. Reading with all errors, the hash, the keys of sweeps, units and the written file follow from the fields.
-"""
+"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers; all that every model gets. A key of
+the scene file is one field, from which reading, hash, keys of sweeps, units and the written file follow."""
 
 from __future__ import annotations
 
@@ -64,11 +61,8 @@ def _read_outputs(value: object) -> tuple[str, ...]:
 
 
 def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
-    """Whether some distribution of mass >= 0 has this tensor: xx yy zz xy xz yz about the centre of mass, kg m².
-
-    That is so exactly where the second moments ∫r rᵀ dm = ½ tr(J) I - J are positive semidefinite: their eigenvalues
-    are (J2 + J3 - J1)/2, so this is the triangle inequality of the principal moments, and it implies J >= 0.
-    """
+    """Whether a distribution of mass >= 0 has this tensor: xx yy zz xy xz yz, kg m². So it is where the second moments
+    ½ tr(J) I - J are positive semidefinite: the triangle inequality of the principal moments."""
     if not any(inertia):
         return True
     import numpy as np  # late: a point mass, as in every scene of the paper, does without
@@ -119,7 +113,6 @@ def _per_blade(kind: Kind) -> Kind:
 
 
 def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
-    """An entry for every coordinate."""
     count = scene.get("blade_count")
     if isinstance(value, list) and count is not None and len(value) != 1 + count:
         raise wrong(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
@@ -187,13 +180,8 @@ _SETTINGS = keys.dict_of(keys.NUMBER_OR_TEXT, "a table of methods' settings, suc
 
 @dataclass(frozen=True, slots=True)
 class Blade:
-    """One rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis.
-
-    mass            kg, > 0
-    centre_of_mass  (3,) m
-    inertia         (6,) kg m², tensor elements xx yy zz xy xz yz about the centre of mass (xy = -∫xy dm)
-    tip             (3,) m, the point whose path is drawn
-    """
+    """One rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis. `inertia` has the elements
+    xx yy zz xy xz yz of its tensor about the centre of mass (xy = -∫xy dm); `tip` is the point whose path is drawn."""
 
     mass: float = file_key("mass", keys.POSITIVE, "kg")
     centre_of_mass: tuple[float, float, float] = file_key("centre_of_mass", _POINT, "m", ": z along the pitch axis")
@@ -228,10 +216,8 @@ class Blade:
 
 
 def _key(path: str, *declared: Any, part: Part = "rotor", added: bool = False, **more: Any) -> Any:
-    """As `file_key`, with the part of the scene, and whether the key is `added`.
-
-    An added key is younger than the stored hashes: at its default it does not enter them.
-    """
+    """As `file_key`, with the part of the scene; an `added` key, younger than stored hashes, does not enter them at its
+    default."""
     return file_key(path, *declared, part=part, added=added, **more)
 
 
@@ -329,10 +315,8 @@ class Scene:
         return self.shaft_damping, *(self.bearing(i)[1] for i in range(len(self.blades)))
 
     def pitch_load(self, blade: int) -> tuple[Table, Table]:
-        """Torque (N m) and rest angle (rad) over time of the pitch bearing of a blade, counted from 0.
-
-        A spring without stiffness has no rest angle.
-        """
+        """Torque (N m) and rest angle (rad; none without stiffness) over time of the pitch bearing of a blade, from
+        0."""
         torque = self.pitch_torque[blade] if self.pitch_torque else ()
         return torque, self.bearing_rest[blade] if self.bearing_rest and self.bearing(blade)[0] else ()
 
@@ -387,7 +371,6 @@ _BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
 
 
 def scene_fields(*parts: Part) -> Iterator[Field[Any]]:
-    """The dataclass fields of Scene that are of these parts, in order."""
     return (field for field in fields(Scene) if field.metadata["part"] in parts)
 
 
@@ -395,11 +378,8 @@ _rotor_values = attrgetter(*(field.name for field in scene_fields("rotor")))
 
 
 def scene_hash(scene: Scene) -> str:
-    """SHA-256, in hexadecimal, over all that a run of the scene depends on: its numbers, bit for bit, and outputs.
-
-    Name, title, figures and the text of the file (comments, order, how a number was written, one [blade] or several
-    equal ones) do not enter; neither does the tip where no tip path is asked for.
-    """
+    """SHA-256, in hexadecimal, over all that a run depends on: numbers bit for bit, and outputs. Name, title, figures
+    and text do not enter; neither does the tip where no tip path is asked for."""
     content: dict[str, object] = {}
     for field in scene_fields("run", "start", "rotor"):
         value = getattr(scene, field.name)
@@ -453,7 +433,14 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
         table, _, name = field.metadata["key"].rpartition(".")
         written: Any
         if field.name == "blades":
-            written = _blade_tables(scene)
+            # One table for equal blades; a tip that only repeats the centre of mass was not given.
+            written = []
+            for blade in scene.blades if len(set(scene.blades)) > 1 else scene.blades[:1]:
+                of_blade = {key: _listed(getattr(blade, key)) for key in BLADE_KEYS}
+                if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
+                    del of_blade["tip"]
+                written.append(of_blade)
+            written = written if len(written) > 1 else written[0]
         elif field.name == "settings":
             written = dict(value)
         elif field.metadata["kind"].per_blade and len(set(value)) == 1:
@@ -466,26 +453,12 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
     return tables
 
 
-def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
-    """One table for equal blades; a tip that only repeats the centre of mass was not given."""
-    tables: list[dict[str, Any]] = []
-    for blade in scene.blades if len(set(scene.blades)) > 1 else scene.blades[:1]:
-        table = {name: _listed(getattr(blade, name)) for name in BLADE_KEYS}
-        if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
-            del table["tip"]
-        tables.append(table)
-    return tables if len(tables) > 1 else tables[0]
-
-
 def _listed(value: Any) -> Any:
     return [_listed(entry) for entry in value] if isinstance(value, tuple) else value
 
 
 def scene_toml(scene: Scene) -> str:
-    """A scene file that has the scene's numbers bit for bit: reading it gives an equal scene, but for name and text.
-
-    Comments and expressions of the file that the scene was read from are not kept.
-    """
+    """A scene file with the scene's numbers bit for bit; comments and expressions of its first file are not kept."""
     top, parts = {}, []
     for name, value in scene_tables(scene).items():
         if isinstance(value, dict):
@@ -513,11 +486,8 @@ def _names(path: KeyPath) -> str:
 
 
 def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
-    """Sets the value at `path` in the tables of a scene; tables that are missing are made, keys are not checked.
-
-    One [blade] for all, or one number or table for every bearing, becomes one for each where the path names one.
-    Raises TableError where the path goes through something that has no such entry.
-    """
+    """Sets the value at `path`, keys not checked; one value for every blade becomes one for each where the path names
+    one. Raises TableError where the path goes through something that has no such entry."""
     here: Any = tables  # a table or a list
     for depth, part in enumerate(path):
         has_such_entries = isinstance(here, list) if isinstance(part, int) else isinstance(here, dict)
@@ -555,7 +525,6 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
 
 
 def copied(value: Any) -> Any:
-    """A copy of tables of a file, with lists and tables of its own."""
     if isinstance(value, dict):
         return {name: copied(entry) for name, entry in value.items()}
     return [copied(entry) for entry in value] if isinstance(value, list) else value

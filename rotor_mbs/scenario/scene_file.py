@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,8 @@ __all__ = ["load_scene", "new_scene_text", "parse_scene", "scene_toml"]
 
 
 def load_scene(path: Path | str, name: str | None = None) -> Scene:
-    """The scene in the TOML file `path`, under `name`, by default the file's name without its ending.
-
-    Raises InputError with all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`;
-    entries are counted from 0, as by `Scene.replace`.
-    """
+    """The scene in the TOML file `path`, under `name` or the file's own. Raises InputError with all errors of the file,
+    a line each: `file:line: key: what is wrong; allowed: ...`; entries are counted from 0."""
     path = Path(path)
     text, tables = read_toml(path)
     if "axis" in tables and "scene" in tables:
@@ -64,7 +61,13 @@ def new_scene_text() -> str:
     """A scene file with every key, a value and what is allowed, to start a scene from."""
     lines: dict[str, list[str]] = {"": _HEADER.splitlines()}
     needed = {"blade"}
-    for path, declared in _all_keys():
+    declarations: dict[str, Mapping[str, Any]] = {}  # by path; those of a blade in the place of `blade`
+    for declared in SCENE_KEYS.values():
+        if declared["key"] == "blade":
+            declarations |= {f"blade.{name}": of_blade for name, of_blade in BLADE_KEYS.items()}
+        elif declared["key"] != "settings":
+            declarations[declared["key"]] = declared
+    for path, declared in declarations.items():
         table, _, name = path.rpartition(".")
         value = _EXAMPLE.get(path, declared.get("optional"))
         if value == () and declared["unit"] != "1":  # no load
@@ -84,12 +87,3 @@ def new_scene_text() -> str:
         header = [f"[{table}]" if table in needed else f"{f'[{table}]':34} # optional"] if table else []
         parts.append("\n".join([*header, *entries, ""]))
     return "\n".join(parts)
-
-
-def _all_keys() -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Path and declaration of every key but settings, those of a blade in the place of `blade`."""
-    for declared in SCENE_KEYS.values():
-        if declared["key"] == "blade":
-            yield from ((f"blade.{name}", of_blade) for name, of_blade in BLADE_KEYS.items())
-        elif declared["key"] != "settings":
-            yield declared["key"], declared

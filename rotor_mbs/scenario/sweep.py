@@ -97,7 +97,6 @@ class AxisTable:
             raise wrong(what, f"exactly one of {', '.join(VARIED)}")
 
     def axis(self, draws: int) -> Axis:
-        """The axis of a design with so many draws."""
         kind = next(name for name in VARIED if getattr(self, name) is not None)
         numbers = getattr(self, kind)
         if kind in ("linear", "log"):
@@ -114,8 +113,6 @@ _AXES = list_of(table_of(AxisTable), "one or more [[axis]] tables", 1)
 
 @dataclass(frozen=True, kw_only=True)
 class SweepTable:
-    """The whole file."""
-
     title: str = file_key("title", keys.LINE)
     scene: str = file_key("scene", _SCENE_NAME)
     methods: Sequence[str] = file_key("methods", _METHODS, default=("lagrange/taylor",))
@@ -156,17 +153,12 @@ class SweepTable:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A base scene and how it is varied.
+    """A base scene and how it is varied."""
 
-    table   what the sweep's file says
-    base    the scene with the sweep's own changes, before any axis
-    text    the TOML text it was read from
-    """
-
-    table: SweepTable
-    base: Scene
+    table: SweepTable  # what the sweep's file says
+    base: Scene  # the scene with the sweep's own changes, before any axis
     design: Design
-    text: str
+    text: str  # the TOML text it was read from
     path: Path
 
     @property
@@ -179,7 +171,6 @@ class Sweep:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """The unit of every axis' key."""
         return tuple(unit_of(parse_key(key)) for key in self.keys)
 
     @property
@@ -198,10 +189,8 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """The sweep in the TOML file `path`; a name such as sweeps/fig11-spread means a shipped one.
-
-    Raises InputError with all errors of the file, a line each.
-    """
+    """The sweep in the TOML file `path`; a name such as sweeps/fig11-spread means a shipped one. Raises InputError with
+    all errors of the file, a line each."""
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped
@@ -215,28 +204,9 @@ def load_sweep(path: Path) -> Sweep:
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
-    """A sweep made without a file.
-
-    Parameters
-    ----------
-    axes
-        By the key of a number of the scene: a list of values, or a table as an [[axis]] of a sweep file has it.
-    options
-        The other keys of a sweep file, such as samples, outputs, draws or validation.
-
-    Raises
-    ------
-    InputError
-        With a line for each error; line numbers are those of the sweep's `text`.
-
-    Examples
-    --------
-    >>> from rotor_mbs.scenario.catalogue import find_scenes
-    >>> scene = find_scenes(["paper/fig11"])[0]
-    >>> sweep = sweep_of(scene, {"bearing.stiffness": [0, 1e3], "gravity": {"uniform": [9, 10]}}, draws=5)
-    >>> sweep.design.count, sweep.units
-    (10, ('N m/rad', 'm/s^2'))
-    """
+    """A sweep made without a file. By key of a number of the scene, `axes` have a list of values or a table as an
+    [[axis]] has it; `options` are the other keys of a sweep file. Raises InputError; line numbers are those of the
+    sweep's `text`."""
     tables: dict[str, object] = {"title": scene.title, "scene": scene.name, **options}
     listed: list[dict[str, object]] = []
     for key, values in axes.items():
@@ -288,10 +258,7 @@ def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | No
 
 
 def _check_rows(sweep: Sweep) -> None:
-    """Validates the scenes of the ends of every axis, or of every row where that is needed.
-
-    Raises InputError with a line for each error.
-    """
+    """Validates the scenes of the ends of every axis, or of every row where that is needed; raises InputError."""
     problems: dict[str, None] = {}
     for i, variants, row in _rows_to_check(sweep):
         try:
@@ -308,10 +275,8 @@ def _check_rows(sweep: Sweep) -> None:
 
 
 def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, ...]]]:
-    """(axis, variants, a row for them): the ends of each axis, and all rows where numbers depend on one another.
-
-    That is enough to find every error: inertias and torque tables alone are validated as a whole.
-    """
+    """(axis, variants, a row for them): the ends of each axis, and all rows where numbers depend on one another, which
+    inertias and torque tables alone do."""
     tables = {**scene_tables(sweep.base), "outputs": list(sweep.outputs) or ["angles"]}
     for i, axis in enumerate(sweep.design.axes):
         alone = Variants(sweep.name, tables, [axis.key])

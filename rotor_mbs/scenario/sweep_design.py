@@ -1,14 +1,11 @@
-"""The rows of a sweep: lists, ranges and random draws, as a grid or zipped.
-
-A grid runs through its axes like the digits of a number, the last axis fastest; all random axes together are one
-digit, the draw. Every row follows from its number alone, so that any part of a sweep can be computed on any computer.
-"""
+"""The rows of a sweep: lists, ranges and random draws, as a grid (the last axis fastest; all random axes together are
+one digit, the draw) or zipped. Every row follows from its number alone, so that any part of a sweep can be computed on
+any computer."""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,17 +19,10 @@ DRAWN = ("uniform", "normal", "sobol")
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter.
-
-    kind     values, linear, log, uniform, normal or sobol
-    numbers  the values; start and end; low and high; or mean and standard deviation
-    count    how many values; of a random axis, how many draws
-    """
-
     key: str
-    kind: str
-    numbers: tuple[float, ...]
-    count: int
+    kind: str  # values, linear, log, uniform, normal or sobol
+    numbers: tuple[float, ...]  # the values; start and end; low and high; or mean and standard deviation
+    count: int  # how many values; of a random axis, how many draws
 
     @property
     def is_drawn(self) -> bool:
@@ -84,38 +74,33 @@ class Design:
 
     @functools.cached_property
     def values(self) -> list[Array]:
-        """(count,) of every axis."""
-        sobol = _sobol(self.axes, self.seed)
-        return [_values(axis, i, self.seed, sobol) for i, axis in enumerate(self.axes)]
+        sobol = [axis.key for axis in self.axes if axis.kind == "sobol"]
+        if sobol:
+            from scipy.stats import qmc  # late: 0.5 s
 
-
-def _values(axis: Axis, number: int, seed: int, sobol: dict[str, Array]) -> Array:
-    if axis.kind == "values":
-        return np.array(axis.numbers)
-    first, second = axis.numbers
-    if axis.kind == "linear":
-        return np.linspace(first, second, axis.count)
-    if axis.kind == "log":
-        return np.geomspace(first, second, axis.count)
-    if axis.kind == "sobol":
-        return first + (second - first) * sobol[axis.key]
-    generator = np.random.default_rng([seed, number])
-    if axis.kind == "uniform":
-        return generator.uniform(first, second, axis.count)
-    return generator.normal(first, second, axis.count)
-
-
-def _sobol(axes: Sequence[Axis], seed: int) -> dict[str, Array]:
-    """One scrambled sequence over all Sobol axes: points in the unit cube, by key."""
-    chosen = [axis for axis in axes if axis.kind == "sobol"]
-    if not chosen:
-        return {}
-    from scipy.stats import qmc  # late: 0.5 s
-
-    sampler = qmc.Sobol(len(chosen), seed=np.random.default_rng(seed))
-    # The balance of the sequence belongs to powers of two: its beginning is taken of the next one.
-    points = sampler.random_base2((chosen[0].count - 1).bit_length())[: chosen[0].count]
-    return {axis.key: points[:, i] for i, axis in enumerate(chosen)}
+            # One scrambled sequence over all Sobol axes: points in the unit cube. Its balance belongs to powers of two:
+            # its beginning is taken of the next one.
+            count = max(axis.count for axis in self.axes if axis.kind == "sobol")
+            sampler = qmc.Sobol(len(sobol), seed=np.random.default_rng(self.seed))
+            points = sampler.random_base2((count - 1).bit_length())[:count]
+        columns = []
+        for i, axis in enumerate(self.axes):
+            if axis.kind == "values":
+                columns.append(np.array(axis.numbers))
+                continue
+            first, second = axis.numbers
+            generator = np.random.default_rng([self.seed, i])
+            if axis.kind == "linear":
+                columns.append(np.linspace(first, second, axis.count))
+            elif axis.kind == "log":
+                columns.append(np.geomspace(first, second, axis.count))
+            elif axis.kind == "sobol":
+                columns.append(first + (second - first) * points[:, sobol.index(axis.key)])
+            elif axis.kind == "uniform":
+                columns.append(generator.uniform(first, second, axis.count))
+            else:
+                columns.append(generator.normal(first, second, axis.count))
+        return columns
 
 
 def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:

@@ -1,9 +1,5 @@
 """Loads over time as tables ((t, value), ...), t in s: linear between the rows, constant before the first and after the
-last; two rows with equal t are a jump; () where there is no such load.
-
-A step over a kink of a load loses its order: tables are cut into segments on which they are linear, and a run into the
-intervals that an engine integrates one by one.
-"""
+last; two rows with equal t are a jump. A step over a kink loses its order: a run is cut into intervals without."""
 
 from __future__ import annotations
 
@@ -34,11 +30,7 @@ MIN_ROWS, MAX_ROWS = 10, 100
 
 
 def value_at(table: Table, time: float) -> float:
-    """Value at `time` in s; at a jump, the value after it; 0 where there is no load.
-
-    >>> value_at(((0.0, 1.0), (2.0, 5.0), (2.0, 7.0)), 2.0)
-    7.0
-    """
+    """Value at `time` in s; at a jump, the value after it; 0 where there is no load."""
     following = bisect_right(table, time, key=itemgetter(0))
     if following in (0, len(table)):
         return table[max(following - 1, 0)][1] if table else 0.0
@@ -47,14 +39,12 @@ def value_at(table: Table, time: float) -> float:
 
 
 def values_at(table: Table, times: Array) -> Array:
-    """(n,) values at (n,) times in s, as of `value_at`."""
     import numpy as np
 
     return np.array([value_at(table, time) for time in times.tolist()])
 
 
 def is_constant(table: Table) -> bool:
-    """Whether the value never changes."""
     return len({value for _, value in table}) <= 1
 
 
@@ -64,7 +54,6 @@ def is_one_table(value: list[Any]) -> bool:
 
 
 def constant_value(table: Table) -> float:
-    """The value, where it never changes; else 0."""
     return value_at(table, 0.0) if is_constant(table) else 0.0
 
 
@@ -96,33 +85,28 @@ class Segment:
         return self.values[load] + self.slopes[load] * (time - self.start)
 
     def loads_at(self, time: float) -> list[float]:
-        """All loads at one time in s."""
         return [self.at(load, time) for load in range(len(self.lines))]
 
 
 def segments(tables: Sequence[Table], duration: float) -> tuple[Segment, ...]:
     """The whole duration (s), cut where a table has a kink or a jump; one segment where all are constant."""
     cuts = [0.0, *knots(tables, duration), duration]
-    lines = [_lines(table, cuts) for table in tables]
-    return tuple(
-        Segment(start, end, tuple(of_table[i] for of_table in lines))
-        for i, (start, end) in enumerate(itertools.pairwise(cuts))
-    )
-
-
-def _lines(table: Table, cuts: Sequence[float]) -> list[tuple[Fraction, Fraction]]:
-    """Offset and slope between every two cuts, where the table has no kink in between."""
-    if is_constant(table):
-        return [(Fraction(table[0][1] if table else 0), Fraction(0))] * (len(cuts) - 1)
-    times = [time for time, _ in table]
-    lines = []
-    for start, end in itertools.pairwise(cuts):
-        before = table[max(bisect_right(times, start) - 1, 0)]
-        after = table[min(bisect_left(times, end), len(table) - 1)]
-        (t0, value0), (t1, value1) = (map(Fraction, row) for row in (before, after))
-        slope = (value1 - value0) / (t1 - t0) if t1 > t0 and value1 != value0 else Fraction(0)
-        lines.append((value0 - slope * t0, slope))
-    return lines
+    parts = list(itertools.pairwise(cuts))
+    lines = []  # offset and slope between every two cuts, of each table
+    for table in tables:
+        if is_constant(table):
+            lines.append([(Fraction(table[0][1] if table else 0), Fraction(0))] * len(parts))
+            continue
+        times = [time for time, _ in table]
+        of_table = []
+        for start, end in parts:
+            before = table[max(bisect_right(times, start) - 1, 0)]
+            after = table[min(bisect_left(times, end), len(table) - 1)]
+            (t0, value0), (t1, value1) = (map(Fraction, row) for row in (before, after))
+            slope = (value1 - value0) / (t1 - t0) if t1 > t0 and value1 != value0 else Fraction(0)
+            of_table.append((value0 - slope * t0, slope))
+        lines.append(of_table)
+    return tuple(Segment(*part, tuple(of_table[i] for of_table in lines)) for i, part in enumerate(parts))
 
 
 def values_before(parts: Sequence[Segment], times: Array) -> Array:
@@ -137,16 +121,12 @@ def values_before(parts: Sequence[Segment], times: Array) -> Array:
 
 @dataclass(frozen=True)
 class Interval:
-    """From one stop of an engine to the next, s, within one segment.
-
-    sample_intervals   how many intervals between samples it covers; 1 where it is a part of one
-    ends_at_sample     whether a sample is at its end
-    """
+    """From one stop of an engine to the next, s, within one segment."""
 
     start: float
     end: float
-    sample_intervals: int
-    ends_at_sample: bool
+    sample_intervals: int  # how many intervals between samples it covers; 1 where it is a part of one
+    ends_at_sample: bool  # whether a sample is at its end
     segment: Segment
 
 

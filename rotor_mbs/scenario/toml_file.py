@@ -1,7 +1,4 @@
-"""TOML text: read from a file with limits, written, and the line on which each key stands.
-
-Every error is a line of an InputError: `file:line: key: what is wrong; allowed: ...`.
-"""
+"""TOML text: read from a file with limits, written, and the line on which each key stands."""
 
 from __future__ import annotations
 
@@ -39,18 +36,12 @@ _TOKEN = re.compile(
 
 
 class KeyProblem(NamedTuple):
-    """One error of the tables of a file.
+    """One error of the tables of a file."""
 
-    path        where it is, in the tables as they were read
-    wrong       what is wrong
-    allowed     what is allowed; "" for what the key allows
-    is_of_key   whether it is the key that is wrong, whatever the value is
-    """
-
-    path: KeyPath
-    wrong: str
-    allowed: str = ""
-    is_of_key: bool = False
+    path: KeyPath  # where it is, in the tables as they were read
+    wrong: str  # what is wrong
+    allowed: str = ""  # what is allowed; "" for what the key allows
+    is_of_key: bool = False  # whether it is the key that is wrong, whatever the value is
 
     @property
     def message(self) -> str:
@@ -83,24 +74,21 @@ class TableError(ValueError):
 
 
 def shown_path(path: Path) -> str:
-    """The path as it can stand in a one-line message."""
     text = str(path)
     return text if text.isprintable() else ascii(text)
 
 
 def shown_key(path: KeyPath) -> str:
-    """The path as `Scene.replace` and sweeps take it, entries counted from 0; odd names in quotes.
-
-    >>> shown_key(("blade", 1, "centre_of_mass", 2))
-    'blade[1].centre_of_mass[2]'
-    """
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{_shown_name(part)}" for part in path)[1:]
-
-
-def _shown_name(name: str) -> str:
-    if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
-        return name
-    return json.dumps(name if len(name) <= 60 else name[:57] + "...")
+    """The path as `Scene.replace` and sweeps take it, entries counted from 0: blade[1].mass; odd names in quotes."""
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        elif re.fullmatch(r"[A-Za-z0-9_-]{1,60}", part):
+            text += f".{part}"
+        else:
+            text += "." + json.dumps(part if len(part) <= 60 else part[:57] + "...")
+    return text[1:]
 
 
 def parse_key(text: str) -> KeyPath:
@@ -115,46 +103,6 @@ _TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
     """The text of the file and its tables. Raises InputError with one line."""
-    text = _read_text(path)
-    return text, parse_toml(text, shown_path(path))
-
-
-def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """The tables in a text. Raises InputError with one line that begins with `source`."""
-    too_long = _LONG_KEY.search(text)
-    if too_long:
-        line = text.count("\n", 0, too_long.start()) + 1
-        raise InputError(f"{source}:{line}: key of over {_MAX_KEY_PARTS} parts; allowed: at most that")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}:{_syntax_error(str(error), text)}; {_TOML_ALLOWED}") from error
-    except RecursionError as error:
-        raise InputError(f"{source}:1: nested too deep; allowed: tables and arrays of a scene") from error
-    except ValueError as error:
-        # The reader does not convert this one to its own error: whole numbers of more digits than Python converts.
-        raise InputError(f"{source}:1: a number is too long; allowed: |x| <= 1e300") from error
-
-
-def toml_value(value: object) -> str:
-    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables.
-
-    >>> toml_value({"start": 0.1, "names": ["a"], "log": True})
-    '{"start" = 0.1, "names" = ["a"], "log" = true}'
-    """
-    if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(toml_value(entry) for entry in value)}]"
-    return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
-
-
-def toml_lines(table: Mapping[str, object]) -> str:
-    """A line `key = value` for each entry."""
-    return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
-
-
-def _read_text(path: Path) -> str:
     shown = shown_path(path)
     try:
         if path.exists() and not path.is_file():  # a pipe or a device would block, or never end
@@ -177,7 +125,37 @@ def _read_text(path: Path) -> str:
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise InputError(f"{shown}:{line}: contains a NUL byte; allowed: TOML text in UTF-8")
-    return text
+    return text, parse_toml(text, shown)
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The tables in a text. Raises InputError with one line that begins with `source`."""
+    too_long = _LONG_KEY.search(text)
+    if too_long:
+        line = text.count("\n", 0, too_long.start()) + 1
+        raise InputError(f"{source}:{line}: key of over {_MAX_KEY_PARTS} parts; allowed: at most that")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}:{_syntax_error(str(error), text)}; {_TOML_ALLOWED}") from error
+    except RecursionError as error:
+        raise InputError(f"{source}:1: nested too deep; allowed: tables and arrays of a scene") from error
+    except ValueError as error:
+        # The reader does not convert this one to its own error: whole numbers of more digits than Python converts.
+        raise InputError(f"{source}:1: a number is too long; allowed: |x| <= 1e300") from error
+
+
+def toml_value(value: object) -> str:
+    """The value in TOML: text, numbers bit for bit, lists, and mappings as inline tables."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{json.dumps(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml_value(entry) for entry in value)}]"
+    return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+
+
+def toml_lines(table: Mapping[str, object]) -> str:
+    return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
 def _syntax_error(message: str, text: str) -> str:
@@ -193,11 +171,8 @@ def _syntax_error(message: str, text: str) -> str:
 
 
 def find_lines(text: str) -> dict[KeyPath, int]:
-    """Line number, counted from 1, of every key and array entry of a text that is valid TOML.
-
-    ("blade", 1, "mass") is in the second [[blade]] table. Left out are the keys of inline tables, which TOML has on one
-    line. In a text that is not TOML some lines are missing or wrong.
-    """
+    """Line number, from 1, of every key and array entry of a text that is valid TOML, but for the keys of inline
+    tables; ("blade", 1, "mass") is in the second [[blade]] table. Without valid TOML some are missing or wrong."""
     lines: dict[KeyPath, int] = {}
     table_counts: dict[KeyPath, int] = {}  # of every array of tables
     table: KeyPath = ()
@@ -240,7 +215,6 @@ def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
 
 
 def _number_entries(path: KeyPath, value: Sequence[tuple[str, int]], lines: dict[KeyPath, int]) -> None:
-    """Notes the line of each entry of an array, and of the arrays inside it."""
     numbers: list[int] = []
     for token, line in value:
         if token in "]}":

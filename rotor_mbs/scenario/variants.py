@@ -18,10 +18,8 @@ MAX_ROTORS = 512
 
 
 class Variants:
-    """The scenes of a sweep: `tables` of the base, with a number put in at each of `keys`.
-
-    Most sweeps vary the initial state of few rotors: a scene is read for each rotor, then initial states are put in.
-    """
+    """The scenes of a sweep: `tables` of the base, with a number put in at each of `keys`. A scene is read for each
+    rotor, of which most sweeps have few, then initial states are put in."""
 
     def __init__(self, name: str, tables: dict[str, Any], keys: Sequence[str]) -> None:
         self.keys = tuple(keys)
@@ -35,7 +33,6 @@ class Variants:
         return self.__dict__ | {"_rotors": self._rotors if all(map(_is_of_start, self._paths)) else {}}
 
     def scene(self, values: Sequence[float]) -> Scene:
-        """The scene with `values`, one per key, in place. Raises TableError."""
         pairs = list(zip(self._paths, values, strict=True))
         rotor_numbers = tuple(value for path, value in pairs if not _is_of_start(path))
         if rotor_numbers not in self._rotors:

@@ -1,8 +1,6 @@
-"""Balances of momentum, from a run's own samples: independent of its equations of motion and of its energies.
-
-About the shaft: L(t) - L(0) = ∫ (torque + moment of the weights - damping) dt, from angles and rates alone. In space:
-p(t) - p(0) = ∫ (force of the shaft's bearing + weights) dt, where the run has that force.
-"""
+"""Balances of momentum, from a run's own samples, independent of its equations of motion and energies: about the shaft
+L(t) - L(0) = ∫ (torque + moment of the weights - damping) dt; in space p(t) - p(0) = ∫ (force of the bearing + weights)
+dt."""
 
 from __future__ import annotations
 
@@ -25,16 +23,8 @@ _MAX_TURN_PER_SAMPLE = 1.0
 
 
 class Balance(NamedTuple):
-    """Residual of a balance of momentum.
-
-    Attributes
-    ----------
-    error : (n,) kg m²/s or kg m/s, beyond what the samples leave open
-    scale : what it is relative to
-    """
-
-    error: Array
-    scale: float
+    error: Array  # (n,) kg m²/s or kg m/s, beyond what the samples leave open
+    scale: float  # what it is relative to
 
     @property
     def largest(self) -> float:
@@ -44,9 +34,7 @@ class Balance(NamedTuple):
 
 def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
     """About the shaft, relative to the largest momentum, the torque's impulse, and what the weights give in a fall.
-
-    Returns None where the samples do not resolve the motion, or are too few to show what they leave open.
-    """
+    None where the samples do not resolve the motion, or are too few to show what they leave open."""
     if len(run.time) < max(_POINTS_WITH_SLOPES) or not _is_resolved(scene, run):
         return None
     angles, rates, step = run.angles, run.rates, run.time[1]
@@ -63,19 +51,16 @@ def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
 
 
 def linear_balance(scene: Scene, run: Trajectory) -> Balance | None:
-    """In space, relative to the largest momentum and what the weights give in a fall.
-
-    Returns None where the run has no force of the bearing, where a load has a kink (the force jumps there), or where
-    the samples do not resolve the motion or the oscillations of a stiff bearing, or are too few to show what they leave
-    open.
-    """
+    """In space, relative to the largest momentum and what the weights give in a fall. None where the run has no force
+    of the bearing, where a load has a kink (the force jumps there), or as for `angular_balance`, oscillations of a
+    stiff bearing among the motion."""
     force = run.get("shaft_force")
-    if (
-        force is None
-        or len(run.time) < max(_POINTS_WITHOUT_SLOPES)
-        or knots(scene.load_tables, scene.duration)
-        or not _is_resolved(scene, run, _fastest_bearing(scene))
-    ):
+    if force is None or len(run.time) < max(_POINTS_WITHOUT_SLOPES) or knots(scene.load_tables, scene.duration):
+        return None
+    # rad/s: the largest natural frequency of a blade on the spring of its bearing.
+    on_springs = [(scene.bearing(i)[0], blade) for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
+    frequencies = [np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2]) for stiffness, blade in on_springs]
+    if not _is_resolved(scene, run, max(frequencies, default=0.0)):
         return None
     momentum, mass = np.zeros(force.shape), sum(blade.mass for blade in scene.blades)
     for i, blade in enumerate(scene.blades):
@@ -92,12 +77,6 @@ def _is_resolved(scene: Scene, run: Trajectory, frequency: float = 0.0) -> bool:
     """Whether little happens from sample to sample: at the run's rates, and at a frequency in rad/s."""
     step = scene.duration / (scene.samples - 1)
     return len(run.time) > 1 and bool(max(np.abs(run.rates).max(), frequency) * step < _MAX_TURN_PER_SAMPLE)
-
-
-def _fastest_bearing(scene: Scene) -> float:
-    """rad/s: the largest natural frequency of a blade on the spring of its bearing."""
-    blades = [(scene.bearing(i)[0], blade) for i, blade in enumerate(scene.blades) if blade.has_pitch_inertia]
-    return max((np.sqrt(stiffness / _inertia_about_hub(blade)[2, 2]) for stiffness, blade in blades), default=0.0)
 
 
 def _beyond(residual: Array, uncertainty: Array) -> Array:
@@ -120,11 +99,8 @@ def _torque_impulse(scene: Scene, times: Array) -> Array:
 
 
 def angular_momentum(scene: Scene, angles: Array, rates: Array) -> Array:
-    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s; constant where neither gravity nor torque acts.
-
-    Summed over hub and blades as L = J_hub Ω + Σ e·(J ω), e the shaft's direction and ω the blade's angular velocity,
-    both in the blade's own frame.
-    """
+    """(n,) kg m²/s about the shaft, from (n, 1 + blades) rad and rad/s: L = J_hub Ω + Σ e·(J ω), e the shaft's
+    direction and ω the blade's angular velocity, both in the blade's own frame."""
     spin = rates[:, 0]
     total = scene.hub_inertia * spin
     for i, blade in enumerate(scene.blades):
@@ -157,10 +133,8 @@ def _centre(scene: Scene, angles: Array, rates: Array, blade: int) -> tuple[Arra
 
 @functools.cache
 def _interval_weights(points: int, interval: int, *, with_slopes: bool) -> tuple[Array, Array]:
-    """Weights of values and slopes at the nodes 0 ... points - 1 in the integral from `interval` to the next node.
-
-    Of the polynomial through all values (and slopes), integrated exactly by Gauss's points.
-    """
+    """Weights of values and slopes at the nodes 0 ... points - 1 in the integral from `interval` to the next node, of
+    the polynomial through all of them; exact by Gauss's points."""
     nodes = np.arange(points, dtype=float)
     abscissae, gauss = np.polynomial.legendre.leggauss(points)
     at, gauss = interval + 0.5 + 0.5 * abscissae, 0.5 * gauss

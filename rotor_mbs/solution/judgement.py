@@ -1,12 +1,6 @@
-"""The one judgement of a run, from its samples: runs, bench, check and report use it.
-
-The bounds are those of reference/accuracy.toml, which `check` reads, too, and those that a quantity brings: a status
-and a verdict cannot follow from different numbers.
-
-An engine's report can only lower a status: a run that it calls failed is never ok, a run that it calls good is examined
-all the same. The printed equations are not judged against the reference or by their energy: that they depart from them
-is the finding.
-"""
+"""The one judgement of a run, from its samples, by the bounds that `check` reads, too. An engine's report can only
+lower a status. The printed equations are not judged against the reference or by their energy: that they depart from
+them is the finding."""
 
 from __future__ import annotations
 
@@ -51,33 +45,17 @@ _CLEAR_SHARE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a run is judged to be.
-
-    Attributes
-    ----------
-    status : one of `status.STATUSES`.
-    message : one line; "" for ok.
-    false_success : the engine reported success of a run that is wrong.
-    metrics : see `metrics.metrics_of`.
-    """
-
-    status: str
-    message: str
-    false_success: bool
-    metrics: Metrics
+    status: str  # one of `status.STATUSES`
+    message: str  # one line; "" for ok
+    false_success: bool  # the engine reported success of a run that is wrong
+    metrics: Metrics  # see `metrics.metrics_of`
 
 
 @functools.cache
 def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> tuple[float, float] | None:
-    """The bounds on "model/integrator", `own` first; None for methods that have none (the printed equations).
-
-    Returns
-    -------
-    angle : relative error (of the rotor's way from its start, of the largest pitch, each at least 1 rad) per unit of
-        error growth: the scene's own growth, which is not the method's fault, carries every local error on (samples
-        before the horizon)
-    energy : of the scene's energy scale, over the whole run; see `energy_conditioning`
-    """
+    """(angle, energy) bounds on "model/integrator", `own` first; None for methods that have none (the printed
+    equations). Angle: relative error (of the rotor's way, of the largest pitch, each at least 1 rad) per unit of error
+    growth, up to the horizon; energy: of the scene's energy scale, over the whole run, see `energy_conditioning`."""
     bounds = shipped_bounds().with_entries(own)
     angle, energy = (bounds.find(check, method) for check in ("agreement", "energy"))
     if angle is None or energy is None:
@@ -86,7 +64,6 @@ def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> tuple[float, float] 
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
-    """The bound on a quantity's number for a method; None where the number is not judged."""
     entry = bounds.find(rule.check, method) if rule.check else None
     return entry.value if entry else rule.bound
 
@@ -115,18 +92,8 @@ def clearly_ok(
     angles: Array,
     own: tuple[Bound, ...] = (),
 ) -> NDArray[np.bool_]:
-    """Whether `judge`, without a reference, is certain to call each run ok; of a method without bounds it is not.
-
-    Parameters
-    ----------
-    scenes, integrations, samples : of each of k runs of one `method`
-    drifts, angles : (k,) energy error of its scale, and the largest angle in rad, of each run
-    own : bounds that the method brings
-
-    Returns
-    -------
-    ndarray of bool, shape (k,)
-    """
+    """(k,) whether `judge`, without a reference, is certain to call each of k runs of a method ok; of a method without
+    bounds it is not. From energy errors `drifts` (of their scale) and the largest `angles` (rad) of each."""
     allowed = allowed_of(method, own)
     complete = np.array([run.success and n == scenes[0].samples for run, n in zip(integrations, samples, strict=True)])
     complete &= angles <= ANGLE_LIMIT
@@ -137,11 +104,8 @@ def clearly_ok(
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
-    """Whether a claim of success may stand: the end reached, and off by no more than a coarse step is.
-
-    An inaccurate run is no false success as long as it resembles the motion; a wrong one is. Against an unchecked
-    run's claim nothing is known.
-    """
+    """Whether a claim of success may stand: an inaccurate run that resembles the motion is no false success; against an
+    unchecked run's claim nothing is known."""
     if status != "inaccurate":
         return status in ("ok", "unchecked")
     errors = [metrics[name] for name in _CHECKS if name in metrics]
@@ -230,11 +194,8 @@ def energy_slack(scene: Scene, run: Trajectory) -> float:
 
 
 def energy_conditioning(scene: Scene, run: Trajectory) -> float:
-    """By how much the energy magnifies round-off of the state, beyond the ordinary; at least 1.
-
-    Near a pitch of π/2 the rates grow like 1/√share while the energy stays: the terms that sum up to it are 1/√share
-    times larger than it. A pitch that moves less than a right angle between samples is examined between them, too.
-    """
+    """By how much the energy magnifies round-off of the state, at least 1: near a pitch of π/2 its terms are 1/√share
+    larger than it. A pitch that moves less than a right angle between samples is examined between them, too."""
     steps = np.abs(np.diff(run.angles[:, 1:], axis=0)).max(initial=0.0)
     shares = rotor_inertia_shares(scene, run.angles)
     if steps < 0.5 * np.pi:
@@ -259,11 +220,8 @@ def _shares_at_quarter_turns(scene: Scene, angles: Array) -> Array:
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
-    """Smallest S / (rotor inertia) at the last sample and on the straight way on to the next one.
-
-    S = J_hub + Σ (a - b²/Jzz) is the Schur complement of the mass matrix: with every pitch free to give way, the
-    rotor's remaining inertia. For point-mass blades it is m (c² + d²) cos²θ.
-    """
+    """Smallest S / (rotor inertia) at the last sample and on the straight way on to the next one. S = J_hub + Σ (a -
+    b²/Jzz) is the rotor's inertia with every pitch free to give way: m (c² + d²) cos²θ for point masses."""
     if not len(run.time):
         angles = np.array([scene.initial_angles])
     else:
@@ -286,10 +244,8 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
 
 @functools.lru_cache(maxsize=512)
 def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]]:
-    """Coefficients of s², c², s c (s, c of the pitch) in S and in the inertia about the shaft (pitches fixed), kg m².
-
-    In exact arithmetic until the end: for a point mass the first vanishes, whose rounding is not inertia.
-    """
+    """Coefficients of s², c², s c (of the pitch) in S and in the inertia about the shaft, kg m²; in exact arithmetic
+    until the end: for a point mass the first vanishes, whose rounding is not inertia."""
     m = Fraction(blade.mass)
     x, y, z = map(Fraction, blade.centre_of_mass)
     xx, yy, zz, xy, xz, yz = map(Fraction, blade.inertia)

@@ -12,18 +12,11 @@ from rotor_mbs.solution.trajectory import Array
 
 @dataclass(frozen=True)
 class Linearization:
-    """δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided out.
+    """δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided out."""
 
-    Attributes
-    ----------
-    stiffness : (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
-    damping : (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
-    residual : (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not known
-    """
-
-    stiffness: Array
-    damping: Array
-    residual: Array
+    stiffness: Array  # (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
+    damping: Array  # (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
+    residual: Array  # (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not known
 
 
 def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
@@ -38,14 +31,8 @@ def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque
 
 
 def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
-    """Difference quotients with the steps h, 2h, 4h, ... extrapolated to a step of 0 (Richardson).
-
-    Parameters
-    ----------
-    quotients : arrays of the same shape, from the shortest step to the longest
-    ratio : by which a doubled step enlarges the first term of the error, and each further term once more: 2 for
-        one-sided quotients, 4 for central ones
-    """
+    """Difference quotients with the steps h, 2h, 4h, ... extrapolated to a step of 0 (Richardson); ratio: by which a
+    doubled step enlarges each further term of the error, 2 for one-sided quotients, 4 for central ones."""
     values = list(quotients)
     for power in range(1, len(values)):
         pairs = itertools.pairwise(values)

@@ -1,8 +1,4 @@
-"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks.
-
-Angles and energies have rules of their own here; every other quantity is measured as its declaration says. Bounds are
-in `judgement`.
-"""
+"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports and checks."""
 
 from __future__ import annotations
 
@@ -56,10 +52,7 @@ def angle_error(run: Trajectory, reference: Trajectory) -> Array:
 
 
 def energy_scale(scene: Scene, run: Trajectory) -> float:
-    """J: what an energy error is relative to: the weights at their arms, the energy at the start, the work done.
-
-    Σ m g |r| + kinetic energy and spring energy at the start + largest |work|. Zero only where nothing moves.
-    """
+    """J: Σ m g |r| + kinetic and spring energy at the start + largest |work|; zero only where nothing moves."""
     weights = sum(blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass)) for blade in scene.blades)
     springs = sum(
         0.5 * stiffness * float(np.square(angle - value_at(scene.pitch_load(i)[1], 0.0)))
@@ -89,28 +82,23 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
         for name, balance in balances.items():
             if balance is not None:
                 metrics[f"{name}_impulse_error_max"] = balance.largest
-    return metrics | _rotor_extremes(run) | _quantity_metrics(scene, run, reference) | _peaks(scene, run)
-
-
-def _rotor_extremes(run: Trajectory) -> Metrics:
-    """Smallest and largest rotor angle (rad) and largest rotor speed (rad/s).
-
-    Over the integrator's own output points where the run has them, else over its samples.
-    """
+    # Of the rotor over the integrator's own output points, where the run has them.
     refined_angles, refined_rates = run.get("refined_angles"), run.get("refined_rates")
     angles = run.angles if refined_angles is None else refined_angles
     rates = run.rates if refined_rates is None else refined_rates
-    return {
-        "rotor_angle_min": float(angles[:, 0].min()),
-        "rotor_angle_max": float(angles[:, 0].max()),
-        "rotor_rate_max": float(np.abs(rates[:, 0]).max()),
-    }
-
-
-def _quantity_metrics(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
-    """The metric of every quantity that is judged by a rule of its declaration."""
-    metrics: Metrics = {}
+    metrics["rotor_angle_min"] = float(angles[:, 0].min())
+    metrics["rotor_angle_max"] = float(angles[:, 0].max())
+    metrics["rotor_rate_max"] = float(np.abs(rates[:, 0]).max())
+    peaks: Metrics = {}  # of a quantity: its largest size, the time of it in s, and the blade, from 1
     for quantity in known_quantities(scene.outputs):
+        values = array_of(quantity, scene, run) if quantity.has_peak else None
+        if values is not None:
+            lengths = sizes(quantity, values)
+            peak = np.unravel_index(int(lengths.argmax()), lengths.shape)
+            peaks[f"{quantity.name}_max"] = float(lengths[peak])
+            peaks[f"{quantity.name}_max_time_s"] = float(run.time[peak[0]])
+            if quantity.dimensions[1:2] == ("blade",):
+                peaks[f"{quantity.name}_max_blade"] = float(peak[1] + 1)
         rule, errors = quantity.judgement, deviation(quantity, scene, run, reference)
         if rule is None or errors is None:
             continue
@@ -124,23 +112,7 @@ def _quantity_metrics(scene: Scene, run: Trajectory, reference: Trajectory | Non
                 errors = errors / (scale * carried[: len(errors)])
         if len(errors):
             metrics[rule.metric] = float(errors.max())
-    return metrics
-
-
-def _peaks(scene: Scene, run: Trajectory) -> Metrics:
-    """The largest size of each quantity that has one among its metrics, its time in s, and its blade, from 1."""
-    metrics: Metrics = {}
-    for quantity in known_quantities(scene.outputs):
-        values = array_of(quantity, scene, run) if quantity.has_peak else None
-        if values is None:
-            continue
-        lengths = sizes(quantity, values)
-        peak = np.unravel_index(int(lengths.argmax()), lengths.shape)
-        metrics[f"{quantity.name}_max"] = float(lengths[peak])
-        metrics[f"{quantity.name}_max_time_s"] = float(run.time[peak[0]])
-        if quantity.dimensions[1:2] == ("blade",):
-            metrics[f"{quantity.name}_max_blade"] = float(peak[1] + 1)
-    return metrics
+    return metrics | peaks
 
 
 def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
@@ -150,23 +122,31 @@ def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
     metrics = {"horizon_s": horizon(reference)}
     if until > 1:
         metrics["angle_error_max"] = float(error[:until].max())
-        metrics["angle_error_per_growth"] = float(_relative_error(run, reference)[:until].max())
+        # The larger of the rotor's and the pitches' angle errors, each of what an error of 1 at the start would have
+        # become: the growth times how far the rotor has turned from its start, or the largest pitch (at least 1).
+        n = len(error)
+        errors = np.abs(run.angles[:n] - reference.angles[:n])
+        rotor, pitch = (size[:n] for size in _motion_sizes(reference))
+        relative = np.maximum(errors[:, 0] / rotor, errors[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
+        metrics["angle_error_per_growth"] = float(relative[:until].max())
     if len(error) > 1:
         metrics["angle_error_whole"] = float(error.max())
         if len(run.time) == len(reference.time):
             metrics["angle_error_end"] = float(error[-1])
-    return metrics | _invariant_set(run, reference)
-
-
-def _relative_error(run: Trajectory, reference: Trajectory) -> Array:
-    """(common samples,) Larger of the rotor's and the pitches' angle errors, each of what an error of 1 at the start
-    would have become: the growth times how far the rotor has turned from its start, or the largest pitch (at least 1).
-    """
-    n = min(len(run.time), len(reference.time))
-    error = np.abs(run.angles[:n] - reference.angles[:n])
-    rotor, pitch = (size[:n] for size in _motion_sizes(reference))
-    relative: Array = np.maximum(error[:, 0] / rotor, error[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
-    return relative
+    # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and how fast they left.
+    zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
+    if zero:
+        away = np.abs(run.angles[:, zero]).max(axis=1)
+        metrics["zero_pitch_max"] = float(away.max())
+        if (away > _LEFT_ZERO).any():
+            metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > _LEFT_ZERO))])
+            large = away >= _LINEAR_TO
+            until = int(np.argmax(large)) if large.any() else len(away)
+            linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < until)
+            if linear.sum() >= 10:
+                slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
+                metrics["zero_pitch_growth_per_s"] = float(slope)
+    return metrics
 
 
 def _motion_sizes(reference: Trajectory) -> tuple[Array, Array]:
@@ -174,24 +154,6 @@ def _motion_sizes(reference: Trajectory) -> tuple[Array, Array]:
     turned = np.abs(reference.angles[:, 0] - reference.angles[0, 0])
     pitch = np.abs(reference.angles[:, 1:]).max(axis=1)
     return np.maximum(np.maximum.accumulate(turned), 1.0), np.maximum(np.maximum.accumulate(pitch), 1.0)
-
-
-def _invariant_set(run: Trajectory, reference: Trajectory) -> Metrics:
-    """Whether pitches that are exactly zero in the reference stayed so, and if not, when and how fast they left."""
-    zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
-    if not zero:
-        return {}
-    away = np.abs(run.angles[:, zero]).max(axis=1)
-    metrics = {"zero_pitch_max": float(away.max())}
-    if (away > _LEFT_ZERO).any():
-        metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > _LEFT_ZERO))])
-        large = away >= _LINEAR_TO
-        until = int(np.argmax(large)) if large.any() else len(away)
-        linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < until)
-        if linear.sum() >= 10:
-            slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
-            metrics["zero_pitch_growth_per_s"] = float(slope)
-    return metrics
 
 
 def largest(values: Array) -> Array:
@@ -204,17 +166,8 @@ def largest(values: Array) -> Array:
 
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
-    """Return the largest energy error of each of k runs, of its scale (J where that is zero).
-
-    Parameters
-    ----------
-    scenes : of each run
-    kinetic, work, errors : (k, n) J, over the samples; NaN samples do not count
-
-    Returns
-    -------
-    ndarray, shape (k,)
-    """
+    """(k,) the largest energy error of each of k runs, of its scale (J where that is zero); from (k, n) J over the
+    samples, NaN samples not counted."""
     nothing = np.zeros((1, 1))
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])

@@ -1,8 +1,5 @@
 """The output quantities of a run, each declared once: dimensions, units, who computes it, how it is judged and drawn.
-
-What stores, reads, compares or draws samples loops over these declarations. Further quantities come from packages that
-have an entry point in the group `rotor_mbs.quantities`.
-"""
+Further ones come from packages that have an entry point in the group `rotor_mbs.quantities`."""
 
 from __future__ import annotations
 
@@ -38,31 +35,22 @@ class QuantityMetric:
     """How a run's array becomes one number that is stored with the run, and the largest value that passes.
 
     The number is the largest size over all samples (with the last dimension `axis`: of the vectors).
-
-    Attributes
-    ----------
-    metric : name of the number among the run's metrics.
-    with_reference : the size is that of the difference from the reference's array, up to the horizon.
-    relative_to : from the scene to what the number is divided by before it is judged; None for 1.
-    per_growth_of : from (scene, reference, number of samples up to the horizon) to a scale; the number is then the
-        error of each sample divided by it and by the error growth up to there, which is not the method's fault.
-    check : name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here.
-    bound : largest value that passes where no check has one; None where the number is not judged.
-    channel, unit : what the judged number is called in a verdict, and its unit in words.
-    fault : sentence for a number that does not pass, with the field {value}.
-    look_at : where a failure would come from.
     """
 
-    metric: str
-    with_reference: bool = True
+    metric: str  # name of the number among the run's metrics
+    with_reference: bool = True  # the size is that of the difference from the reference's array, up to the horizon
+    # from the scene to what the number is divided by before it is judged; None for 1
     relative_to: Callable[[Scene], float] | None = None
+    # from (scene, reference, number of samples up to the horizon) to a scale; the number is then the error of each
+    # sample divided by it and by the error growth up to there, which is not the method's fault
     per_growth_of: Callable[[Scene, Samples, int], float] | None = None
+    # name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here
     check: str = ""
-    bound: float | None = None
-    channel: str = ""
+    bound: float | None = None  # largest value that passes where no check has one; None where the number is not judged
+    channel: str = ""  # what the judged number is called in a verdict, and its unit in words
     unit: str = ""
-    fault: str = ""
-    look_at: str = ""
+    fault: str = ""  # sentence for a number that does not pass, with the field {value}
+    look_at: str = ""  # where a failure would come from
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,19 +66,6 @@ class Plot:
 class Quantity:
     """An array that a run may have.
 
-    Attributes
-    ----------
-    name : name of the dataset, and of the attribute of a solution.
-    dimensions : names of its axes, see `SCALES`; the first is `time` but for an integrator's own output points.
-    units, long_name : as stored.
-    output : the entry of a scene's `outputs` that asks for it; "" where it is stored whenever the model has it.
-    producer : from (scene, samples) to the array, where one formula serves all methods; None where each model
-        computes it from its own state. Returns None where the samples lack what it needs.
-    required : whether every run has it whose scene asks for it; else some methods alone have it.
-    judgement : how a run's array is judged; None where it is not, or where `metrics` has a rule of its own for it.
-    plot : how it is drawn; None where it is not drawn by itself.
-    has_peak : whether its largest size, and the time of it, are among a run's metrics.
-
     Examples
     --------
     >>> angular_momentum = Quantity(
@@ -101,20 +76,24 @@ class Quantity:
     True
     """
 
-    name: str
+    name: str  # name of the dataset, and of the attribute of a solution
+    # names of its axes, see `SCALES`; the first is `time` but for an integrator's own output points
     dimensions: tuple[str, ...]
-    units: str
+    units: str  # as stored
     long_name: str
+    # the entry of a scene's `outputs` that asks for it; "" where it is stored whenever the model has it
     output: str = ""
+    # from (scene, samples) to the array, where one formula serves all methods; None where each model computes it from
+    # its own state. Returns None where the samples lack what it needs
     producer: Callable[[Scene, Samples], Array | None] | None = None
-    required: bool = True
+    required: bool = True  # whether every run has it whose scene asks for it; else some methods alone have it
+    # how a run's array is judged; None where it is not, or where `metrics` has a rule of its own for it
     judgement: QuantityMetric | None = None
-    plot: Plot | None = None
-    has_peak: bool = False
+    plot: Plot | None = None  # how it is drawn; None where it is not drawn by itself
+    has_peak: bool = False  # whether its largest size, and the time of it, are among a run's metrics
 
     @property
     def is_over_time(self) -> bool:
-        """Whether it has a value per sample."""
         return self.dimensions[:1] == ("time",)
 
 
@@ -134,7 +113,6 @@ SCALES = {
 
 
 def sample_times(scene: Scene) -> Array:
-    """(samples,) s, both ends included."""
     return np.linspace(0.0, scene.duration, scene.samples)
 
 
@@ -234,14 +212,8 @@ LOADS = (
 def named_loads(
     roots: Iterable[tuple[Array, Array]], shaft_force: Array, shaft_moment: Array, actuators: Array
 ) -> dict[str, Array]:
-    """The arrays of `LOADS` by name.
-
-    Parameters
-    ----------
-    roots : of each blade, (n, 3) force in N and (n, 3) moment in N m at its root, in its frame
-    shaft_force, shaft_moment : (n, 3) N and N m, in the base frame
-    actuators : (n, blades) N m
-    """
+    """The arrays of `LOADS` by name, from each blade's (n, 3) force (N) and moment (N m) at its root in its frame, the
+    shaft's in the base frame, and the (n, blades) moments of the actuators."""
     forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
     arrays = forces, moments, shaft_force, shaft_moment, actuators
     return {load.name: np.asarray(values, dtype=float) for load, values in zip(LOADS, arrays, strict=True)}
@@ -305,21 +277,14 @@ NAMES = frozenset({*(quantity.name for quantity in BUILT_IN), "refined_time"})
 
 
 def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
-    """The built-in quantities, and those that installed packages bring for `outputs`.
-
-    Raises
-    ------
-    InputError
-        Where an output is neither built in nor brought by an installed package.
-    """
+    """The built-in quantities, and those that installed packages bring for `outputs`. Raises InputError where an output
+    is neither."""
     return BUILT_IN + tuple(quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output))
 
 
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
-    """The quantities that a scene's `outputs` ask for, and those that are stored whenever a model has them.
-
-    Raises InputError as `known_quantities` does.
-    """
+    """Those that a scene's `outputs` ask for, and those that are stored whenever a model has them; raises
+    InputError."""
     asked = {"", *outputs}
     return tuple(quantity for quantity in known_quantities(asked) if quantity.output in asked)
 
@@ -363,10 +328,8 @@ def installed(output: str) -> tuple[Quantity, ...]:
 
 
 def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None:
-    """The run's array of a quantity: the model's own, or what the quantity's producer makes of the samples.
-
-    Returns None where the run does not have it. Raises InputError where a producer gives an array of another shape.
-    """
+    """The run's array: the model's own, or what the quantity's producer makes of the samples; None where there is none.
+    Raises InputError where a producer gives an array of another shape."""
     values = samples.get(quantity.name)
     if values is not None or quantity.producer is None:
         return values
@@ -381,7 +344,6 @@ def array_of(quantity: Quantity, scene: Scene, samples: Samples) -> Array | None
 
 
 def arrays(scene: Scene, samples: Samples) -> dict[str, Array]:
-    """All arrays of a run that its scene asks for, by name."""
     by_name = {quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)}
     return {name: values for name, values in by_name.items() if values is not None}
 
@@ -393,10 +355,8 @@ def sizes(quantity: Quantity, values: Array) -> Array:
 
 
 def deviation(quantity: Quantity, scene: Scene, run: Samples, reference: Samples | None) -> Array | None:
-    """(common samples,) Size of a quantity, or of its difference from the reference, largest over the other axes.
-
-    Returns None where the quantity is not judged, or where the run or the needed reference does not have it.
-    """
+    """(common samples,) size of a quantity, or of its difference from the reference, largest over the other axes; None
+    where it is not judged, or the run or the needed reference does not have it."""
     rule = quantity.judgement
     if rule is None:
         return None

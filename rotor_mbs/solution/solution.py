@@ -91,15 +91,8 @@ class Solution:
         raise AttributeError(name)
 
     def to_xarray(self) -> Any:
-        """The samples as an xarray.Dataset, with units, long names and labels.
-
-        Select by label: `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
-        """
+        """The samples as an xarray.Dataset with units, long names and labels: `data.angles.sel(coordinate="pitch 1")`,
+        `data.tip.sel(blade=1, axis="y")`. Raises InputError where xarray is not installed."""
         xarray = need_xarray()
         labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
@@ -140,7 +133,6 @@ class Solution:
         return "\n  ".join([*lines, *textwrap.wrap(metrics, 110)[:3]])
 
     def _repr_html_(self) -> str:
-        """For a notebook: a table of status and numbers."""
         rows = self._summary() | {name: f"{value:.3g}" for name, value in self.metrics.items()}
         cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table><caption>{escape(self.scene.title)}</caption>{cells}</table>"

@@ -1,15 +1,7 @@
-"""How a run ended: the one list of statuses for runs, bench points, step ladders and sweeps, and their integer codes.
-
-Arrays of statuses are stored as integers with the CF attributes `flag_values` and `flag_meanings`, and are read back by
-these attributes, so that the order of the list may differ between files.
-"""
+"""How a run ended: the one list of statuses, and their integer codes. Files have CF's `flag_values` and
+`flag_meanings`, so that the order of the list may differ between files."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # `rotor-mbs list` and every --help need no NumPy
-    pass
 
 # Those that a run's state can have ("unchecked": complete, with nothing to judge it by), a point of which no run was
 # made, and a run whose process died. Codes are places in this list: new ones go to its end.
@@ -21,5 +13,4 @@ COMPLETE = ("ok", "inaccurate", "unchecked")
 
 
 def code_of(status: str) -> int:
-    """The integer code of a status. Raises ValueError where there is no such status."""
     return STATUSES.index(status)

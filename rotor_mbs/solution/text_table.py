@@ -8,7 +8,6 @@ from html import escape
 
 
 def listed(texts: Sequence[str]) -> str:
-    """ "a, b and c"."""
     if len(texts) == 1:
         return texts[0]
     return f"{', '.join(texts[:-1])} and {texts[-1]}"

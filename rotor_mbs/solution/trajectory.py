@@ -15,24 +15,9 @@ from rotor_mbs.solution.quantities import sample_times as sample_times
 
 
 class Trajectory:
-    """Samples at equally spaced times, as far as the run got (n rows; every row finite).
-
-    Angles are unwrapped. A pitch without inertia stays at its initial value. Further quantities are in `quantities` by
-    name; the built-in ones are attributes, too, None where the scene does not ask for them or the model lacks them.
-
-    Attributes
-    ----------
-    time : (n,) s
-    angles, rates : (n, 1 + blades) rad, rad/s: rotor, then the pitch of each blade
-    quantities : the other arrays by name; dimensions and units are declared in `solution.quantities`
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> run = Trajectory(np.zeros(1), np.zeros((1, 4)), np.zeros((1, 4)), work=np.zeros(1))
-    >>> run.work, run.tip
-    (array([0.]), None)
-    """
+    """Samples at equally spaced times, as far as the run got (n rows; every row finite); angles are unwrapped.
+    Quantities beside angles and rates (n, 1 + blades) are in `quantities` by name; the built-in ones are attributes,
+    too, None where the scene does not ask for them or the model lacks them."""
 
     time: Array
     angles: Array
@@ -78,44 +63,26 @@ _FIELDS = ("time", "angles", "rates")
 
 @dataclass(slots=True)
 class Integration:
-    """One integration as the engine reports it: a claim, which `judgement` checks against the samples.
+    """One integration as the engine reports it: a claim, which `judgement` checks against the samples."""
 
-    Attributes
-    ----------
-    success : whether the engine says that it reached the end.
-    message : why it did not; "" where it did.
-    time_reached : s
-    steps, rhs_evaluations : how many; None where they are not counted.
-    out_of_time : it was ended by its time limit; what it reached is kept.
-    """
-
-    success: bool
-    message: str = ""
-    time_reached: float = 0.0
-    steps: int | None = None
+    success: bool  # whether the engine says that it reached the end
+    message: str = ""  # why it did not; "" where it did
+    time_reached: float = 0.0  # s
+    steps: int | None = None  # how many; None where they are not counted
     rhs_evaluations: int | None = None
-    out_of_time: bool = False
+    out_of_time: bool = False  # it was ended by its time limit; what it reached is kept
 
 
 @dataclass
 class RunBlock:
-    """Many runs at once, of scenes with the same number of blades and samples and the same outputs.
+    """Many runs at once, of scenes with the same number of blades and samples and the same outputs."""
 
-    Attributes
-    ----------
-    time : (runs, samples) s
-    quantities : by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
-    integrations : the engine's report of each run
-    samples : how many rows of each are finite
-    """
-
-    time: Array
-    quantities: dict[str, Array]
-    integrations: list[Integration]
-    samples: list[int]
+    time: Array  # (runs, samples) s
+    quantities: dict[str, Array]  # by name, what the scenes ask for: (runs, samples, ...), NaN after a run broke off
+    integrations: list[Integration]  # the engine's report of each run
+    samples: list[int]  # how many rows of each are finite
 
     def trajectory(self, i: int) -> Trajectory:
-        """Run i alone, cut where it broke off."""
         n = self.samples[i]
         return Trajectory(self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()})
 
@@ -138,7 +105,6 @@ def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, A
 
 
 def finite_rows(*tables: Array) -> int:
-    """How many rows from the first are finite in every table."""
     finite = np.all([np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0)
     return len(finite) if finite.all() else int(np.argmin(finite))
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from rotor_mbs.analysis.work_precision import SMALLEST_ERROR, fitted_order
 from rotor_mbs.errors import InputError
+from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
 from rotor_mbs.methods.catalogue import find_method, ladders, settings_for
-from rotor_mbs.methods.ladders import STEP, TOLERANCE, Ladder
 from rotor_mbs.runs import last_core
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
@@ -98,11 +98,12 @@ def replaced_points(output: Path, curves: Sequence[Curve]) -> list[tuple[str, st
     """(group, run) of stored points of these curves that are no longer among them."""
     if not output.exists():
         return []
-    stored = TableFile(output).tables.get(BENCH)
-    if stored is None:
+    file = TableFile(output)
+    if BENCH not in file.groups:
         return []
+    stored = file.table(BENCH)
     labels = {(curve.scene.name, curve.ladder.curve): [row["run"] for row in curve.rows] for curve in curves}
-    owners = zip(stored.runs, stored.known["scene"][1], stored.known["curve"][1], strict=True)
+    owners = zip(stored.runs, stored.known["scene"], stored.known["curve"], strict=True)
     return [(BENCH, run) for run, scene, name in owners if run not in labels.get((scene, name), [run])]
 
 

@@ -21,7 +21,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.run import OnProgress, ignore_progress, run_scenes
-from rotor_mbs.studies.stored_references import shipped_files
+from rotor_mbs.studies.stored_references import shipped_files, shipped_reference
 
 # The chain takes as long as all else together; four scenes of the paper cover what it can show.
 _CHAIN, _CHAIN_SCENES = "exudyn_chain/generalized_alpha", ("paper/fig03", "paper/fig04b", "paper/fig08", "paper/fig11")
@@ -32,7 +32,7 @@ _ROUNDING = 2.0**-50
 
 
 def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
-    """Return the scenes, and the methods by scene name, that are computed where no file is given.
+    """The scenes, and the methods by scene name, that are computed where no file is given.
 
     Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method.
     """
@@ -49,12 +49,7 @@ def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
     """Check what is stored, and whether every scene has a run of each required method.
 
-    Raises
-    ------
-    InputError
-        Where there is nothing to judge: no run of a method, as in a bench file or a file of references.
-    StoreError
-        Where the file cannot be read.
+    Raises InputError where there is no run of a method, as in a bench file or a file of references; StoreError.
     """
     checks = judge_file(path, bounds)
     if all(check.passed and check.where.method == REFERENCE for check in checks):
@@ -88,7 +83,11 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     try:
         with ExitStack() as stack:
             results = stack.enter_context(open_results(path, verify=False))
-            shipped = [stack.enter_context(open_results(file)) for file in shipped_files()]
+            frozen = [shipped_reference(str(scene.attributes["scene_hash"])) for scene in results.scenes.values()]
+            shipped = [
+                stack.enter_context(open_results(file, only=[known.scene for known in frozen if known is not None]))
+                for file in {known.path for known in frozen if known is not None}
+            ]
             checks = checks_of(results, shipped, bounds)
     except (RuntimeError, OSError) as exc:  # what HDF5 finds wrong, at whatever place
         raise StoreError(f"{path}: damaged or incomplete ({' '.join(str(exc).split())[:150]})") from exc
@@ -138,34 +137,17 @@ def judge_frozen(bounds: Bounds, paths: Sequence[Path] = ()) -> list[Check]:
 def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> list[Check]:
     """Compare margins: a check "against" for every earlier one, how many times its margin has shrunk.
 
-    Parameters
-    ----------
-    new, old : checks of two files, made with the same bounds.
-    factor : allowed ratio of the earlier margin to the present one, at least 1.
-
-    Returns
-    -------
-    A check for every one of `old`, and one for a run that is gone. The value is NaN, which fails, where `new` lacks the
-    check or the run, and infinite where a check that passed fails. What failed before and fails now is no regression.
-
-    Examples
-    --------
-    >>> from dataclasses import replace
-    >>> where = Where("paper/fig08", "exudyn_tree/rk67", "balance")
-    >>> before = Check("energy", where, 1e-12, 1e-9, "", "of scale")
-    >>> [change] = regressions([replace(before, value=6.4e-11)], [before], factor=10.0)
-    >>> round(change.value), change.passed
-    (64, False)
+    The allowed `factor` is at least 1. A check for every one of `old`, and one for a run that is gone. The value is
+    NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed fails. What failed
+    before and fails now is no regression.
     """
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}
-    gone = {
-        check.where[:2]: replace(check, name="run", where=check.where._replace(channel="all"))
-        for check in old
-        if check.where[:2] not in runs
-    }
+    gone = {check.where[:2]: check for check in old if check.where[:2] not in runs}
+    kept = [check for check in old if check.where[:2] in runs]
+    lost = [replace(check, name="run", where=check.where._replace(channel="all")) for check in gone.values()]
     changes = []
-    for check in [*(check for check in old if check.where[:2] in runs), *gone.values()]:
+    for check in [*kept, *lost]:
         now = present.get((check.name, check.where))
         if now is None:
             value, hint = math.nan, "was judged in the earlier file and is not in this one"

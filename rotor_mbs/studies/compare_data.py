@@ -11,14 +11,7 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.data_verdict import (
-    DEFAULT_TOLERANCE,
-    DataVerdict,
-    as_dictionary,
-    carried_errors,
-    channel_errors,
-    rows_to_the_horizon,
-)
+from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, as_dictionary
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import channels
 from rotor_mbs.foreign.trajectory import ForeignData
@@ -31,10 +24,10 @@ from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.judgement import judge
+from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-from rotor_mbs.studies.data_causes import CauseSearch, states_of
-from rotor_mbs.studies.scene_causes import likely_causes
+from rotor_mbs.studies.data_causes import CauseSearch, carried_errors, likely_causes, states_of
 
 METHOD = "data"  # what takes the place of a method's name
 # An error of the state changes the energy by its gradient: some ten times the error, of the energy scale; tenfold that.
@@ -48,14 +41,10 @@ _SEARCH_S = 60.0  # of the search for causes: scenes that are stiff or have many
 
 @dataclass(frozen=True)
 class DataStudy:
-    """Data, what they were compared with, and the verdict.
+    """Data, cut to the scene's duration, what they were compared with, and the verdict.
 
-    Attributes
-    ----------
-    scene, data : what was compared; the data cut to the scene's duration.
     expected : (n, channels) the reference at the times of the data, as far as the motion goes.
     carried : (n, channels) what an error of the initial state of 1 rad may be in each channel, at most.
-    verdict : the numbers.
     """
 
     scene: Scene
@@ -100,7 +89,10 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
         raise InputError(f"tolerance: {tolerance!r}; allowed: a number more than 0, rad per unit of error growth")
     inside = data.time <= scene.duration * (1.0 + _ROUNDING)
     cut = replace(data, time=data.time[inside], values=data.values[inside])
-    exact = _reference(scene, cut.time)
+    # At the times of the data and at the scene's samples, which make growth and horizon the same for all data.
+    end = max(scene.duration, float(cut.time[-1])) if len(cut.time) else scene.duration
+    times = np.union1d(np.append(cut.time, end), np.linspace(0.0, scene.duration, scene.samples))
+    exact = reference_at(replace(scene, duration=end, samples=len(times), outputs=("angles", "rates")), times)
     run = exact.trajectory
     place: NDArray[np.int64] = np.searchsorted(run.time, cut.time)
     place = place[place < len(run.time)]
@@ -108,7 +100,10 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
         raise InputError(f"{data.source}: no row within the {scene.duration:g} s of {scene.name}; allowed: times in s")
     carried = carried_errors(run, exact.growth, exact.units)[place][:, data.columns]
     at_rows = Trajectory(run.time[place], run.angles[place], run.rates[place], error_growth=run.error_growth[place])
-    cut = _with_whole_turns(cut, at_rows)
+    expected = states_of(at_rows)[:, cut.columns]
+    # Wrapped channels with as many turns as the reference has in the first row.
+    turns = 2.0 * np.pi * np.round((expected[0] - cut.values[0]) / (2.0 * np.pi))
+    cut = replace(cut, values=np.where(cut.wrapped, cut.values + turns, cut.values))
     verdict = _verdict(scene, data, cut, at_rows, exact, carried, tolerance)
     worst = max(channel.error_per_growth for channel in verdict.channels)
     if not verdict.agrees:
@@ -117,40 +112,21 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
         search = CauseSearch(scene, whole, exact, tolerance, worst, ends)
         with np.errstate(over="ignore", invalid="ignore"):  # data may be of any size
             likely, note = likely_causes(search)
-        start = "" if likely else _other_start(scene, cut, states_of(at_rows)[0, cut.columns])
+        start = "" if likely else _other_start(scene, cut, expected[0])
         notes = (*verdict.notes, *(line for line in (note, start) if line))
         verdict = replace(verdict, likely=tuple(likely), notes=notes)
-    return DataStudy(scene, cut, states_of(at_rows)[:, cut.columns], carried, verdict)
-
-
-def _reference(scene: Scene, time: Array) -> TimedReference:
-    """At the times of the data and at the scene's samples, which make growth and horizon the same for all data."""
-    end = max(scene.duration, float(time[-1])) if len(time) else scene.duration
-    times = np.union1d(np.append(time, end), np.linspace(0.0, scene.duration, scene.samples))
-    whole = replace(scene, duration=end, samples=len(times), outputs=("angles", "rates"))
-    return reference_at(whole, times)
-
-
-def _with_whole_turns(data: ForeignData, reference: Trajectory) -> ForeignData:
-    """Wrapped channels with as many turns as the reference has in the first row."""
-    values = data.values.copy()
-    expected = states_of(reference)[0, data.columns]
-    for j, wrapped in enumerate(data.wrapped):
-        if wrapped:
-            values[:, j] += 2.0 * np.pi * np.round((expected[j] - values[0, j]) / (2.0 * np.pi))
-    return replace(data, values=values)
+    return DataStudy(scene, cut, expected, carried, verdict)
 
 
 def _verdict(
     scene: Scene, whole: ForeignData, data: ForeignData, reference: Trajectory, exact: TimedReference, carried: Array,
     tolerance: float,
 ) -> DataVerdict:  # fmt: skip
-    rows, (horizon_s, until) = len(reference.time), rows_to_the_horizon(exact.trajectory, reference.time)
+    rows, horizon_s, until = len(reference.time), horizon(exact.trajectory), len(reference.time)
+    if horizon_samples(exact.trajectory) < len(exact.trajectory.time):
+        until = int(np.searchsorted(reference.time, horizon_s, side="right"))
     compared = replace(data, time=data.time[:rows], values=data.values[:rows])
-    expected = states_of(reference)[:, data.columns]
-    slopes = _slopes(exact, reference.time)[:, data.columns]
-    names = [(channel.name, channel.unit) for channel in data.channels]
-    errors = channel_errors(names, reference.time, compared.values, expected, slopes, carried, max(until, 1))
+    errors = _channel_errors(compared, reference, exact.trajectory, carried, max(until, 1))
     run = _as_run(scene, compared, reference, tolerance)
     status, message, metrics = "unchecked", "a single row", {}
     if rows > 1:
@@ -170,11 +146,37 @@ def _verdict(
     )  # fmt: skip
 
 
-def _slopes(exact: TimedReference, time: Array) -> Array:
-    """(n, 2 (1 + blades)) Time derivatives at the rows; of rates by differences."""
-    run = exact.trajectory
-    slopes = np.gradient(run.rates, run.time, axis=0) if len(run.time) > 1 else 0.0 * run.rates
-    return states_of(Trajectory(run.time, run.rates, slopes))[np.searchsorted(run.time, time)]
+def _channel_errors(
+    data: ForeignData, reference: Trajectory, whole: Trajectory, carried: Array, until: int
+) -> tuple[ChannelErrors, ...]:
+    """The errors of every channel; until: rows up to the horizon; whole: the reference at more times than those."""
+    time, expected = reference.time, states_of(reference)[:, data.columns]
+    # Time derivatives; of rates by differences.
+    accelerations = np.gradient(whole.rates, whole.time, axis=0) if len(whole.time) > 1 else 0.0 * whole.rates
+    slopes = np.hstack([whole.rates, accelerations])[np.searchsorted(whole.time, time)][:, data.columns]
+    errors = []
+    for j, channel in enumerate(data.channels):
+        error = np.abs(data.values[:, j] - expected[:, j])
+        agrees_until = []
+        for level in LEVELS:
+            beyond = np.flatnonzero(~(error <= level))
+            last = int(beyond[0]) - 1 if len(beyond) else len(time) - 1
+            agrees_until.append(float(time[last]) if last >= 0 else float("nan"))
+        # Linear least squares, each row by its weight; what a channel cannot show is 0 or 1.
+        weight = carried[:until, j]
+        columns = np.stack([-slopes[:until, j], expected[:until, j], np.ones(until)], axis=1) / weight[:, None]
+        sizes = np.linalg.norm(columns, axis=0)
+        sizes[sizes == 0.0] = 1.0
+        difference = (data.values[:until, j] - expected[:until, j]) / weight
+        lag, scale, offset = np.linalg.lstsq(columns / sizes, difference, rcond=1e-9)[0] / sizes
+        errors.append(
+            ChannelErrors(
+                channel.name, channel.unit, float(error[:until].max()), float(error.max()),
+                float((error / carried[:, j])[:until].max()), tuple(agrees_until),
+                float(lag), 1.0 + float(scale), float(offset),
+            )
+        )  # fmt: skip
+    return tuple(errors)
 
 
 def _as_run(scene: Scene, data: ForeignData, reference: Trajectory, tolerance: float) -> Solution:

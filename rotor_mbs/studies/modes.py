@@ -16,9 +16,17 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.campbell import REST, ROTATION, FloquetTable, LinearModes, SceneModes, StabilityChart
-from rotor_mbs.analysis.mode_records import to_records
-from rotor_mbs.analysis.modes import GROWTH, Complex, floquet, isotropic_modes, modes_of, track
+from rotor_mbs.analysis.campbell import (
+    REST,
+    ROTATION,
+    FloquetTable,
+    LinearModes,
+    SceneModes,
+    StabilityChart,
+    read_modes,
+    to_records,
+)
+from rotor_mbs.analysis.modes import GROWTH, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
@@ -26,7 +34,7 @@ from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.records import Record, read_records, write_records
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.scenario.time_table import Table, value_at
+from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.linearization import Linearization
 from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.studies.run import OnProgress, Outcome, ignore_progress
@@ -50,7 +58,7 @@ def modes_of_scenes(
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
 ) -> list[Outcome]:
-    """The modes of every scene into the results file `output`; what it has already is kept.
+    """The modes of every scene into the file `output`; those of other scenes that it has are kept.
 
     speeds        rad/s, of the Campbell diagram and the Floquet multipliers
     stiffnesses   N m/rad, of every bearing, for the stability chart over speed
@@ -61,17 +69,23 @@ def modes_of_scenes(
     made: list[Outcome] = []
     names = {scene.name for scene in scenes}
     with writing(output):
-        kept = [record for record in stored_records(output) if record.scene not in names]
-        records = []
+        records: list[Record] = []
+        if output.exists():
+            hashes = {record.scene: record.attributes["scene_hash"] for record in read_records(output, "modes")}
+            if not hashes:
+                raise InputError(f"{output}: is no file of modes; allowed: another output file")
+            for name, modes in read_modes(output).items():
+                if name not in names:
+                    records += to_records(modes, {"scene_hash": hashes[name]})
         with local_pool(workers) as pool:
             tasks = [(scene, tuple(speeds), tuple(stiffnesses)) for scene in scenes]
-            for done, end in enumerate(run_in(pool, perform_modes, tasks, timeout_s), 1):
+            for done, end in enumerate(run_in(pool, _perform, tasks, timeout_s), 1):
                 if isinstance(end.error, RotorError):
                     raise end.error
-                scene = end.task[0]
+                scene, share = end.task[0], done / len(tasks)
                 label = f"{scene.name} modes"
                 if end.value is None:
-                    outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=done / len(tasks))
+                    outcome = Outcome(label, "", end.failure, end.message, is_stored=False, share=share)
                 else:
                     modes = end.value
                     records += to_records(modes, {"scene_hash": scene_hash(scene)})
@@ -79,26 +93,15 @@ def modes_of_scenes(
                     if not modes.agrees:
                         differ = f"frequencies of two models differ by {modes.disagreement:.1e} of their size"
                         status, message = "inaccurate", differ
-                    outcome = Outcome(label, "", status, message, share=done / len(tasks))
+                    outcome = Outcome(label, "", status, message, share=share)
                 made.append(outcome)
                 on_progress(done, len(tasks), outcome)
-        if records:
-            write_records(output, [*kept, *records])
+        if any(outcome.is_stored for outcome in made):
+            write_records(output, records)
     return made
 
 
-def stored_records(output: Path) -> list[Record]:
-    """The modes that a file has. Raises InputError where it has something else."""
-    if not output.exists():
-        return []
-    records = read_records(output, "modes")
-    if not records:
-        raise InputError(f"{output}: is no file of modes; allowed: another output file")
-    return records
-
-
-def perform_modes(task: tuple[Scene, tuple[float, ...], tuple[float, ...]]) -> SceneModes:
-    """The modes of one scene, in a worker process."""
+def _perform(task: tuple[Scene, tuple[float, ...], tuple[float, ...]]) -> SceneModes:
     return compute_modes(*task)
 
 
@@ -111,61 +114,78 @@ def compute_modes(
     The torque on the rotor is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
     """
     notes: list[str] = []
-    scene = replace(scene, pitch_torque=_at_start(scene.pitch_torque), bearing_rest=_at_start(scene.bearing_rest))
-    speeds, stiffnesses = (
-        np.array(_increasing(given, name)) for given, name in ((speeds, "speeds"), (stiffnesses, "stiffnesses"))
+    torques, rests = (
+        tuple(((0.0, value_at(table, 0.0)),) if table else () for table in tables)
+        for tables in (scene.pitch_torque, scene.bearing_rest)
     )
+    scene = replace(scene, pitch_torque=torques, bearing_rest=rests)
+    speeds = np.array(_increasing(speeds, "speeds"))
     rest = _linear(scene, REST, np.zeros(1), notes)
     rotation = _linear(scene, ROTATION, speeds, notes) if len(speeds) else {}
     turning = speeds[speeds > 0.0]
+    stiffness = np.array(_increasing(stiffnesses, "stiffnesses"))
     table = chart = None
     if scene.gravity and len(turning):
         try:
-            table = floquet_table(scene, turning)
-            charted = [replace(scene, bearing_stiffness=(float(k),) * len(scene.blades)) for k in stiffnesses]
-            rows = [floquet_table(one, turning).largest for one in charted]
-            chart = StabilityChart(turning, stiffnesses, np.array(rows)) if rows else None
+            table = _floquet_table(scene, turning)
+            charted = [replace(scene, bearing_stiffness=(float(k),) * len(scene.blades)) for k in stiffness]
+            rows = [_floquet_table(stiffer, turning).largest for stiffer in charted]
+            chart = StabilityChart(turning, stiffness, np.array(rows)) if rows else None
         except MethodRefusal as exc:
             notes.append(f"no Floquet multipliers: {exc}")
     title, blades = scene.title, len(scene.blades)
     return SceneModes(scene.name, title, blades, scene.gravity, rest, rotation, table, chart, tuple(notes))
 
 
-def _at_start(tables: tuple[Table, ...]) -> tuple[Table, ...]:
-    """Constant at the values that they have at t = 0."""
-    return tuple(((0.0, value_at(table, 0.0)),) if table else () for table in tables)
-
-
-def linearizing_methods() -> dict[str, Method]:
-    """By model, the method that linearizes it, of those that are installed; the closed form first."""
-    return {method.model: method for method in methods() if method.linearize is not None and method.is_installed}
-
-
-def is_isotropic(scene: Scene, pitches: Array) -> bool:
-    """Whether all blades and bearings are equal, move and stand at equal pitches, and no gravity tells them apart."""
-    bearings = scene.bearing_stiffness, scene.bearing_damping, scene.bearing_rest, scene.pitch_torque
-    same = all(len(set(values)) <= 1 for values in (scene.blades, *bearings))
-    return same and scene.blades[0].has_pitch_inertia and scene.gravity == 0.0 and bool(np.ptp(pitches) < 1e-9)
-
-
 def _linear(scene: Scene, kind: str, speeds: Array, notes: list[str]) -> dict[str, LinearModes]:
-    """By model; a model that cannot do any of the speeds is left out, with a note."""
+    """By model, the closed form first; a model that cannot do any of the speeds is left out, with a note."""
     points = _steady_states(scene, kind, speeds)
+    there = [not isinstance(point, str) for point in points]
     steady = [point for point in points if not isinstance(point, str)]
     if not steady:
         notes.append(str(points[0]))
         return {}
-    symmetric = all(is_isotropic(at, angles[1:]) for at, angles, _, _ in steady)
-    found = {}
-    for model, method in linearizing_methods().items():
+    # All blades and bearings are equal, stand at equal pitches, and no gravity tells them apart.
+    bearings = scene.bearing_stiffness, scene.bearing_damping, scene.bearing_rest, scene.pitch_torque
+    same = all(len(set(values)) <= 1 for values in (scene.blades, *bearings)) and scene.blades[0].has_pitch_inertia
+    symmetric = same and all(at.gravity == 0.0 and np.ptp(angles[1:]) < 1e-9 for at, angles, _, _ in steady)
+    columns = scene.moving_coordinates
+
+    def over_speed(values: Sequence[NDArray[Any]], nothing: complex = np.nan) -> NDArray[Any]:
+        """By speed; NaN where there is no steady state."""
+        whole = np.full((len(points), *values[0].shape), nothing, values[0].dtype)
+        whole[there] = values
+        return whole
+
+    modes_by_model = {}
+    for method in {method.model: method for method in methods() if method.linearize and method.is_installed}.values():
         try:
             made = [_linearized(method, point) for point in steady]
         except MethodRefusal as exc:
             if kind == REST:
                 notes.append(str(exc))
             continue
-        found[model] = _modes_over_speed(scene, kind, method, speeds, points, made, symmetric)
-    return found
+        modes_at = (
+            isotropic_modes if symmetric else partial(modes_of, is_cyclic=kind == ROTATION or scene.gravity == 0.0)
+        )
+        sets = track([modes_at(linear.stiffness, linear.damping) for linear in made])
+        names = (name if name == "rotor" else f"{name} pitch" for name in sets[0].names)
+        modes_by_model[method.model] = LinearModes(
+            eigenvalues=over_speed([modes.eigenvalues for modes in sets], complex(np.nan, np.nan)),
+            shapes=over_speed([modes.shapes for modes in sets]),
+            names=tuple(names) or tuple(f"mode {k + 1}" for k in range(len(columns))),
+            source=method.model,
+            label=method.model_label,
+            kind=kind,
+            blades=len(scene.blades),
+            speeds=speeds,
+            coordinates=tuple(scene.coordinate_labels[column] for column in columns),
+            angles=over_speed([angles[columns] for _, angles, _, _ in steady]),
+            stiffness=over_speed([linear.stiffness for linear in made]),
+            damping=over_speed([linear.damping for linear in made]),
+            messages=tuple(point if isinstance(point, str) else "" for point in points),
+        )
+    return modes_by_model
 
 
 def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]:
@@ -174,22 +194,22 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
 
     at = scene if kind == REST else replace(scene, gravity=0.0)
     start = scene  # of each slower speed: the pitches before, so that one branch is followed down to rest
-    found: list[_Point | str] = []
+    points: list[_Point | str] = []
     for speed in map(float, speeds[::-1]):
         try:
             angles = equilibrium(start) if kind == REST else steady_rotation(start, speed)
         except InputError as exc:
-            found.append(str(exc))
+            points.append(str(exc))
         except ZeroDivisionError:
-            found.append(f"{scene.name}: singular at {speed:g} rad/s")
+            points.append(f"{scene.name}: singular at {speed:g} rad/s")
         else:
             start = replace(start, initial_angles=tuple(angles.tolist()))
-            found.append((replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed)))
-    return found[::-1]
+            points.append((replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed)))
+    return points[::-1]
 
 
 def _linearized(method: Method, point: _Point) -> Linearization:
-    assert method.linearize is not None  # linearizing_methods says so
+    assert method.linearize is not None  # the caller has asked
     made = method.linearize(*point)
     left = np.abs(made.residual).max(initial=0.0)
     if left > _STEADY * max(np.abs(made.stiffness).max(), 1e-12):
@@ -197,45 +217,7 @@ def _linearized(method: Method, point: _Point) -> Linearization:
     return made
 
 
-def _modes_over_speed(
-    scene: Scene,
-    kind: str,
-    method: Method,
-    speeds: Array,
-    points: Sequence[_Point | str],
-    made: Sequence[Linearization],
-    symmetric: bool,
-) -> LinearModes:
-    """made: at the points that are no reason why there is none; NaN at the others."""
-    columns, n = scene.moving_coordinates, len(scene.moving_coordinates)
-    there = [not isinstance(point, str) for point in points]
-
-    def over_speed(values: Sequence[NDArray[Any]], nothing: complex = np.nan) -> NDArray[Any]:
-        whole = np.full((len(points), *values[0].shape), nothing, values[0].dtype)
-        whole[there] = values
-        return whole
-
-    modes = isotropic_modes if symmetric else partial(modes_of, is_cyclic=kind == ROTATION or scene.gravity == 0.0)
-    sets = track([modes(one.stiffness, one.damping) for one in made])
-    names = (name if name == "rotor" else f"{name} pitch" for name in sets[0].names)
-    return LinearModes(
-        eigenvalues=over_speed([each.eigenvalues for each in sets], complex(np.nan, np.nan)),
-        shapes=over_speed([each.shapes for each in sets]),
-        names=tuple(names) or tuple(f"mode {k + 1}" for k in range(n)),
-        source=method.model,
-        label=method.model_label,
-        kind=kind,
-        blades=len(scene.blades),
-        speeds=speeds,
-        coordinates=tuple(scene.coordinate_labels[column] for column in columns),
-        angles=over_speed([point[1][columns] for point in points if not isinstance(point, str)]),
-        stiffness=over_speed([one.stiffness for one in made]),
-        damping=over_speed([one.damping for one in made]),
-        messages=tuple(point if isinstance(point, str) else "" for point in points),
-    )
-
-
-def floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
+def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
     """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down.
 
     Raises MethodRefusal where heyoka is not installed.
@@ -252,20 +234,15 @@ def floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
         every, others = floquet(turn.transition, turn.flow, turn.gradient, turn.speed)
         modulus = float(np.abs(others).max(initial=0.0))
         is_stable = -1 if turn.message else int(modulus <= 1.0 + GROWTH)
-        error = _product_error(every, turn)
+        sizes = np.abs(every)
+        rounding = np.finfo(float).eps * np.linalg.norm(turn.transition)
+        error = float("nan")  # where rounding leaves under six digits
+        if not turn.message and rounding < 1e-6 * sizes.min():
+            error = float(np.log(sizes).sum() - turn.trace_integral)
         rows.append((every, modulus, is_stable, error, turn.torque, turn.mismatch))
     multipliers, largest, stable, errors, torques, mismatches = map(np.array, zip(*rows, strict=True))
     messages = tuple(turn.message for turn in turns)
     return FloquetTable(speeds, multipliers, largest, stable, errors, torques, mismatches, messages)
-
-
-def _product_error(multipliers: Complex, turn: Turn) -> float:
-    """ln of the product of the multipliers less the integrated trace; NaN where rounding leaves under six digits."""
-    sizes = np.abs(multipliers)
-    rounding = np.finfo(float).eps * np.linalg.norm(turn.transition)
-    if turn.message or not rounding < 1e-6 * sizes.min():
-        return float("nan")
-    return float(np.log(sizes).sum() - turn.trace_integral)
 
 
 def _increasing(values: Sequence[float] | Array, name: str) -> list[float]:

@@ -185,9 +185,11 @@ def _stale(
     if not output.exists():
         return []
     stale = []
-    for table, stored in TableFile(output).tables.items():
-        if table in (STEPS, LIMIT, SYMMETRY):
-            owners = zip(stored.runs, stored.known["scene"][1], stored.known["method_name"][1], strict=True)
+    file = TableFile(output)
+    for table in (STEPS, LIMIT, SYMMETRY):
+        if table in file.groups:
+            stored = file.table(table)
+            owners = zip(stored.runs, stored.known["scene"], stored.known["method_name"], strict=True)
             stale += [
                 (table, run)
                 for run, scene, method in owners

@@ -53,7 +53,7 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
     by_hash: dict[str, ShippedReference] = {}
     for path in files:
         file = TableFile(path)
-        for row in range(len(file.tables[RUNS].runs)):
+        for row in range(len(file.table(RUNS).runs)):
             known = file.known(RUNS, row)
             frozen_with = json.loads(known["versions"])["frozen_with"]
             by_hash[known["scene_hash"]] = ShippedReference(path, known["scene"], frozen_with)
@@ -115,7 +115,7 @@ def frozen_solution(scene: Scene) -> Solution:
     shipped = shipped_reference(scene_hash(scene))
     if shipped is None:
         raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}; `rotor-mbs reference` makes one")
-    with open_results(shipped.path) as results:
+    with open_results(shipped.path, only=[shipped.scene]) as results:
         stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene
         facts = stored.attributes

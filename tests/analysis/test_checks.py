@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support.references import reference
 from support.scenes import general, paper
-from support.stored import Arrays, Made, rotor, store
+from support.stored import Arrays, Made, damage, rotor, store
 
 from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.rehydrate import Rehydrated
@@ -183,7 +183,7 @@ def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
     found = Rehydrated(scene, run, None, [])
     judged = values(checks._of_corrected_model(stored(), BOUNDS, found, run.trajectory))
     assert judged["exact", "rotor angle"] == pytest.approx(1e-3, rel=1e-6)
-    blind = replace(found, scene=replace(scene, outputs=("rates", "energy")))
+    blind = found._replace(scene=replace(scene, outputs=("rates", "energy")))
     judged = values(checks._of_corrected_model(stored(), BOUNDS, blind, run.trajectory))
     assert ("exact", "rotor angle") not in judged
 
@@ -313,17 +313,6 @@ def test_copies_are_a_check_each(runs: dict[str, Any], found: dict[tuple[str, st
     assert values(checks._copies(scene, BOUNDS)) == found
 
 
-def test_damage_is_told_by_its_parts() -> None:
-    assert [checks._integrity("s", METHOD, parts, BOUNDS).value for parts in ((), ("angles",), ("angles", "x"))] == [
-        0,
-        1,
-        2,
-    ]
-    assert checks._integrity("s", METHOD, (), BOUNDS).hint == "as written"
-    assert "angles, x changed" in checks._integrity("s", METHOD, ("angles", "x"), BOUNDS).hint
-    assert "no digests" in checks._integrity("s", METHOD, (checks.DIGESTS,), BOUNDS).hint
-
-
 @pytest.mark.parametrize(
     ("value", "passed", "margin"),
     [(0.5, True, 4.0), (2.0, True, 1.0), (2.1, False, 2.0 / 2.1), (0.0, True, np.inf), (np.nan, False, 0.0)],
@@ -345,28 +334,25 @@ def test_the_papers_numbers_are_judged_of_the_printed_equations_alone(tmp_path: 
             assert [one.value for one in checks._of_paper(results, BOUNDS)] == pytest.approx(expected)
 
 
-def test_damage_is_told_of_the_group_that_has_it_and_what_cannot_be_read_is_incomplete(
+def test_a_damaged_row_fails_and_what_cannot_be_read_is_incomplete(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of an array that is as written, the same error is a fault of the program."""
+    """Of a row that is as written, the same error is a fault of the program."""
 
     def fail(*_: object) -> None:
         raise KeyError("angles")
 
-    damages = [("", "a"), (f"paper/fig11/{METHOD}", "b"), ("", "c")]
-    monkeypatch.setattr(checks, "all_damages", lambda _: damages)
     monkeypatch.setattr(checks, "rehydrate", fail)
-    made = [Made(paper("fig11", samples=501), METHOD, rotor(np.zeros_like))]
-    with open_results(store(tmp_path / "r.h5", made)) as results:
+    path = store(tmp_path / "r.h5", [Made(paper("fig11", samples=501), METHOD, rotor(np.zeros_like))])
+    with open_results(path) as results, pytest.raises(KeyError):
+        checks.checks_of(results, [], BOUNDS)
+    damage(path, f"paper/fig11/{METHOD}", "angles")
+    with open_results(path, verify=False) as results:
         failures = [check for check in checks.checks_of(results, [], BOUNDS) if not check.passed]
-        assert [(check.name, check.where.scene, check.where.method, check.value) for check in failures[:2]] == [
-            ("integrity", "paper/fig11", METHOD, 1.0),
-            ("complete", "paper/fig11", METHOD, pytest.approx(np.nan, nan_ok=True)),
-        ]
-        assert (failures[-1].where.scene, failures[-1].where.method, failures[-1].value) == ("file", "*", 2.0)
-        damages.clear()
-        with pytest.raises(KeyError):
-            checks.checks_of(results, [], BOUNDS)
+    assert [(check.name, check.where.method, check.value) for check in failures[:2]] == [
+        ("integrity", METHOD, 1.0),
+        ("complete", METHOD, pytest.approx(np.nan, nan_ok=True)),
+    ]
 
 
 def test_a_file_is_judged_by_its_copies_and_by_the_papers_numbers_too(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ def stored(tmp_path: Path, *, scenes: int = 1) -> Path:
     runs = []
     for i in range(scenes):
         scene = replace(SCENE, name=f"paper/s{i}")
-        runs += [Made(scene, "reference", rotor(np.sin), attributes={"frozen_with": "1.0"})]
+        runs += [Made(scene, "reference", rotor(np.sin), versions={"frozen_with": "1.0"})]
         runs += [Made(scene, GOOD, rotor(lambda t: np.sin(t) + 1e-9))]
         runs += [Made(scene, BAD, rotor(lambda t: np.sin(t) + 0.25), attributes={"status": "inaccurate"})]
     return store(tmp_path / "r.h5", runs)

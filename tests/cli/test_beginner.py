@@ -120,9 +120,9 @@ def test_a_scene_names_its_methods_and_settings(folder: Path) -> None:
     path = scene_file(folder, edits)
     assert rm.run(rm.load(path), "exudyn_tree/rk67").settings["step"] == 0.002
     assert rotor_mbs("run", path, "-o", "r.h5", "-j", "1", "--set", "step=0.001").status == 0
-    tree = rm.open("r.h5")
-    assert set(tree.scenes["mine"]) == {"reference", "exudyn_tree/rk67", "lagrange/dop853"}
-    assert tree["mine/exudyn_tree/rk67"].settings["step"] == 0.001
+    runs = rm.open("r.h5")
+    assert set(runs["mine"]) == {"reference", "exudyn_tree/rk67", "lagrange/dop853"}
+    assert runs["mine/exudyn_tree/rk67"].settings["step"] == 0.001
     scene_file(folder, edits | {"# step = 1e-3": "stp = 0.002"})
     refused = rotor_mbs("run", path, "-o", "r.h5")
     assert refused.status == 2

@@ -149,6 +149,7 @@ def test_the_action_passes_and_leaves_its_files(earlier: Path, folder: Path) -> 
     assert {path.name for path in (folder / "rotor-mbs-check").iterdir()} == {"verdicts.json", "junit.xml"}
 
 
+@pytest.mark.full
 def test_the_action_fails_on_a_loosened_run(earlier: Path, loosened: Path, folder: Path) -> None:
     done = _run_action(folder, file=str(loosened), against=str(earlier), package="")
     assert [step.returncode for step in done] == [0, 1]
@@ -168,6 +169,7 @@ def test_the_action_installs_the_checkout_it_is_from(folder: Path) -> None:
     assert (place / "pyproject.toml").samefile(ROOT / "pyproject.toml")
 
 
+@pytest.mark.full
 def test_the_gitlab_job_is_plain_bash_too(earlier: Path, folder: Path) -> None:
     job = yaml.safe_load((ROOT / ".gitlab/rotor-mbs-check.yml").read_text())[".rotor-mbs-check"]
     variables = {**job["variables"], "PACKAGE": "", "FILE": str(earlier), "AGAINST": str(earlier)}

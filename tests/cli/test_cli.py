@@ -36,7 +36,7 @@ BOTH = ("-m", "lagrange/dop853", "-m", "exudyn_tree/rk67")
 def hashes(path: Path) -> dict[str, str]:
     with open_results(path) as results:
         return {
-            f"{scene.name}/{run.method}": run.attributes["run_hash"]
+            f"{scene.name}/{run.method}": run.known["scene_hash"]
             for scene in results.scenes.values()
             for run in scene.runs.values()
         }
@@ -187,6 +187,7 @@ def test_a_scene_with_other_numbers_does_not_silently_replace_runs(quick: Path, 
     assert not set(new.values()) & set(old.values())
 
 
+@pytest.mark.full
 def test_a_run_over_its_time_limit_is_recorded_and_the_rest_goes_on(quick: Path) -> None:
     method = "exudyn_chain/generalized_alpha"
     ended = rotor_mbs("run", "paper/fig11", quick, "-m", method, "--timeout", "0.6", "-o", "r.h5")
@@ -206,6 +207,7 @@ def test_a_run_without_a_single_finite_sample_is_stored_as_what_it_is() -> None:
         assert not len(run.array("time"))
 
 
+@pytest.mark.full
 def test_samples_do_not_depend_on_the_number_of_processes(results: Path) -> None:
     """Those of `results` are from one."""
     assert rotor_mbs("run", "paper/fig08", "paper/fig11", *BOTH, "-j", "2", "-o", "2.h5").status == 0

@@ -45,6 +45,7 @@ def test_a_closed_pipe_is_no_success_but_of_a_command_that_only_prints(words: tu
         os.close(writing)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="fills standard output as Linux does")
 def test_full_output_and_closed_errors_lose_no_run(folder: Path) -> None:
     Path("s.toml").write_text(SWEEP)

@@ -43,7 +43,7 @@ CHANGES: dict[str, Callable[[], object]] = {
     "a bit of the results": lambda: Path("results.h5").write_bytes(bytes(999) + b"\x01"),
     "no results": Path("results.h5").unlink,
     "no index": Path("report/index.html").unlink,
-    "unfinished work": Path("results.h5.parts").mkdir,
+    "unfinished work": Path(".results.h5.lock").touch,
     "a call that failed": Path("fails").touch,
 }
 
@@ -64,5 +64,5 @@ def test_another_time_limit_or_other_code_is_looked_into(
 ) -> None:
     assert call()
     assert call("--timeout", "5")
-    monkeypatch.setattr(reproduce, "fingerprint", lambda *_: "other code")
+    monkeypatch.setattr(reproduce, "versions", lambda: {"rotor_mbs": "other code"})
     assert call("--timeout", "5")

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Settings, stability_polynomial
-from rotor_mbs.methods.ladders import step_ladder
+from rotor_mbs.methods.base import BuiltItem, Method, Settings, stability_polynomial, step_ladder
 from rotor_mbs.methods.settings import number
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.solution.trajectory import Integration, RunBlock, Trajectory

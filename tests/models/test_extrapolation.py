@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.references import reference, run, scene
 
-from rotor_mbs.models.exudyn.extrapolation import extrapolated
+from rotor_mbs.models.exudyn.solvers import extrapolated
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import horizon_samples
 from rotor_mbs.solution.solution import Solution
@@ -94,6 +94,7 @@ def test_chaotic_scenes_to_1e_6_before_the_horizon(name: str, step: float, toler
     assert (error <= uncertainty).all()
 
 
+@pytest.mark.full
 def test_every_quantity_is_extrapolated() -> None:
     name = "check/general"
     given = beginning(name, 21)

@@ -16,7 +16,7 @@ from support.rotors import FIG08, FIG11, MIXED, PAPER, make_scene
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import energy, geometry, sensor_samples
+from rotor_mbs.models.exudyn import geometry, sensor_samples
 
 POLE = replace(PAPER, centre_of_mass=(0.0, 0.0, 15.42))
 BARE = replace(FIG08, gravity=0.0, outputs=("angles", "rates"))
@@ -255,7 +255,7 @@ def test_unwrapping_follows_rates_over_turns_between_rows() -> None:
 
 def test_cumulative_integral_is_exact_on_uneven_rows() -> None:
     t = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 40))
-    got = energy.cumulative_integral(t, 8 * t**7 - 2 * t)
+    got = sensor_samples.cumulative_integral(t, 8 * t**7 - 2 * t)
     assert np.allclose(got, t**8 - t**2 - (t[0] ** 8 - t[0] ** 2), rtol=1e-11)
 
 
@@ -263,8 +263,8 @@ def test_cumulative_integral_of_a_mirrored_function_is_mirrored() -> None:
     """The nearest rows stand alike on both sides of an interval, but for the first and last three."""
     t = np.cumsum(np.random.default_rng(2).uniform(0.5, 1.5, 40))
     power = np.exp(0.3 * t - 9.0)
-    forwards = np.diff(energy.cumulative_integral(t, power))
-    backwards = np.diff(energy.cumulative_integral(-t[::-1], power[::-1]))[::-1]
+    forwards = np.diff(sensor_samples.cumulative_integral(t, power))
+    backwards = np.diff(sensor_samples.cumulative_integral(-t[::-1], power[::-1]))[::-1]
     assert np.allclose(forwards, backwards, rtol=1e-11)
 
 

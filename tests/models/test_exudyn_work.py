@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.rotors import PAPER, make_scene
 
-from rotor_mbs.models.exudyn import energy
+from rotor_mbs.models.exudyn import sensor_samples as energy
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import segments
 from rotor_mbs.solution.trajectory import Array

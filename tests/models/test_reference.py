@@ -15,10 +15,10 @@ from support.scenes import PAPER, general, paper
 
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import reference as reference_module
-from rotor_mbs.models.lagrange.loads import quad_loads, sampled_loads
 from rotor_mbs.models.lagrange.methods import ReferenceSettings
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.models.lagrange.reference import ReferenceSolver, build, reference_at, uncertainty
+from rotor_mbs.models.lagrange.samples import quad_loads, sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import open_results

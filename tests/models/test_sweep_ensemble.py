@@ -80,21 +80,25 @@ _PITCH_TORQUE = (((0.0, 50.0),), ((0.0, -20.0),), ())
 _COMMAND = (((0.0, 0.1),), ((0.5, 0.0), (0.5, 0.2)), ())
 
 
+_SIDE_BY_SIDE = {
+    "starts": _perturbed(paper("fig11", duration=2.0, samples=41), LANES + 3),
+    "fixed pitch": _perturbed(paper("fig04b", samples=41), 3),
+    "rotors": _machines(3),
+    "dampers": [replace(scene, bearing_damping=(10.0, 20.0, 30.0), shaft_damping=5.0) for scene in _machines(2)],
+    "torque over time": [replace(scene, rotor_torque=((0.0, 0.0), (1.0, 50.0))) for scene in _machines(2)],
+    "tips": _tips(LANES + 1),
+    "six blades": _many_blades(6, 2),
+    "free": [replace(scene, gravity=0.0, bearing_stiffness=()) for scene in _machines(2)],
+    "pitch loads": [replace(scene, pitch_torque=_PITCH_TORQUE, bearing_rest=_COMMAND) for scene in _machines(2)],
+}
+_QUICK = ("starts", "fixed pitch", "pitch loads")
+
+
 @pytest.mark.parametrize(
     "scenes",
-    [
-        _perturbed(paper("fig11", duration=2.0, samples=41), LANES + 3),
-        _perturbed(paper("fig04b", samples=41), 3),  # a fixed pitch
-        _machines(3),
-        [replace(scene, bearing_damping=(10.0, 20.0, 30.0), shaft_damping=5.0) for scene in _machines(2)],
-        [replace(scene, rotor_torque=((0.0, 0.0), (1.0, 50.0))) for scene in _machines(2)],
-        _tips(LANES + 1),
-        _many_blades(6, 2),
-        [replace(scene, gravity=0.0, bearing_stiffness=()) for scene in _machines(2)],
-        [replace(scene, pitch_torque=_PITCH_TORQUE, bearing_rest=_COMMAND) for scene in _machines(2)],
-    ],
-    ids=["starts", "fixed pitch", "rotors", "dampers", "torque over time", "tips", "six blades", "free", "pitch loads"],
-)
+    [pytest.param(scenes, id=name, marks=() if name in _QUICK else pytest.mark.full)
+     for name, scenes in _SIDE_BY_SIDE.items()],
+)  # fmt: skip
 def test_runs_side_by_side_are_the_runs_one_by_one(scenes: list[Scene]) -> None:
     block = solve_many(scenes, _EPS)
     for i, scene in enumerate(scenes):

@@ -135,14 +135,17 @@ def test_a_figure_shows_each_model_in_a_column_as_it_was_stored(drawn: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["figures", "--figure", "2", "-o", "out"], "figure 2: not in it; allowed: 8, 9"),
-        (["figures", "--figure", "../11", "-o", "out"], "figure ../11: not in it"),
-        (["figures", "--results", "none.h5", "-o", "out"], "none.h5: no such file"),
-        (["animate", "paper/fig12", "-o", "a.webp"], "'paper/fig12': no such scene in it; allowed: paper/fig08"),
-        (["animate", "folder/mine.toml", "-o", "a.webp"], "'mine': no such scene in it"),  # stored by its stem
-        (["animate", "../fig11", "-o", "a.webp"], "no such scene"),
-        (["animate", "paper/fig11", "-o", "a.avi"], "unknown kind of file .avi; allowed: .webp, .gif, .mp4"),
-        (["animate", "paper/fig11", "-o", "a.webp", "--results", "none.h5"], "no such file"),
+        (["figures", "FILE", "--figure", "2", "-o", "out"], "figure 2: not in it; allowed: 8, 9"),
+        (["figures", "FILE", "--figure", "../11", "-o", "out"], "figure ../11: not in it"),
+        (["figures", "none.h5", "-o", "out"], "none.h5: no such file"),
+        (
+            ["animate", "paper/fig12", "FILE", "-o", "a.webp"],
+            "'paper/fig12': no such scene in it; allowed: paper/fig08",
+        ),
+        (["animate", "folder/mine.toml", "FILE", "-o", "a.webp"], "'mine': no such scene in it"),  # stored by its stem
+        (["animate", "../fig11", "FILE", "-o", "a.webp"], "no such scene"),
+        (["animate", "paper/fig11", "FILE", "-o", "a.avi"], "unknown kind of file .avi; allowed: .webp, .gif, .mp4"),
+        (["animate", "paper/fig11", "none.h5", "-o", "a.webp"], "no such file"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
@@ -150,7 +153,7 @@ def test_bad_input_is_one_line_and_status_2(
     arguments: list[str], message: str,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
-    assert main([arguments[0], "--results", str(drawn), *arguments[1:]]) == 2
+    assert main([str(drawn) if word == "FILE" else word for word in arguments]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1

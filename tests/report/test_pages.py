@@ -12,18 +12,17 @@ import h5py
 import numpy as np
 import pytest
 from markupsafe import escape
-from rotor_mbs.analysis.claim_records import stored_claims
-from rotor_mbs.analysis.claim_shares import ClaimShare, ClaimShares
-from rotor_mbs.models.printed.errata import CheckedEntry
 from support.checking import add_run, results_file
 from support.scenes import paper
 from support.stored import Arrays, Made, rotor, store
 from support.sweeps import made_sweep
 
+from rotor_mbs.analysis.claim_study import ClaimShare, ClaimShares, claim_study
 from rotor_mbs.analysis.claims import Claim, ClaimResult
-from rotor_mbs.analysis.published import errata, published
+from rotor_mbs.analysis.published import CheckedEntry, errata, published
 from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import find_method, look_up
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.core import numbers
@@ -35,6 +34,7 @@ from rotor_mbs.report.pages.errata import matrices
 from rotor_mbs.report.pages.index import heat_map
 from rotor_mbs.report.pages.quantities import parting
 from rotor_mbs.report.pages.scene import range_table
+from rotor_mbs.runs import results as results_module
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -222,7 +222,7 @@ def test_the_page_of_the_check_has_every_verdict_that_fails_and_is_made_where_it
     assert failed  # the motion is no solution: it does not start where the scene does
     section = text[text.index('<section id="failures">') : text.index('<section id="all"')]
     assert section.count('class="bad"') == len(failed)
-    looked_at = {str(escape(verdict.look_at)) for verdict in failed}
+    looked_at = {str(escape(verdict.hint)) for verdict in failed}
     assert looked_at == set(re.findall(r"fail</span><small>(.*?)</small>", section))
     assert 'href="check.html"' in (folder / "paper-fig11.html").read_text(encoding="utf-8")
 
@@ -267,13 +267,11 @@ def test_verdicts_of_claims_are_those_of_the_shares() -> None:
 
 
 def test_the_numbers_stand_in_tables_by_duration_tolerances_and_way_of_writing() -> None:
-    study = stored_claims()
-    assert study is not None
 
     def reproduced(table: PageTable) -> list[bool]:
         return [all(not isinstance(cell, str) and cell.tone == "good" for cell in row[-4:]) for row in table.rows]
 
-    by_duration, by_tolerance, by_row = map(reproduced, claim_tables.trial_tables(study.numbers))
+    by_duration, by_tolerance, by_row = map(reproduced, claim_tables.trial_tables(claim_study().numbers))
     assert by_duration == [False, False, False, False, True, False]
     assert (sum(by_tolerance), sum(by_row), len(by_row)) == (1, 8, 12)
 
@@ -346,6 +344,7 @@ def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(t
     assert "Exudyn tree, RK67" in sections["shaft_moment"]
 
 
+@pytest.mark.full
 def test_the_uncertainty_of_an_extrapolated_run_is_drawn_and_stated(tmp_path: Path) -> None:
     path, (scene,) = results_file(tmp_path / "r.h5", ["check/held"], []), find_scenes(["check/held"])
     run = solve("exudyn_chain/newmark_index2", scene, {"extrapolation": "richardson", "step": 5e-3})
@@ -373,10 +372,12 @@ def test_the_page_of_a_driven_scene_shows_power_pitch_and_command_and_no_other_d
 # Safety
 
 
-def test_texts_from_the_file_are_escaped(tmp_path: Path) -> None:
+def test_texts_from_the_file_are_escaped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a method that is not installed, too."""
+    monkeypatch.setattr(results_module, "find_method", lambda name: look_up(name) or find_method(TAYLOR))
     evil = "<script>alert(1)</script>"
     scene = replace(FIG11, name="a b/<i>", title=f"{evil}\x1b[2J", text=f"# {evil}\n{FIG11.text}\n# </pre>{evil}")
-    failed = {"status": evil, "message": evil}
+    failed = {"status": "singular", "message": evil}
     runs = [Made(scene, REFERENCE, SWING), Made(scene, f"lagrange/{evil[:8]}>x", SWING, attributes=failed)]
     folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "o")
     for path in folder.parent.glob("*.html"):
@@ -443,6 +444,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(results: Path, tmp_path: Pa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.full
 def test_the_same_file_gives_the_same_bytes_in_any_number_of_processes(tmp_path: Path) -> None:
     path = store(tmp_path / "r.h5", [Made(replace(PLAIN, name=name), TAYLOR, SWING) for name in ("one", "two")])
     folders = [write_report(path, tmp_path / str(jobs), jobs=jobs).parent for jobs in (1, 2)]

@@ -10,25 +10,26 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from rotor_mbs.runs.results_file import ResultsStore
 from support.checking import failed, judged, results_file
-from support.sweeps import run_local
+from support.commands import rotor_mbs
+from support.sweeps import made_sweep
 
 import rotor_mbs as rm
-from rotor_mbs.cli import main
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.digests import seal
 from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.scenario.sweep import load_sweep
+from rotor_mbs.runs.table import Rows
 
 METHOD = "lagrange/dop853"
-RUN = f"check/held/{METHOD}"
+SCENE = "check/held"
+RUN = f"{SCENE}/{METHOD}"
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return results_file(tmp_path_factory.mktemp("digests") / "good.h5", ["check/held"], [METHOD])
+    return results_file(tmp_path_factory.mktemp("digests") / "good.h5", [SCENE], [METHOD])
 
 
 @pytest.fixture
@@ -36,118 +37,115 @@ def copy(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copy(written, tmp_path / "results.h5"))
 
 
-def in_last_bit(dataset: h5py.Dataset) -> None:
-    values = dataset[()]
-    values.reshape(-1)[-1] = np.nextafter(values.reshape(-1)[-1], np.inf)
-    dataset[...] = values
+def change_row(path: Path, run: str, column: str, change: Callable[[np.ndarray], object]) -> None:
+    """Changes a column of a row and leaves its checksum as it was."""
+    place = TableFile(path).place(run)
+    values = place.read()[column].copy()
+    change(values)
+    with path.open("r+b") as file:
+        file.seek(place.offsets[column])
+        file.write(values.tobytes())
 
 
-def every_array(path: Path) -> list[str]:
-    with h5py.File(path) as file:
-        return [name for name, item in file[RUN].items() if item.dtype.kind == "f"]
+def last_bit(values: np.ndarray) -> None:
+    values.reshape(-1).view(np.uint8)[-8 if values.itemsize == 8 else -1] ^= 1
 
 
-def test_the_last_bit_of_every_array_is_found(copy: Path) -> None:
-    arrays = every_array(copy)
-    assert {"time", "angles", "rates", "tip", "kinetic_energy", "potential_energy", "work", "energy_error"} <= {*arrays}
-    for name in arrays:
-        with h5py.File(copy, "r+") as file:
-            before = file[RUN][name][()]
-            in_last_bit(file[RUN][name])
-        (found,) = [one for one in failed(judged(copy)) if one.name == "integrity"]
-        assert (found.where.scene, found.where.method) == ("check/held", METHOD)
-        assert found.hint.startswith(f"{name} changed")
-        with open_results(copy) as results, pytest.raises(StoreError, match=f"{name} changed after it was written"):
-            results.scenes["check/held"].runs[METHOD].array(name)
-        with h5py.File(copy, "r+") as file:
-            file[RUN][name][...] = before
-    assert not failed(judged(copy))
+def forge(path: Path, run: str, change: Callable[[Rows], object]) -> None:
+    """Changes a row and gives it the checksum that belongs to it, as a careful forger does."""
+    place = TableFile(path).place(run)
+    row = {name: values.copy() for name, values in place.read().items()}
+    change(row)
+    place.write(place.first, row)
 
 
-CHANGES: dict[str, Callable[[h5py.File], object]] = {
-    "a status": lambda file: file[RUN].attrs.modify("status", "inaccurate"),
-    "a metric": lambda file: file[RUN].attrs.modify("energy_drift_max", 0.0),
-    "a unit": lambda file: file[RUN]["angles"].attrs.modify("units", "deg"),
-    "a title": lambda file: file["check/held"].attrs.modify("title", "another"),
-    "a version": lambda file: file.attrs.modify("numpy", "0.0"),
-    "an array more": lambda file: file[RUN].create_dataset("more", data=np.zeros(3)),
-    "an array less": lambda file: file[RUN].__delitem__("energy_error"),
-    "digests gone": lambda file: file[RUN].attrs.__delitem__("digests"),
-    "the summary": lambda file: in_last_bit(file["summary/run_time_s"]),
+def test_the_last_bit_of_every_column_of_a_run_is_found(copy: Path) -> None:
+    columns = TableFile(copy).place(RUN).row.names or ()
+    assert {"angles", "rates", "tip", "kinetic_energy", "energy_error", "energy_drift_max", "message"} <= {*columns}
+    before = copy.read_bytes()
+    for column in columns:
+        change_row(copy, RUN, column, last_bit)
+        with open_results(copy) as results:
+            run = results.scenes[SCENE].runs[METHOD]
+            assert run.is_damaged, column
+            with pytest.raises(StoreError, match=f"{RUN} changed after it was written"):
+                run.array("angles")
+        copy.write_bytes(before)
+    with open_results(copy) as results:
+        assert not any(run.is_damaged for run in results.scenes[SCENE].runs.values())
+
+
+def test_check_and_report_name_a_damaged_run(copy: Path, tmp_path: Path) -> None:
+    change_row(copy, RUN, "angles", last_bit)
+    (damage,) = [check for check in failed(judged(copy)) if check.name == "integrity"]
+    assert (damage.where.scene, damage.where.method) == (SCENE, METHOD)
+    report = rotor_mbs("report", copy, "-o", tmp_path / "report")
+    assert report.status == 2
+    (line,) = report.err.splitlines()
+    assert f"{RUN} changed after it was written" in line
+    with pytest.raises(StoreError, match=f"{RUN} changed after it was written"):
+        _ = rm.open(copy)[RUN]
+
+
+LAID_OUT: dict[str, Callable[[h5py.File], object]] = {
+    "a setting": lambda file: file["runs/settings"].__setitem__(1, "{}"),
+    "a version": lambda file: file["runs/versions"].__setitem__(1, "{}"),
+    "a time": lambda file: file[SCENE]["time"].__setitem__(1, 0.5),
+    "a unit": lambda file: file[SCENE]["angles"].attrs.modify("units", "deg"),
+    "a title": lambda file: file[SCENE].attrs.modify("title", "another"),
+    "the version of a library": lambda file: file.attrs.modify("numpy", "0.0"),
+    "no digests": lambda file: file[SCENE].attrs.__delitem__("digests"),
+    "an array more": lambda file: file[SCENE].create_dataset("more", data=np.zeros(3)),
+    "an array less": lambda file: file[SCENE].__delitem__("energy_error"),
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_change_is_found_by_check(change: str, copy: Path) -> None:
-    with h5py.File(copy, "r+") as file:
-        CHANGES[change](file)
-    assert any(one.name == "integrity" for one in failed(judged(copy)))
-
-
-@pytest.mark.parametrize("change", ["a status", "a title", "a unit"])
-def test_a_change_is_told_by_report_in_one_line(
-    change: str, copy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("change", LAID_OUT)
+@pytest.mark.parametrize("command", ["check", "report", "run"])
+def test_a_change_of_what_was_laid_out_is_refused_in_one_line(
+    change: str, command: str, copy: Path, tmp_path: Path
 ) -> None:
     with h5py.File(copy, "r+") as file:
-        CHANGES[change](file)
-    assert main(["report", str(copy), "-o", str(tmp_path / "report")]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "changed after" in line
+        LAID_OUT[change](file)
+    before = copy.read_bytes()
+    words = {
+        "check": ["check", copy],
+        "report": ["report", copy, "-o", tmp_path / "report"],
+        "run": ["run", SCENE, "-m", METHOD, "-o", copy, "-j", "1"],
+    }
+    ended = rotor_mbs(*words[command])
+    assert ended.status == 2
+    (line,) = ended.err.splitlines()
+    assert "changed after the file was laid out" in line
+    assert copy.read_bytes() == before
 
 
-def test_a_damaged_run_is_computed_anew_by_the_same_command(copy: Path) -> None:
-    with h5py.File(copy, "r+") as file:
-        in_last_bit(file[RUN]["angles"])
-        count = len(file["check/held"])
-    assert count == 2
-    assert len(ResultsStore(copy).stored_keys()) == 1  # the reference's
-    results_file(copy, ["check/held"], [METHOD])
-    assert not failed(judged(copy))
+# Behind checksums that are right
 
 
-def test_a_merge_does_not_bless_what_was_damaged(copy: Path) -> None:
-    with h5py.File(copy, "r+") as file:
-        in_last_bit(file[RUN]["angles"])
-    results_file(copy, ["check/held"], ["lagrange/radau"])
-    assert [one.where.method for one in failed(judged(copy)) if one.name == "integrity"] == [METHOD]
-
-
-def sealed_anew(file: h5py.File, group: str) -> None:
-    """Digests as a careful forger leaves them."""
-    del file[group].attrs["digests"]
-    seal(file[group])
-
-
-def test_a_growth_that_hides_an_error_is_found_behind_new_digests(copy: Path) -> None:
+def test_a_growth_that_hides_an_error_is_found(copy: Path) -> None:
     """With a growth of 1e6 at the second sample nothing is compared any more, and a wrong run could be called ok."""
-    with h5py.File(copy, "r+") as file:
-        file["check/held/reference/error_growth"][1] = 1e6
-        sealed_anew(file, "check/held/reference")
-    checks = {one.name for one in failed(judged(copy))}
-    assert "growth" in checks
-    assert "integrity" not in checks
+    forge(copy, f"{SCENE}/reference", lambda row: row["error_growth"].__setitem__((0, 1), 1e6))
+    names = {check.name for check in failed(judged(copy))}
+    assert "growth" in names
+    assert "integrity" not in names
 
 
-def test_an_energy_error_that_is_not_the_balance_is_found_behind_new_digests(copy: Path) -> None:
-    with h5py.File(copy, "r+") as file:
-        values = file[RUN]["energy_error"][()]
-        values[5] += 1.0
-        file[RUN]["energy_error"][...] = values
-        sealed_anew(file, RUN)
-    (found,) = failed(judged(copy))
-    assert (found.name, found.where.channel) == ("energies", "energy error")
+def test_an_energy_error_that_is_not_the_balance_is_found(copy: Path) -> None:
+    forge(copy, RUN, lambda row: row["energy_error"].__setitem__((0, 5), row["energy_error"][0, 5] + 1.0))
+    (failure,) = failed(judged(copy))
+    assert (failure.name, failure.where.channel) == ("energies", "energy error")
 
 
-def test_settings_and_steps_that_are_not_the_methods_are_found_behind_new_digests(copy: Path) -> None:
+def test_settings_and_steps_that_are_not_the_methods_are_found(copy: Path) -> None:
+    forge(copy, RUN, lambda row: row["steps"].fill(1))
+    assert {check.name for check in failed(judged(copy))} == {"steps"}
+    columns = TableFile(copy).tables["runs"].filled.keys()
     with h5py.File(copy, "r+") as file:
-        file[RUN].attrs["settings"] = '{"step": 0.001}'
-        file[RUN].attrs["steps"] = 1
-        sealed_anew(file, RUN)
-    assert {one.name for one in failed(judged(copy))} == {"settings"}
-    with h5py.File(copy, "r+") as file:
-        file[RUN].attrs["settings"] = '{"absolute_tolerance": 1e-16, "relative_tolerance": 3e-14}'
-        sealed_anew(file, RUN)
-    assert {one.name for one in failed(judged(copy))} == {"steps"}
+        file["runs/settings"][1] = '{"step": 0.001}'
+        del file["runs"].attrs["digests"]
+        seal(file["runs"], later=columns)
+    assert "settings" in {check.name for check in failed(judged(copy))}
 
 
 # What is refused: links, other files' arrays, claims
@@ -159,85 +157,103 @@ def outside(path: Path) -> Path:
 
 
 FOREIGN: dict[str, Callable[[h5py.Group, Path], object]] = {
-    "an external link": lambda run, place: run.__setitem__("angles", h5py.ExternalLink(str(place), "/x")),
-    "a soft link": lambda run, _: run.__setitem__("angles", h5py.SoftLink("/check/held/reference/angles")),
-    "another file's bytes": lambda run, place: run.create_dataset(
-        "angles", (151, 4), "f8", external=[(str(place), 0, 151 * 32)]
+    "an external link": lambda scene, place: scene.__setitem__("angles", h5py.ExternalLink(str(place), "/x")),
+    "a soft link": lambda scene, _: scene.__setitem__("angles", h5py.SoftLink(f"/{SCENE}/rates")),
+    "another file's bytes": lambda scene, place: scene.create_dataset(
+        "angles", (2, 151, 4), "f8", external=[(str(place), 0, 2 * 151 * 32)]
     ),
-    "30 GB that are not there": lambda run, _: run.create_dataset("angles", (10**9, 4), "f8", chunks=(1000, 4)),
-    "a group": lambda run, _: run.create_group("angles"),
-    "a text": lambda run, _: run.create_dataset("angles", data="text"),
-    "an array of nothing": lambda run, _: run.create_dataset("angles", data=h5py.Empty("f8")),
+    "30 GB that are not there": lambda scene, _: scene.create_dataset("angles", (10**9, 4), "f8", chunks=(1000, 4)),
+    "a compressed bomb": lambda scene, _: scene.create_dataset(
+        "angles", data=np.zeros((1_000_000, 4)), compression="gzip"
+    ),
+    "a group": lambda scene, _: scene.create_group("angles"),
+    "a text": lambda scene, _: scene.create_dataset("angles", data="text"),
+    "an array of nothing": lambda scene, _: scene.create_dataset("angles", data=h5py.Empty("f8")),
 }
 
 
+@pytest.mark.parametrize("is_sealed", [False, True])
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_what_is_not_an_array_of_the_file_is_refused(
-    kind: str, copy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_not_an_array_of_the_file_is_refused(kind: str, is_sealed: bool, copy: Path, tmp_path: Path) -> None:
     with h5py.File(copy, "r+") as file:
-        del file[RUN]["angles"]
-        FOREIGN[kind](file[RUN], outside(tmp_path / "outside.bin"))
-    assert main(["report", str(copy), "-o", str(tmp_path / "report")]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert str(copy) in line
-    assert main(["check", str(copy)]) == 1
-    assert any(f"check/held {METHOD}" in line for line in capsys.readouterr().out.splitlines())
+        scene, columns = file[SCENE], TableFile(copy).tables[SCENE].filled
+        del scene["angles"]
+        FOREIGN[kind](scene, outside(tmp_path / "outside.bin"))
+        if is_sealed and kind not in ("an external link", "a group"):
+            for name, value in (("units", "rad"), ("long_name", "angles")):
+                scene["angles"].attrs[name] = value
+            del scene.attrs["digests"]
+            seal(scene, later=columns.keys())
+    for words in (["report", copy, "-o", tmp_path / "report"], ["check", copy]):
+        ended = rotor_mbs(*words)
+        assert ended.status == 2
+        (line,) = ended.err.splitlines()
+        assert str(copy) in line
 
 
-def test_a_compressed_bomb_is_refused(copy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with h5py.File(copy, "r+") as file:
-        del file[RUN]["angles"]
-        file[RUN].create_dataset("angles", data=np.zeros((5_000_000, 4)), compression="gzip")
-    assert main(["report", str(copy), "-o", str(tmp_path / "report")]) == 2
-    assert "claims 1.6e+08 bytes" in capsys.readouterr().err
-
-
-def test_a_group_that_holds_itself_ends(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_group_that_holds_itself_ends(copy: Path) -> None:
     with h5py.File(copy, "r+") as file:
         file["check/again"] = file["check"]
         file["check/once_more"] = file["/"]
-    assert main(["check", str(copy)]) == 0
-    assert "runs judged: 1 lagrange/dop853\n" in capsys.readouterr().out
+    ended = rotor_mbs("check", copy)
+    assert ended.status == 2
+    assert len(ended.err.splitlines()) == 1
+
+
+def test_files_that_are_not_ours_are_refused_with_one_line(written: Path, tmp_path: Path) -> None:
+    (tmp_path / "cut.h5").write_bytes(written.read_bytes()[:3000])
+    (tmp_path / "half.h5").write_bytes(written.read_bytes()[: written.stat().st_size // 2])
+    (tmp_path / "text.h5").write_text("no HDF5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    with h5py.File(tmp_path / "newer.h5", "w") as file:
+        file.attrs["format"], file.attrs["format_version"] = "rotor_mbs", 99
+    for name in ("cut.h5", "half.h5", "text.h5", "other.h5", "newer.h5", "missing.h5", "."):
+        with pytest.raises(StoreError) as caught, open_results(tmp_path / name):
+            pass
+        assert "\n" not in str(caught.value)
+        assert str(tmp_path) in str(caught.value)
 
 
 # Sweeps
 
+SWEEP = """
+title = "three"
+scene = "paper/fig11"
+methods = ["lagrange/dop853"]
+samples = 3
+outputs = ["angles", "rates"]
+[change]
+duration = 0.2
+[[axis]]
+key = "gravity"
+values = [9.7, 9.8, 9.9]
+"""
+
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sweep")
-    (folder / "s.toml").write_text(
-        'title = "three"\nscene = "paper/fig11"\nmethods = ["lagrange/dop853"]\n'
-        'samples = 3\noutputs = ["angles", "rates"]\n[change]\nduration = 0.2\n'
-        '[[axis]]\nkey = "gravity"\nvalues = [9.7, 9.8, 9.9]\n'
-    )
-    run_local(load_sweep(folder / "s.toml"), folder / "s.h5", workers=1)
-    return folder / "s.h5"
+    return made_sweep(tmp_path_factory.mktemp("sweep"), SWEEP)
 
 
 @pytest.mark.parametrize("column", ["angles", "energy_drift_max", "status", "gravity", "time", "crc32"])
-def test_a_changed_number_of_a_finished_sweep_is_found(
-    column: str, swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_changed_number_of_a_finished_sweep_is_found(column: str, swept: Path, tmp_path: Path) -> None:
     copy = Path(shutil.copy(swept, tmp_path / "s.h5"))
-    assert main(["check", str(copy)]) == 0
+    assert rotor_mbs("check", copy).status == 0
     with h5py.File(copy, "r+") as file:
         values = file[column][()]
         values.view(np.uint8).reshape(-1)[0] ^= 1
         file[column][...] = values
-    status = main(["check", str(copy)])
-    out = capsys.readouterr()
+    ended = rotor_mbs("check", copy)
     if column in ("gravity", "time"):
-        assert status == 2
-        assert f"{column} changed after the file was laid out" in out.err
-    else:
-        assert status == 1
-        assert "1 runs changed after they were written" in out.out
+        assert ended.status == 2
+        assert f"{column} changed after the file was laid out" in ended.err
+        return
+    assert ended.status == 1
+    assert "1 runs changed after they were written" in ended.out
+    with pytest.raises(StoreError, match="runs 0 changed"):
+        StoredSweep(copy)
+    assert rotor_mbs("report", copy, "-o", tmp_path / "report").status == 2
+    for read in (partial(rm.Runs.column, name="time"), partial(rm.Runs.at, name="angles", sample=0), rm.Runs.to_xarray):
         with pytest.raises(StoreError, match="runs 0 changed"):
-            StoredSweep(copy)
-        assert main(["report", str(copy), "-o", str(tmp_path / "report")]) == 2
-        data = rm.SweepData(copy)
-        for read in (partial(data.column, "time"), partial(data.at, "angles", 0), data.to_xarray):
-            with pytest.raises(StoreError, match="runs 0 changed"):
-                read()
+            read(rm.open(copy))

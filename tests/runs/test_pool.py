@@ -67,6 +67,7 @@ def test_two_tasks_at_once_are_in_two_processes(tmp_path: Path) -> None:
     assert os.getpid() not in found
 
 
+@pytest.mark.full
 def test_death_and_time_out_are_told_apart_and_cost_one_task_each(tmp_path: Path) -> None:
     with WorkerPool(2) as pool:
         died = pool.submit(_meet_and_die, str(tmp_path), _LONG_S)
@@ -95,6 +96,7 @@ def test_a_time_out_under_a_memory_limit_is_no_end_of_a_task() -> None:
     )  # fmt: skip
 
 
+@pytest.mark.full
 def test_a_process_killed_while_it_waits_is_replaced() -> None:
     """The task that finds it dead may be lost, and is then tried again; the pool goes on."""
     with WorkerPool(1) as pool:
@@ -110,6 +112,7 @@ def _large(size: int) -> bytes:
     return bytes(size)
 
 
+@pytest.mark.full
 def test_a_process_killed_while_it_sends_a_result_does_not_stop_the_pool() -> None:
     with WorkerPool(1) as pool:
         for _ in range(5):
@@ -166,6 +169,7 @@ def test_an_infinite_time_limit_is_none() -> None:
         assert pool.submit(_pid, None, float("inf")).result() > 0
 
 
+@pytest.mark.full
 def test_closing_ends_running_tasks_and_starts_no_others(tmp_path: Path) -> None:
     pool = WorkerPool(2)
     running = [pool.submit(_meet_and_sleep, str(tmp_path), _LONG_S) for _ in range(2)]
@@ -299,6 +303,7 @@ def _split(numbers: tuple[int, ...]) -> list[tuple[int, ...]]:
     return [(number,) for number in numbers] if len(numbers) > 1 else []
 
 
+@pytest.mark.full
 def test_a_lost_task_of_many_runs_is_split_and_only_one_run_is_lost() -> None:
     def limit(numbers: tuple[int, ...]) -> float:
         return 1.0 if 7 in numbers else _LONG_S
@@ -310,6 +315,7 @@ def test_a_lost_task_of_many_runs_is_split_and_only_one_run_is_lost() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
 def test_dead_processes_leave_no_open_files() -> None:
     _ends(_pid, [0])  # opens what stays open
@@ -341,7 +347,14 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks for processes in /proc")
-@pytest.mark.parametrize("signals", [[signal.SIGINT], [signal.SIGINT, signal.SIGINT], [signal.SIGKILL]])
+@pytest.mark.parametrize(
+    "signals",
+    [
+        [signal.SIGINT],
+        pytest.param([signal.SIGINT, signal.SIGINT], marks=pytest.mark.full),
+        pytest.param([signal.SIGKILL], marks=pytest.mark.full),
+    ],
+)
 def test_workers_end_with_their_parent(tmp_path: Path, signals: list[signal.Signals]) -> None:
     """Interrupted once or twice, or killed: no worker goes on."""
     program = tmp_path / "program.py"

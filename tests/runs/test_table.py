@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -15,6 +15,7 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.records import points_table, row_of_point
@@ -24,11 +25,12 @@ from rotor_mbs.runs.table import (
     MISSING,
     Place,
     Rows,
+    StoredTable,
     Table,
     blank_rows,
     characters,
     lay_out,
-    stored_tables,
+    stored_table,
     text_of,
 )
 from rotor_mbs.solution.status import STATUSES
@@ -51,6 +53,11 @@ def _table() -> Table:
     return Table("", np.arange(ROWS), known, filled, scales)
 
 
+def _stored(path: Path) -> StoredTable:
+    with files.open_file(path) as file, files.reading(path):
+        return stored_table(file)
+
+
 def _rows(place: Place, first: int, count: int) -> Rows:
     rows = blank_rows(count, place.row)
     rows["status"][:], rows["steps"][:] = 0, 7
@@ -67,14 +74,14 @@ def path(tmp_path: Path) -> Path:
 
 
 def _fill(path: Path, starts: range) -> None:
-    place = stored_tables(path)[""].place()
+    place = _stored(path).place()
     for first in starts:
         count = min(4, ROWS - first)
         place.write(first, _rows(place, first, count))
 
 
 def _missing(path: Path) -> list[int]:
-    table = stored_tables(path)[""]
+    table = _stored(path)
     return np.flatnonzero(table.place().stored(table.statuses()) == MISSING).tolist()
 
 
@@ -113,7 +120,7 @@ def test_the_order_of_writing_does_not_show(path: Path, tmp_path: Path) -> None:
 def test_rows_without_their_status_are_missing(path: Path) -> None:
     """As after a kill between the numbers and the status."""
     _fill(path, range(0, 8, 4))
-    stored_tables(path)[""].place().mark_missing([5])
+    _stored(path).place().mark_missing([5])
     assert _missing(path) == [5, *range(8, ROWS)]
     _fill(path, range(4, ROWS, 4))
     assert _missing(path) == []
@@ -122,7 +129,7 @@ def test_rows_without_their_status_are_missing(path: Path) -> None:
 @pytest.mark.parametrize("column", ["angles", "crc32", "status", "message", "steps"])
 def test_a_flipped_bit_of_any_computed_column_is_found(path: Path, column: str) -> None:
     _fill(path, range(0, ROWS, 4))
-    place = stored_tables(path)[""].place(9)
+    place = _stored(path).place(9)
     with path.open("r+b") as file:
         file.seek(place.offsets[column])
         byte = file.read(1)[0]
@@ -136,15 +143,15 @@ def test_a_change_of_what_was_laid_out_is_refused(path: Path, name: str) -> None
     with h5py.File(path, "r+") as file:
         file[name][3] += 1
     with pytest.raises(StoreError, match=f"{name} changed after the file was laid out"):
-        stored_tables(path)
+        _stored(path)
 
 
 def test_rows_of_another_number_do_not_count(path: Path) -> None:
     """Bytes that are copied to another row have the wrong checksum."""
-    place = stored_tables(path)[""].place()
+    place = _stored(path).place()
     place.write(0, _rows(place, 0, 1))
     rows = place.read(1)
-    moved = stored_tables(path)[""].place(3)
+    moved = _stored(path).place(3)
     with path.open("r+b") as file:
         for name, values in rows.items():
             file.seek(moved.offsets[name])
@@ -153,7 +160,7 @@ def test_rows_of_another_number_do_not_count(path: Path) -> None:
 
 
 def test_a_worker_of_an_earlier_file_does_not_write_to_its_successor(path: Path) -> None:
-    place = stored_tables(path)[""].place()
+    place = _stored(path).place()
     path.rename(path.with_name("kept.h5"))  # keeps its inode from being used again
     lay_out(path, [_table()], {"title": "t"})
     before = path.read_bytes()
@@ -171,7 +178,7 @@ def test_a_file_that_was_cut_off_is_refused_with_one_line(path: Path) -> None:
     _fill(path, range(0, ROWS, 4))
     path.write_bytes(path.read_bytes()[:2000])
     with pytest.raises(StoreError) as caught:
-        stored_tables(path)
+        _stored(path)
     assert "\n" not in str(caught.value)
 
 
@@ -181,7 +188,7 @@ def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
     program = (
         "import sys, pathlib, test_table as t\n"
         "path, first = pathlib.Path(sys.argv[1]), int(sys.argv[2])\n"
-        "place = t.stored_tables(path)[''].place()\n"
+        "place = t._stored(path).place()\n"
         "for start in list(range(first, t.ROWS, 2)) * 1000:\n"
         "    place.write(start, t._rows(place, start, 1))\n"
     )
@@ -191,13 +198,13 @@ def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
             subprocess.Popen([sys.executable, "-c", program, str(path), str(first)], env=environment)
             for first in (0, 1)
         ]
-        with suppress(subprocess.TimeoutExpired):
+        with contextlib.suppress(subprocess.TimeoutExpired):
             writers[0].wait(timeout=0.5 + 0.03 * round_)
         for writer in writers:
             writer.send_signal(signal.SIGKILL)
             writer.wait()
         stored = [row for row in range(ROWS) if row not in _missing(path)]
-        place = stored_tables(path)[""].place()
+        place = _stored(path).place()
         for row in stored:
             assert (place.read(1, row)["angles"] == row).all()
     _fill(path, range(0, ROWS, 4))
@@ -222,9 +229,9 @@ def _write(file: TableFile, run: str, value: float) -> None:
     place.write(place.first, row)
 
 
-def _stored(path: Path) -> list[str]:
+def _runs(path: Path) -> list[str]:
     file = TableFile(path)
-    return [run for run in file.tables["runs"].runs.tolist() if file.place(run).is_stored]
+    return [run for run in file.table("runs").runs.tolist() if file.place(run).is_stored]
 
 
 def test_what_is_asked_again_changes_nothing(tmp_path: Path) -> None:
@@ -239,9 +246,9 @@ def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
     path, first = tmp_path / "r.h5", "paper/fig08/lagrange/taylor"
     _write(fit(path, results_tables(_asked("reference", "lagrange/taylor"))), first, 1.0)
     file = fit(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
-    assert _stored(path) == [first]
+    assert _runs(path) == [first]
     assert (file.place(first).read()["angles"] == 1.0).all()
-    assert file.tables["paper/fig08"].runs.tolist() == [
+    assert file.table("paper/fig08").runs.tolist() == [
         "reference", "lagrange/taylor", "exudyn_chain/generalized_alpha",
     ]  # fmt: skip
     assert np.isnan(file.place(first).read()["constraint_error"]).all()  # a column that it does not have
@@ -255,9 +262,9 @@ def test_other_settings_and_versions_are_missing_and_others_stay(tmp_path: Path)
         _write(file, f"paper/fig08/{name}", 1.0)
     scene = _asked("exudyn_tree/rk67")[0].scene
     fit(path, results_tables([Asked(scene, "exudyn_tree/rk67", {"step": 1e-3})]))
-    assert _stored(path) == ["paper/fig08/lagrange/taylor"]
+    assert _runs(path) == ["paper/fig08/lagrange/taylor"]
     fit(path, results_tables([Asked(scene, "lagrange/taylor", versions={"rotor_mbs": "0"})]))
-    assert _stored(path) == []
+    assert _runs(path) == []
 
 
 def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_path: Path) -> None:
@@ -265,23 +272,26 @@ def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_
     _write(fit(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
     with pytest.raises(InputError, match="has lagrange/taylor of a scene of that name with other numbers"):
         fit(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
-    assert _stored(path) == ["paper/fig08/lagrange/taylor"]
+    assert _runs(path) == ["paper/fig08/lagrange/taylor"]
     fit(path, results_tables(_asked("lagrange/taylor", gravity=9.81)))
-    assert _stored(path) == []
+    assert _runs(path) == []
 
 
 def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
     fit(path, results_tables(_asked("lagrange/taylor")))
-    point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5}
+    point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5, "tolerance": np.nan}
     file = fit(path, [points_table("stability", [point])])
     place = file.place("a", "stability")
     place.write(place.first, row_of_point(place, "ok", "", {"angle_error_max": 0.25}))
     file = fit(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
     assert file.place("a", "stability").is_stored
     assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
+    assert fit(path, [points_table("stability", [point])]).place("a", "stability").is_stored
+    changed = fit(path, [points_table("stability", [point | {"step": 0.25}])])
+    assert not changed.place("a", "stability").is_stored
     file = fit(path, [], dropped=[("stability", "a")])
-    assert "stability" not in file.tables
+    assert "stability" not in file.groups
 
 
 def test_a_sweeps_file_is_no_output_of_runs(path: Path) -> None:

@@ -18,9 +18,9 @@ from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
 from rotor_mbs.models.exudyn import adapter, chain, sensor_samples
-from rotor_mbs.models.exudyn.methods import MultibodySolver
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
+from rotor_mbs.models.exudyn.solvers import MultibodySolver
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.judgement import Judgement, energy_conditioning, judge
 from rotor_mbs.solution.solution import Solution

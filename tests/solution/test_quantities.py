@@ -19,7 +19,6 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.quantities import BUILT_IN, Quantity
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.status import STATUSES, recode
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies.run import solve_judged
 
@@ -136,12 +135,3 @@ def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(InputError, match=r'pip install "rotor_mbs\[xarray\]"'):
         solve("lagrange/dop853", SCENE, {}).to_xarray()
-
-
-def test_codes_of_statuses_are_read_by_their_meanings() -> None:
-    earlier = {"flag_meanings": "ok inaccurate diverged singular solver_failed timed_out worker_died"}
-    codes = recode(np.array([0, 6, -1], dtype=np.int8), earlier)
-    assert [STATUSES[code] for code in codes[:2]] == ["ok", "worker_died"]
-    assert codes[2] == -1
-    same = np.arange(len(STATUSES))
-    np.testing.assert_array_equal(recode(same, {}), same)

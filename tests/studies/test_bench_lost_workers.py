@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rotor_mbs.runs.case import Case
 from support.scenes import paper
 
-from rotor_mbs.runs.records import Record
-from rotor_mbs.runs.runner import Job
+from rotor_mbs.methods.catalogue import ladders
+from rotor_mbs.runs.results import fit
 from rotor_mbs.studies import bench
 from rotor_mbs.studies.bench_worker import Point, ask
 
@@ -26,21 +26,14 @@ def ask_dying(request: tuple[str, Point]) -> Any:
     task, point = request
     kills = Path(os.environ[KILLS])
     left = kills.read_text().split()
-    if (key := f"{point.curve}:{task}") in left:
+    if (key := f"{point.curve.rpartition(' ')[2]}:{task}") in left:
         left.remove(key)
         kills.write_text(" ".join(left))
         os.kill(os.getpid(), signal.SIGKILL)
     return ask(request)
 
 
-def point(curve: str) -> Point:
-    return Point(curve, "lagrange/ode45", 1e-3, (("absolute_tolerance", 1e-3), ("relative_tolerance", 1e-3)))
-
-
-def _record(rows: list[dict[str, Any]]) -> Record:
-    return Record("bench", "s", "c", {"setting_kind": "tolerance", "messages": [""]}, bench.arrays_of(rows))
-
-
+@pytest.mark.full
 def test_a_point_whose_process_dies_is_tried_again_and_after_that_not_stored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -48,16 +41,19 @@ def test_a_point_whose_process_dies_is_tried_again_and_after_that_not_stored(
     kills.write_text("once:prepare twice:judge twice:judge")
     monkeypatch.setenv(KILLS, str(kills))
     monkeypatch.setattr(bench, "ask", ask_dying)
-    curves = {name: [point(name)] for name in ("once", "twice", "never")}
-    scenes = {points[0]: (SCENE, None) for points in curves.values()}
-    found = bench.measure_points(scenes, list(curves.values()), {"budget_s": 60.0, "repeats": 2})
+    (ladder,) = ladders(["lagrange/ode45"])
+    short = replace(ladder, values=(1e-3,))
+    curves = [bench.Curve(SCENE, replace(short, variant=f" {name}"), {}) for name in ("once", "twice", "never")]
+    points = [bench.points_of(curve.ladder, 0.05) for curve in curves]
+    measured = bench.measure_points({own[0]: (SCENE, None) for own in points}, points, 2, 60.0)
     assert kills.read_text() == ""
-    for name, points in curves.items():
-        job = Job(Case(SCENE, points[0].method), tmp_path / f"{name}.h5")
-        result = found.lost(points) or bench.store_curve(job, _record(found.rows(points)))
-        if name == "twice":
-            assert result.status == "worker_died"
-            assert result.message.endswith("and again when it was tried alone")
+    file = fit(tmp_path / "b.h5", [bench.bench_table(curves)])
+    for curve, own in zip(curves, points, strict=True):
+        lost = measured.lost(own)
+        if curve.ladder.variant == " twice":
+            assert lost.endswith("and again when it was tried alone")
         else:
-            assert (result.status, result.message) == ("ok", "1 points, 0 failed, 0 left out")
-        assert job.part.exists() == (result.status == "ok")
+            assert not lost
+            outcome = bench.store_curve(file, curve, measured.rows(own), {})
+            assert (outcome.status, outcome.message) == ("ok", "1 points, 0 failed, 0 left out")
+    assert [bench.is_measured(file, curve) for curve in curves] == [True, False, True]

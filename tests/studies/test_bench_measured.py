@@ -14,19 +14,19 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from rotor_mbs.runs.timing import conduct, statistics
+from support.commands import Ended, rotor_mbs
 from support.cost_scaling import SETTINGS, with_blades
 from support.references import reference
 from support.scenes import paper
 
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, fitted_order, time_to_reach
-from rotor_mbs.cli import main
 from rotor_mbs.methods.catalogue import find_method, ladders, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.metrics import angle_error
+from rotor_mbs.studies.bench_timing import conduct, statistics
 from rotor_mbs.studies.bench_worker import Point, PointTimer, thinned, thinned_reference
 
 
@@ -141,21 +141,22 @@ def test_a_method_made_twice_slower_moves_up_by_two(monkeypatch: pytest.MonkeyPa
     assert timing.judge(DOP853)["angle_error_max"] == measured(DOP853)["angle_error_max"]
 
 
-def bench(tmp_path: Path, *arguments: str, name: str = "b.h5") -> int:
-    return main(["bench", *arguments, "-o", str(tmp_path / name)])
+def bench(tmp_path: Path, *words: str, name: str = "b.h5") -> Ended:
+    return rotor_mbs("bench", *words, "-o", tmp_path / name)
 
 
 def curves(tmp_path: Path, name: str = "b.h5") -> dict[str, Record]:
     return {curve.name: curve for curve in read_records(tmp_path / name, "bench")}
 
 
-def test_a_bench_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.full
+def test_a_bench_goes_on_where_it_was(tmp_path: Path) -> None:
     quick = ("--repeats", "2", "--budget", "3")
-    assert bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick) == 0
+    assert bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick).status == 0
     first = curves(tmp_path)
-    assert bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick) == 0
-    assert "0 scenes measured, 1 there already" in capsys.readouterr().out
-    assert bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", "-m", "exudyn_tree/rk67", *quick) == 0
+    again = bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", *quick)
+    assert "0 scenes measured, 1 already stored" in again.out
+    assert bench(tmp_path, "paper/fig08", "-m", "lagrange/dop853", "-m", "exudyn_tree/rk67", *quick).status == 0
     second = curves(tmp_path)
     assert set(second) == {"lagrange/dop853", "exudyn_tree/rk67"}
     before, after = (found["lagrange/dop853"].arrays["run_time_s"] for found in (first, second))
@@ -164,75 +165,40 @@ def test_a_bench_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixt
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b-report", "b.h5"]
 
 
-def test_the_stored_curve_keeps_the_contract(tmp_path: Path) -> None:
-    assert bench(tmp_path, "paper/fig08", "-m", "exudyn_tree/rk44", "--repeats", "2", "--budget", "3") == 0
+def test_the_stored_points_keep_the_contract(tmp_path: Path) -> None:
+    ended = bench(tmp_path, "check/held", "-m", "exudyn_tree/rk44", "--repeats", "2", "--budget", "0.5")
+    assert ended.status == 0, ended.err
     with h5py.File(tmp_path / "b.h5") as file:
-        group = file["bench/paper/fig08/exudyn_tree/rk44"]
-        for name in (
-            "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "run_time_s", "run_time_min_s",
-            "run_time_q1_s", "run_time_q3_s", "setup_time_s", "output_time_s", "repeats", "steps", "status",
-        ):  # fmt: skip
-            assert group[name].dims[0][0].name.endswith("/setting"), name
-        assert group["setting"].attrs["kind"] == "step"
-        assert group.attrs["order_expected"] == 4.0
-        assert group.attrs["horizon_s"] < 10.0
+        table = file["bench"]
+        columns = (
+            "angle_error_max angle_error_end tip_error_max energy_drift_max run_time_s run_time_min_s run_time_q1_s "
+            "run_time_q3_s setup_time_s output_time_s repeats steps status step tolerance left_out crc32"
+        )
+        for name in columns.split():
+            assert table[name].dims[0][0].name == "/bench/run", name
+        assert table["step"].attrs["units"] == "s"
+        assert table["scene"].asstr()[0] == "check/held"
+        assert table["run"].asstr()[0].startswith("check/held/exudyn_tree/rk44 step=")
+    (curve,) = curves(tmp_path).values()
+    assert (curve.attributes["setting_kind"], curve.attributes["order_expected"]) == ("step", 4.0)
+    assert len(curve.arrays["setting"]) == len(curve.messages) >= 6
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
+    ("words", "says"),
     [
         (("paper/fig09", "-m", "no/such"), "unknown method 'no/such'"),
         (("paper/fig09", "-m", "printed/ode45"), "no ladder for method 'printed/ode45'"),
-        ((), "nothing to measure"),
+        ((), "the following arguments are required: SCENE"),
         (("paper/nosuch",), "no such scene"),
-        (("extreme/singular-start", "-m", "lagrange/dop853"), "no usable reference"),
+        (("extreme/singular-start", "-m", "lagrange/dop853"), "every pitch at ±π/2 leaves the rotor no inertia"),
+        (("paper/fig09", "--budget", "0"), "budget"),
     ],
 )
-def test_bad_input_is_one_line(
-    arguments: tuple[str, ...], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert bench(tmp_path, *arguments) == 2
-    assert says in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_a_budget_of_nothing_and_a_file_of_another_version_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as caught:
-        bench(tmp_path, "paper/fig09", "--budget", "0")
-    assert caught.value.code == 2
-    with h5py.File(tmp_path / "b.h5", "w") as file:
-        file.attrs["format"], file.attrs["format_version"] = "rotor_mbs", 99
-    capsys.readouterr()
-    assert bench(tmp_path, "paper/fig09", "-m", "lagrange/dop853") == 2
-    assert "format_version 99, this program reads" in capsys.readouterr().err
-
-
-@pytest.mark.full
-def test_two_benches_tell_the_same(tmp_path: Path) -> None:
-    """Errors bit by bit, failures one by one; medians of runs over 1 ms within 15 % where nothing else is running."""
-    methods = ("lagrange/taylor", "exudyn_tree/rk44", "exudyn_tree/rk67", "exudyn_tree/generalized_alpha")
-    chosen = [part for name in methods for part in ("-m", name)]
-    for name in ("a.h5", "b.h5"):
-        assert bench(tmp_path, "paper/fig09", *chosen, "--budget", "25", name=name) == 0
-    first, second = curves(tmp_path, "a.h5"), curves(tmp_path, "b.h5")
-    assert set(first) == set(second)
-    # The bench's own process makes a load of one; half of one more is what an idle machine has beside it.
-    idle = max(curve.attributes["load_after"] for curve in (*first.values(), *second.values())) < 1.5
-    changes = {}
-    for name, one in first.items():
-        other = second[name]
-        both = np.array([a != "left_out" != b for a, b in zip(one.statuses, other.statuses, strict=True)])
-        assert both.sum() >= 6
-        np.testing.assert_array_equal(one.arrays["angle_error_max"][both], other.arrays["angle_error_max"][both])
-        np.testing.assert_array_equal(one.arrays["status"][both], other.arrays["status"][both])
-        a, b = one.arrays["run_time_s"][both], other.arrays["run_time_s"][both]
-        long = a > 1e-3
-        changes[name] = np.abs(b[long] / a[long] - 1.0)
-    print("largest change of a median:", {name: f"{found.max(initial=0.0):.1%}" for name, found in changes.items()})
-    if not idle:
-        pytest.skip("the machine was busy: the medians were not judged")
-    assert all(np.all(found < 0.15) for found in changes.values())
+def test_bad_input_is_one_line(words: tuple[str, ...], says: str, tmp_path: Path) -> None:
+    ended = bench(tmp_path, *words)
+    assert ended.status == 2
+    assert says in ended.err.splitlines()[-1]
 
 
 Runner = Callable[[float], tuple[Callable[[], object], Callable[[], float]]]

@@ -7,14 +7,11 @@ import io
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from rotor_mbs.runs.results_file import merge
 
 from rotor_mbs.analysis.work_precision import (
-    cost_exponent,
     failed,
     fastest,
     fitted_order,
@@ -31,7 +28,8 @@ from rotor_mbs.report.pages.bench import (
     overview_table,
     reach_table,
 )
-from rotor_mbs.runs.records import Record, read_records, write_records
+from rotor_mbs.runs.records import COLUMNS, Record, points_table, read_records, row_of_point
+from rotor_mbs.runs.results import TableFile, fit
 from rotor_mbs.solution.status import STATUSES
 
 
@@ -123,13 +121,6 @@ def test_orders_are_fitted_above_the_floor(order: int) -> None:
     assert fitted_order(steps, np.full(10, 1.0)) is None
 
 
-def test_cost_exponent_of_the_larger_sizes() -> None:
-    """3 + n²/100: the constant hides the square at small n, and not at large n."""
-    sizes = np.array([1.0, 2.0, 3.0, 100.0, 200.0, 400.0])
-    assert cost_exponent(sizes, 3.0 + sizes**2 / 100.0) == pytest.approx(2.0, abs=0.05)
-    assert cost_exponent(sizes[:1], sizes[:1]) is None
-
-
 def test_failures_are_points_and_none_is_dropped() -> None:
     assert succeeded(SLOW).tolist() == [False, True, True, False, False]
     assert failed(SLOW).tolist() == [True, False, False, False, True]
@@ -195,33 +186,49 @@ def test_csv_has_every_point_unrounded() -> None:
     assert [row["status"] for row in rows[3:]] == ["timed_out", "ok", "ok", "left_out", "inaccurate"]
 
 
-def test_curves_survive_storing_and_merging_bit_by_bit(tmp_path: Path) -> None:
-    write_records(tmp_path / "a.h5", [FAST, SLOW])
-    newer = curve("exudyn_tree/rk67", [1e-3], [5.0])
-    write_records(tmp_path / "b.h5", [newer])
-    merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
-    merge(tmp_path / "all.h5", [tmp_path / "all.h5"], {})
-    found = {one.name: one for one in read_records(tmp_path / "all.h5", "bench")}
-    assert set(found) == {"lagrange/taylor", "exudyn_tree/rk67"}
-    for name, values in FAST.arrays.items():
-        np.testing.assert_array_equal(found["lagrange/taylor"].arrays[name], values)
-    assert found["exudyn_tree/rk67"].arrays["run_time_s"].tolist() == [5.0]
-    with h5py.File(tmp_path / "all.h5") as file:
-        status = file["bench/paper/fig09/lagrange/taylor/status"]
-        assert status.dims[0][0].name.endswith("/setting")
-        assert status.attrs["flag_meanings"].split() == list(STATUSES)
-        assert status.attrs["flag_values"].tolist() == list(range(len(STATUSES)))
+def stored(path: Path, *curves: Record) -> Path:
+    """The curves in a file, as `bench` stores them."""
+    points = [point for curve in curves for point in known_points(curve)]
+    file = fit(path, [points_table("bench", points)])
+    for curve in curves:
+        facts = {name: value for name, value in curve.attributes.items() if name in COLUMNS["bench"]}
+        for i, point in enumerate(known_points(curve)):
+            place = file.place(str(point["run"]), "bench")
+            values = {name: array[i] for name, array in curve.arrays.items() if name not in ("setting", "status")}
+            place.write(place.first, row_of_point(place, curve.statuses[i], curve.messages[i], facts | values))
+    return path
 
 
-def test_curves_of_a_scene_with_other_numbers_are_dropped(tmp_path: Path) -> None:
-    write_records(tmp_path / "a.h5", [FAST, SLOW])
-    write_records(tmp_path / "b.h5", [curve("exudyn_tree/rk67", [1e-3], [5.0], scene_hash="2")])
-    merge(tmp_path / "all.h5", [tmp_path / "a.h5", tmp_path / "b.h5"], {})
-    assert [one.name for one in read_records(tmp_path / "all.h5", "bench")] == ["exudyn_tree/rk67"]
+def known_points(curve: Record) -> list[dict[str, object]]:
+    facts = curve.attributes
+    known = {
+        "scene": curve.scene, "method_name": curve.method, "curve": curve.name, "setting_kind": "step",
+        "scene_hash": facts["scene_hash"], "order_expected": facts.get("order_expected", np.nan),
+        "options": '{"budget_s": 28.0, "duration_s": 10.0}',
+    }  # fmt: skip
+    return [known | {"run": f"{curve.scene}/{curve.name} {x:g}", "step": x} for x in curve.arrays["setting"].tolist()]
+
+
+def test_curves_survive_storing_bit_by_bit(tmp_path: Path) -> None:
+    stored(tmp_path / "a.h5", FAST)
+    stored(tmp_path / "a.h5", SLOW)
+    read = {curve.name: curve for curve in read_records(tmp_path / "a.h5", "bench")}
+    assert set(read) == {"lagrange/taylor", "exudyn_tree/rk67"}
+    for curve in (FAST, SLOW):
+        for name, values in curve.arrays.items():
+            np.testing.assert_array_equal(read[curve.name].arrays[name], values)
+        assert read[curve.name].messages == curve.messages
+        assert read[curve.name].attributes.get("order_expected") == curve.attributes.get("order_expected")
+
+
+def test_a_curve_of_which_a_point_is_missing_is_not_shown(tmp_path: Path) -> None:
+    stored(tmp_path / "a.h5", FAST, SLOW)
+    TableFile(tmp_path / "a.h5").place("paper/fig09/lagrange/taylor 0.05", "bench").mark_missing([0])
+    assert [curve.name for curve in read_records(tmp_path / "a.h5", "bench")] == ["exudyn_tree/rk67"]
 
 
 def test_pages_and_csv_are_written(tmp_path: Path) -> None:
-    write_records(tmp_path / "a.h5", [FAST, SLOW])
+    stored(tmp_path / "a.h5", FAST, SLOW)
     index = write_report(tmp_path / "a.h5", tmp_path / "report")
     names = {path.name for path in index.parent.iterdir()}
     assert names == {"index.html", "bench-paper-fig09.html", "bench-paper-fig09.csv", "bench.csv"}
@@ -238,7 +245,7 @@ def test_pages_and_csv_are_written(tmp_path: Path) -> None:
 def test_names_of_curves_and_scenes_are_escaped_in_the_pages(tmp_path: Path) -> None:
     evil = '<meta http-equiv="refresh" content="0">'
     curves = [replace(FAST, name=f"lagrange/{evil}"), replace(SLOW, scene=f"paper/{evil}"), SLOW]
-    write_records(tmp_path / "a.h5", curves)
+    stored(tmp_path / "a.h5", *curves)
     index = write_report(tmp_path / "a.h5", tmp_path / "out")
     pages = [page.read_text() for page in index.parent.glob("*.html")]
     assert len(pages) == 3

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from rotor_mbs.runs.timing import Timings, allot, conduct, statistics
 from support.scenes import paper
 
 from rotor_mbs.methods.base import BuiltItem, Settings
@@ -16,6 +15,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench_worker
+from rotor_mbs.studies.bench_timing import Timings, allot, conduct, statistics
 from rotor_mbs.studies.bench_worker import Point, PointTimer
 
 SCENE = paper("fig08", duration=1.0, samples=11)

@@ -55,7 +55,7 @@ def accepted(name: str, kind: str, duration: float, folder: Path) -> None:
     if kind == "data.out":
         columns = {"rotor": {"column": "Azimuth", "wrapped": True}}
         columns |= {f"pitch_{i}": f"BldPitch{i}" for i in (1, 2, 3)} | {"rotor_rate": "RotSpeed"}
-    found = rm.compare_data(folder / kind, scene, columns=columns)
+    found = rm.compare(folder / kind, scene, columns=columns)
     assert (found.status, found.message) == ("ok", "")
     # SciPy at 1e-11 makes errors of some 1e-11 a step; a wrong digit in the equations, at least 1e-4.
     assert max(one.error_per_growth for one in found.verdict.channels) < 1e-8
@@ -90,15 +90,16 @@ def test_a_script_for_mujoco_agrees(tmp_path: Path) -> None:
         rows.append((data.time, data.qpos.copy(), data.qvel.copy()))
     time, qpos, qvel = map(np.array, zip(*rows[::10], strict=True))
     np.savez(tmp_path / "mujoco.npz", time=time, qpos=qpos, qvel=qvel)
-    found = rm.compare_data(tmp_path / "mujoco.npz", scene)
+    found = rm.compare(tmp_path / "mujoco.npz", scene)
     assert (found.status, found.message) == ("ok", "")
 
 
+@pytest.mark.full
 def test_an_exported_script_for_exudyn_agrees(tmp_path: Path) -> None:
     """The CSV that the script writes, run without this package, as it is."""
     (script,) = rm.export(rm.scene("check/pitch-loads"), "exudyn", tmp_path / "model.py")
     subprocess.run([sys.executable, "-P", script, tmp_path / "out.csv"], check=True, cwd=tmp_path, capture_output=True)
-    found = rm.compare_data(tmp_path / "out.csv", rm.scene("check/pitch-loads"))
+    found = rm.compare(tmp_path / "out.csv", rm.scene("check/pitch-loads"))
     assert (found.status, found.message) == ("ok", "")
     assert len(found.verdict.channels) == 8
 
@@ -124,7 +125,7 @@ def test_a_script_for_pinocchio_agrees(tmp_path: Path, name: str) -> None:
     (tmp_path / "rotor.json").write_text(json.dumps(rotor))
     script = Path(__file__).parents[1] / "support" / "pinocchio_script.py"
     subprocess.run([python, "-P", script, "rotor.json", "pinocchio.csv"], check=True, cwd=tmp_path)
-    found = rm.compare_data(tmp_path / "pinocchio.csv", scene)
+    found = rm.compare(tmp_path / "pinocchio.csv", scene)
     assert (found.status, found.message) == ("ok", "")
     # As of the other code: SciPy at 1e-11; a wrong number in the model makes 1e-4 at least.
     assert max(one.error_per_growth for one in found.verdict.channels) < 1e-8
@@ -162,7 +163,7 @@ def test_a_driven_rotor_is_judged_by_its_own_growth() -> None:
     heavier = tuple(replace(blade, mass=1.01 * blade.mass) for blade in scene.blades)
     time = np.linspace(0.0, 10.0, 101)
     angles, rates = other_code.trajectory(replace(scene, blades=heavier), time)
-    found = rm.compare_data({"time": time, "angles": angles, "rates": rates}, scene)
+    found = rm.compare({"time": time, "angles": angles, "rates": rates}, scene)
     assert found.status == "inaccurate"
     assert found.message.startswith("rotor")
 
@@ -197,7 +198,7 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(tmp_path: Pat
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
     late = run.time <= 9.0
     pitch = np.degrees(run.angles[late, 1]) + 1e-3
-    found = rm.compare_data({"t_ms": 1e3 * run.time[late], "pitch_1_deg": pitch}, run.scene)
+    found = rm.compare({"t_ms": 1e3 * run.time[late], "pitch_1_deg": pitch}, run.scene)
     assert found.likely == ("pitch 1: zero off by 1.74533e-05",)
     found.save(tmp_path / "c.h5")
     for engine in ("h5netcdf", "netcdf4"):
@@ -217,7 +218,7 @@ def test_the_stored_comparison_has_data_reference_and_errors_in_si(tmp_path: Pat
 
 def test_every_comparison_of_a_file_has_a_page(tmp_path: Path) -> None:
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
-    record = rm.compare_data({"time": run.time, "angles": run.angles}, run.scene).study.record()
+    record = rm.compare({"time": run.time, "angles": run.angles}, run.scene).study.record()
     write_records(tmp_path / "c.h5", [record, replace(record, scene="own")])
     index = write_report(tmp_path / "c.h5", tmp_path)
     pages = [path.read_text() for path in (index, tmp_path / "data--2.html")]
@@ -240,7 +241,7 @@ def test_a_test_of_another_project() -> None:
 )
 def test_data_that_leave_out_a_part_are_not_ok(cut: slice, message: str) -> None:
     run = rm.run(rm.scene("paper/fig08"), "lagrange/dop853")
-    found = rm.compare_data({"time": run.time[cut], "angles": run.angles[cut]}, run.scene)
+    found = rm.compare({"time": run.time[cut], "angles": run.angles[cut]}, run.scene)
     assert found.status == "inaccurate"
     assert message in found.message
 
@@ -248,23 +249,23 @@ def test_data_that_leave_out_a_part_are_not_ok(cut: slice, message: str) -> None
 def test_a_start_alone_is_no_other_unit_of_time() -> None:
     """Within 1e-9 s nothing has moved, whatever the unit."""
     scene = rm.scene("paper/fig03")
-    found = rm.compare_data({"t": np.linspace(0.0, 1e-9, 100), "rotor": np.full(100, scene.initial_angles[0])}, scene)
+    found = rm.compare({"t": np.linspace(0.0, 1e-9, 100), "rotor": np.full(100, scene.initial_angles[0])}, scene)
     assert (found.status, found.likely) == ("inaccurate", ())
 
 
 def test_numbers_without_sense_are_inaccurate() -> None:
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
-    found = rm.compare_data({"time": run.time, "rotor": 1e300 * run.angles[:, 0]}, run.scene)
+    found = rm.compare({"time": run.time, "rotor": 1e300 * run.angles[:, 0]}, run.scene)
     assert (found.status, found.likely) == ("inaccurate", ("too large by a factor: rotor by 1e+300",))
 
 
 def test_channels_may_be_missing_and_rates_alone_are_judged() -> None:
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
-    alone = rm.compare_data({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene)
+    alone = rm.compare({"t": run.time, "pitch_1": run.angles[:, 1]}, run.scene)
     assert (alone.status, len(alone.verdict.channels)) == ("ok", 1)
     assert "no angle of: rotor" in alone.verdict.notes
-    assert rm.compare_data({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).agrees
-    wrong = rm.compare_data({"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene)
+    assert rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).agrees
+    wrong = rm.compare({"t": run.time, "rotor_rate": 1.001 * run.rates[:, 0]}, run.scene)
     assert wrong.message.startswith("rotor rate")
     assert wrong.verdict.channels[0].scale == pytest.approx(1.001, abs=1e-9)
 
@@ -273,12 +274,12 @@ def test_data_without_a_likely_cause_are_told_where_they_start() -> None:
     """Two mistakes at once, degrees in a scene that starts elsewhere: no single correction fits."""
     scene = rm.scene("paper/fig03")
     run = rm.run(scene.replace(**{"initial.angles": [0.3, 0.2]}), "lagrange/dop853")
-    found = rm.compare_data({"t": run.time, "angles": np.degrees(run.angles)}, scene)
+    found = rm.compare({"t": run.time, "angles": np.degrees(run.angles)}, scene)
     assert not found.verdict.likely
     (line,) = (note for note in found.verdict.notes if note.startswith("the data start elsewhere"))
     assert "rotor 17.19 (scene: 2.88)" in line
     assert "unit?" in line
-    same = rm.compare_data({"t": run.time, "angles": run.angles}, run.scene)
+    same = rm.compare({"t": run.time, "angles": run.angles}, run.scene)
     assert not any("start elsewhere" in note for note in same.verdict.notes)
 
 
@@ -288,16 +289,16 @@ def test_numbers_of_few_digits_are_noticed(tmp_path: Path) -> None:
     head = "\n".join(["", "OpenFAST", "", "", "", "", "Time Azimuth BldPitch1", "(s) (deg) (deg)"])
     rows = np.column_stack([run.time, np.degrees(run.angles)])
     np.savetxt(tmp_path / "low.out", rows, header=head, comments="", fmt="%10.3E")
-    found = rm.compare_data(tmp_path / "low.out", run.scene)
+    found = rm.compare(tmp_path / "low.out", run.scene)
     assert found.status == "inaccurate"
     assert "numbers of 4 digits: their rounding alone is 5e-04 of their size" in found.verdict.notes
-    assert rm.compare_data(tmp_path / "low.out", run.scene, tolerance=1e-3).agrees
+    assert rm.compare(tmp_path / "low.out", run.scene, tolerance=1e-3).agrees
 
 
 def test_the_comparison_as_a_dataset_has_units() -> None:
     pytest.importorskip("xarray")
     run = rm.run(rm.scene("paper/fig03"), "lagrange/dop853")
-    data = rm.compare_data({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).to_xarray()
+    data = rm.compare({"t": run.time, "rotor_rate": run.rates[:, 0]}, run.scene).to_xarray()
     np.testing.assert_array_equal(data.rotor_rate, run.rates[:, 0])
     assert data.rotor_rate_reference.attrs["units"] == "rad/s"
     assert (data.attrs["status"], data.time.attrs["units"]) == ("ok", "s")
@@ -309,7 +310,7 @@ def test_lag_scale_and_offset_are_those_that_were_put_in() -> None:
     scene = rm.scene("paper/fig03")
     run = rm.run(replace(scene, samples=10001), "lagrange/dop853")
     late = 0.25 + 0.999 * run.angles[10:-1:10, 0]  # 0.01 s late of the rows' times, from the second on
-    found = rm.compare_data({"t": run.time[10:-1:10] - 0.001, "rotor": late}, scene)
+    found = rm.compare({"t": run.time[10:-1:10] - 0.001, "rotor": late}, scene)
     (channel,) = found.verdict.channels
     assert channel.lag_s == pytest.approx(-0.001, rel=0.01)
     assert channel.scale == pytest.approx(0.999, abs=1e-5)
@@ -321,6 +322,6 @@ def test_the_energy_of_data_is_examined_beyond_the_horizon() -> None:
     scene = rm.scene("paper/fig06")
     run = rm.run(scene, "lagrange/dop853")
     rates = run.rates * np.where(run.time < 2.0, 1.0, 0.9)[:, None]
-    found = rm.compare_data({"time": run.time, "angles": run.angles, "rates": rates}, scene)
+    found = rm.compare({"time": run.time, "angles": run.angles, "rates": rates}, scene)
     assert found.status == "inaccurate"
     assert found.message.startswith("energy drift")

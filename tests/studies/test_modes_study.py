@@ -12,7 +12,7 @@ import pytest
 from support.scenes import general
 
 import rotor_mbs as rm
-from rotor_mbs.analysis.mode_records import read_modes, to_records
+from rotor_mbs.analysis.campbell import read_modes, to_records
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
@@ -93,6 +93,7 @@ def test_speeds_that_do_not_increase_from_zero_are_refused(speeds):
         study.compute_modes(SOFT, speeds)
 
 
+@pytest.mark.full
 def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Path, capsys):
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("heyoka")
@@ -112,11 +113,9 @@ def test_the_command_writes_a_file_that_opens_in_xarray_and_a_page(tmp_path: Pat
         assert data.undamped_frequency.dims == ("speed", "mode")
         assert data.undamped_frequency.units == "rad/s"
         assert list(data.coordinate.labels) == ["rotor", "pitch 1", "pitch 2", "pitch 3"]
-    before = output.stat().st_mtime_ns
     assert main(["modes", "stiff/nrel-5mw", "--speeds", "0:3:4", "-o", str(output), "-j", "1", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)["stiff/nrel-5mw"]
     assert len(rows) == 4 + 4 * 4
-    assert output.stat().st_mtime_ns == before  # nothing to do
     assert main(["report", str(output), "-o", str(tmp_path / "again")]) == 0
     assert (tmp_path / "again" / "index.html").is_file()
 
@@ -125,14 +124,17 @@ def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_pa
     scene = replace(SOFT, gravity=0.0)
     output = tmp_path / "modes.h5"
     study.modes_of_scenes([scene, general(gravity=0.0)], output, speeds=[0.0, 1.0], workers=0, timeout_s=60.0)
-    assert read_modes(output)["soft"].rotation
+    first = read_modes(output)
+    assert first["soft"].rotation
     study.modes_of_scenes([scene], output, workers=0, timeout_s=60.0)
     found = read_modes(output)
     assert found["soft"].rest
     assert not found["soft"].rotation
-    assert found["general"].rotation
+    general_before, general_now = (modes["general"].rotation["lagrange"] for modes in (first, found))
+    np.testing.assert_array_equal(general_now.eigenvalues, general_before.eigenvalues)
+    assert general_now.names == general_before.names
     made = study.modes_of_scenes([scene], output, speeds=[0.0, 1.0], workers=0, timeout_s=60.0)
-    assert [one.result.status for one in made] == ["ok"]
+    assert [outcome.status for outcome in made] == ["ok"]
 
 
 def test_show_says_which_models_are_linearized(capsys):

@@ -103,7 +103,7 @@ UNSEEN = {
     ),
     r"time_table\.values_before .*1e-12 scaled": "keeps rounding from passing a jump: any size near it does",
     r"time_table\.steps_and_rows .*(1e-09|span / step)": "a step more in an interval does as well",
-    r"ode_solvers\.ode45_integrator .*end - start|adapter\._schedule .*(0\.1 / |1\.0 - )": (
+    r"ode_solvers\.ode45_integrator .*end - start|adapter\.integrate .*(0\.1 / |1\.0 - )": (
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands of intervals"
     ),
     r"ode45\._after_success .*0\.2 -> ": "where steps begin to grow fivefold at most, they grow as much by either rule",
@@ -117,8 +117,8 @@ UNSEEN = {
     r"schemes\.trial_steps .*-> 2": "the least of a range: one trial step ends as soon as two",
     r"schemes\.scheme .*(1e-14|5\.0) -> ": "the smallest step, and how fast steps grow: no motion here comes near",
     r"adapter\._count .*(rejected|newtonSteps).* scaled": "evaluations of rejected steps: reported, judged by nothing",
-    r"adapter\._schedule .*1 -> 2": "a scheme that chooses its own steps makes the first one of the interval anyway",
-    r"adapter\._schedule .*(step is None|every_step)": "rows at every step or at every sample carry the work as well",
+    r"adapter\.integrate .*1 -> 2": "a scheme that chooses its own steps makes the first one of the interval anyway",
+    r"adapter\.integrate .*(step is None|every_step)": "rows at every step or at every sample carry the work as well",
     r"(ode_solvers|taylor)\..*deadline\.is_over": "the time limit of a run, which a run within it does not show",
 }
 EXPLAINED = {**EQUIVALENT, **UNSEEN}

@@ -221,7 +221,7 @@ FAST = {"degrees", "blade order", "sign of pitch", "truncated", "one sample late
 )
 def test_a_mistake_is_named(name: str) -> None:
     plant = PLANTS[name]
-    comparison = rm.compare_data(plant.data(), short(plant.scene))
+    comparison = rm.compare(plant.data(), short(plant.scene))
     assert comparison.status != "ok"
     assert any(plant.says in text for text in (comparison.message, *comparison.likely)), comparison.likely
 
@@ -229,27 +229,28 @@ def test_a_mistake_is_named(name: str) -> None:
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_be_compared_is_refused(name: str) -> None:
     with pytest.raises(rm.InputError, match=REFUSED[name].says):
-        rm.compare_data(REFUSED[name].data(), short("paper/fig11"))
+        rm.compare(REFUSED[name].data(), short("paper/fig11"))
 
 
 @pytest.mark.parametrize("scene", ["paper/fig11", "check/general"])
 def test_a_true_run_with_the_noise_of_rounding_is_ok(scene: str) -> None:
-    comparison = rm.compare_data(Plant("", scene, spoilt=noise(1e-12)).data(), short(scene))
+    comparison = rm.compare(Plant("", scene, spoilt=noise(1e-12)).data(), short(scene))
     assert (comparison.status, comparison.likely) == ("ok", ())
 
 
 @pytest.mark.full
 def test_e3_alone_is_no_mistake() -> None:
     """The power of a term whose coefficient is zero unless E2 is in."""
-    assert rm.compare_data(Plant("", mistakes=Mistakes(e3=True)).data(), short("paper/fig11")).agrees
+    assert rm.compare(Plant("", mistakes=Mistakes(e3=True)).data(), short("paper/fig11")).agrees
 
 
 # A sine that no mistake makes.
 UNKNOWN = Plant("", spoilt=lambda t, q, w: (t, q + 1e-2 * np.sin(7.0 * t)[:, None], w))
 
 
+@pytest.mark.full
 def test_nothing_is_said_where_nothing_fits() -> None:
-    comparison = rm.compare_data(UNKNOWN.data(), short("paper/fig11"))
+    comparison = rm.compare(UNKNOWN.data(), short("paper/fig11"))
     assert comparison.status == "inaccurate"
     assert comparison.likely == ()
     assert comparison.verdict.notes == ()
@@ -260,7 +261,7 @@ def test_a_search_for_causes_ends_by_its_time_limit_and_says_so(monkeypatch: pyt
     seconds = itertools.count()
     monkeypatch.setattr(compare_data, "monotonic", lambda: 0.0)
     monkeypatch.setattr(data_causes, "monotonic", lambda: float(next(seconds)))
-    comparison = rm.compare_data(UNKNOWN.data(), short("paper/fig11"))
+    comparison = rm.compare(UNKNOWN.data(), short("paper/fig11"))
     (note,) = comparison.verdict.notes
     tried, of = map(int, re.findall(r"(\d+) of (\d+) scenes tried", note)[0])
     assert 0 < tried <= 60 < of

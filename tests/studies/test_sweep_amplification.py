@@ -7,10 +7,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from support.sweeps import made_sweep
 
-from rotor_mbs.cli import main
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import scene_hash
 from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.studies.stored_references import frozen_solution
 
@@ -28,16 +27,13 @@ values = [0, {gravity}]
 
 def _sweep(folder: Path, asked: str) -> Path:
     gravity = find_scenes(["paper/fig11"])[0].gravity
-    (folder / "s.toml").write_text(SWEEP.format(asked=asked, gravity=gravity))
-    path = folder / "s.h5"
-    assert main(["sweep", str(folder / "s.toml"), "-o", str(path), "-j", "1"]) in (0, 1)
-    return path
+    return made_sweep(folder, SWEEP.format(asked=asked, gravity=gravity))
 
 
 def test_it_is_that_of_the_frozen_reference(tmp_path: Path) -> None:
     """Both from double precision variational equations, whose own rounding is far below a thousandth."""
     (scene,) = find_scenes(["paper/fig11"])
-    frozen = frozen_solution(scene, scene_hash(scene))[0].trajectory
+    frozen = frozen_solution(scene).trajectory
     with h5py.File(_sweep(tmp_path, "true")) as file:
         growth, until = file["error_growth"][()], file["horizon_s"][()]
         assert file["horizon_s"].attrs["units"] == "s"

@@ -17,10 +17,11 @@ from support.sweeps import stored_runs
 
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs import dask_cluster
+from rotor_mbs.runs import cluster as dask_cluster
 from rotor_mbs.runs.pool import SerialPool, run_in
 
 pytest.importorskip("distributed")
+pytestmark = pytest.mark.full
 
 _SWEEP = """
 title = "starts"

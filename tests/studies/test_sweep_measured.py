@@ -2,7 +2,7 @@
 
     python -m pytest -m full -s tests/studies/test_sweep_measured.py
 
-prints the table of the README (medians of five rounds, everything in turn) and what a run costs beside its integration.
+prints the table of the README (medians of five rounds, everything in turn).
 It skips itself where the machine is busy.
 """
 
@@ -14,12 +14,10 @@ import pickle
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -27,16 +25,10 @@ from scipy.integrate import solve_ivp
 from support.comparison_dop853 import straightforward
 from support.scenes import paper
 
-from rotor_mbs.cli import main
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange import ensemble
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.taylor import build_system
-from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep import plan_sweep
-from rotor_mbs.studies.sweep_work import Chunk, rows_of
 
 pytestmark = pytest.mark.full
 
@@ -130,100 +122,6 @@ def _skip_where_busy() -> None:
         pytest.skip("the machine is busy: nothing would be learnt")
 
 
-class _Timed:
-    """An integrator that tells how long it integrated, in s."""
-
-    def __init__(self, integrator: Any) -> None:
-        self._integrator, self.spent = integrator, 0.0
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._integrator, name)
-
-    def propagate_grid(self, times: Any) -> Any:
-        start = time.perf_counter()
-        found = self._integrator.propagate_grid(times)
-        self.spent += time.perf_counter() - start
-        return found
-
-
-def _shares(chunks: Sequence[Chunk]) -> tuple[float, float, float]:
-    """s of all their runs: in all, of that what is not integration, and of that what fills the arrays."""
-    made: list[_Timed] = []
-    filling = [0.0]
-    integrator, put = ensemble._integrator, ensemble._Group.put
-
-    def timed(*arguments: Any) -> Any:
-        made.append(_Timed(integrator(*arguments)))
-        return made[-1]
-
-    def timed_put(*arguments: Any) -> None:
-        start = time.perf_counter()
-        put(*arguments)
-        filling[0] += time.perf_counter() - start
-
-    ensemble._integrator, ensemble._Group.put = timed, timed_put
-    try:
-        start = time.perf_counter()
-        for chunk in chunks:
-            rows_of(chunk)
-        spent = time.perf_counter() - start
-    finally:
-        ensemble._integrator, ensemble._Group.put = integrator, put
-    return spent, spent - sum(one.spent for one in made), filling[0]
-
-
-def _own_time(path: Path, samples: int, draws: int) -> float:
-    """s of processor time that this process, the parent, spends on a sweep, but for bringing arrays to the disk."""
-    sweep = _file(path, samples, draws, "lagrange/taylor")
-    syncing = [0.0]
-
-    def timed_sync(file: int, sync: Callable[[int], None] = os.fsync) -> None:
-        start = time.thread_time()
-        sync(file)
-        syncing[0] += time.thread_time() - start
-
-    start = time.process_time()
-    with mock.patch.object(os, "fsync", timed_sync):
-        assert main(["sweep", str(sweep), "-o", str(path / f"{draws}.h5")]) == 0
-    spent = time.process_time() - start - syncing[0]
-    (path / f"{draws}.h5").unlink()
-    return spent
-
-
-def test_a_fast_run_is_integration_and_arrays_but_for_a_tenth(tmp_path: Path) -> None:
-    """In a worker, from parameters to rows: scenes, tips, energies, judgement; and in the parent, what a run costs."""
-    _skip_where_busy()
-    work = plan_sweep(load_sweep(_file(tmp_path, 201, _RUNS, "lagrange/taylor")), ("lagrange/taylor",), (1, 1), 60.0)
-    chunks = list(work.chunks([(0, _RUNS)], 2))[::4]  # large ones, and small ones at the end, as two workers have them
-    runs = sum(len(chunk.values) for chunk in chunks)
-    engine = open_task_pool("local", 1)
-    try:
-        shares = [engine.submit(_shares, chunks, 60.0).result() for _ in range(1 + _ROUNDS)]
-    finally:
-        engine.close()
-    spent, beside, filling = 1e3 * np.median(shares[1:], axis=0) / runs  # ms a run; the first one compiles
-    _own_time(tmp_path, 201, 64)  # loads
-    more = [_own_time(tmp_path, 201, 8192) - _own_time(tmp_path, 201, 2048) for _ in range(3)]
-    parent = 1e3 * float(np.median(more)) / 6144
-    share = (beside - filling + parent) / (spent + parent)
-    print(f"\na fast run: {spent:.3f} ms in a worker, {beside:.3f} of them not integration, {filling:.3f} fill arrays;")
-    print(f"{parent:.3f} ms in the parent: {100 * share:.1f} % are neither integration nor arrays")
-    assert share < 0.10
-
-
-def test_a_run_of_another_method_costs_15_ms_beside_its_integration(tmp_path: Path) -> None:
-    """A thousand runs of two samples on one worker, whose integration is nearly nothing; all of the command counted."""
-    _skip_where_busy()
-    path = _file(tmp_path, 2, 1000, "exudyn_tree/rk67")
-    path.write_text(path.read_text().replace("seed = 1", "seed = 1\nchange = { duration = 1e-3 }"))
-    command = [sys.executable, "-m", "rotor_mbs", "sweep", str(path), "-m", "exudyn_tree/rk67", "-j", "1"]
-    start = time.perf_counter()
-    subprocess.run([*command, "-o", str(tmp_path / "o.h5")], capture_output=True, check=True)
-    spent = (time.perf_counter() - start) / 1000
-    print(f"\nexudyn_tree/rk67: {1e3 * spent:.1f} ms a run in all")
-    assert spent < 0.015
-
-
 @pytest.fixture(scope="module")
 def rates(tmp_path_factory: pytest.TempPathFactory) -> Rates:
     """s a run of every contestant, medians of all rounds. Skips where the machine is busy."""
@@ -289,10 +187,3 @@ def test_a_sweep_costs_a_fifth_of_a_script_for_the_integrator(rates: Rates) -> N
 def test_a_sweep_costs_a_fifth_of_the_bare_integrator(rates: Rates) -> None:
     """The same with the equations of the models, a quarter cheaper than as written; neither with its start."""
     assert rates["loop over bare heyoka, 201 samples"][1] > 5.0 * rates["sweep, 201 samples"][1]
-
-
-@pytest.mark.xfail(reason="5.1 times at 201 samples, which noise can undo; 690 MB to write: 3.7 at 1,001")
-@pytest.mark.parametrize("samples", _SAMPLES)
-def test_so_does_the_whole_command(rates: Rates, samples: int) -> None:
-    """The models' equations in both, from start to end, and with every sample of the figure."""
-    assert rates[f"loop over bare heyoka, {samples} samples"][0] > 5.0 * rates[f"sweep, {samples} samples"][0]

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from rotor_mbs.runs.cluster import open_task_pool
+from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import plan_sweep
 from rotor_mbs.studies.sweep_work import perform
@@ -60,17 +61,15 @@ def _resident(_: object) -> float:
 )
 def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, duration: float) -> None:
     """10,000 runs after the first thousand: at most 20 MB."""
-    work = plan_sweep(load_sweep(_file(tmp_path, method, 11_000, samples, duration)), (), (1, 1), 60.0)
-    engine = open_task_pool("local", 1)
-    try:
+    plan = plan_sweep(load_sweep(_file(tmp_path, method, 11_000, samples, duration)))
+    nowhere = Place(Path(), 0, 0, {}, plan.table().row_type)
+    with open_task_pool("local", 1) as pool:
         before = 0.0
-        for chunk in work.chunks([(0, 11_000)]):
+        for chunk in plan.chunks(nowhere, [(0, 11_000)]):
             if not before and chunk.first >= 1000:
-                before = engine.submit(_resident, None, 60.0).result()
-            engine.submit(perform, chunk, 60.0).result()
-        after = engine.submit(_resident, None, 60.0).result()
-    finally:
-        engine.close()
+                before = pool.submit(_resident, None, 60.0).result()
+            pool.submit(perform, chunk, 60.0).result()
+        after = pool.submit(_resident, None, 60.0).result()
     print(f"\n{method}, {samples} samples: {before:.1f} MB after 1,000 runs, {after:.1f} MB after 11,000")
     assert after - before < 20.0
 

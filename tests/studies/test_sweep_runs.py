@@ -15,15 +15,17 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from rotor_mbs.runs.sweep_columns import MISSING, Rows
+from support.commands import rotor_mbs
 from support.sweeps import command, run_local, stored_runs, wait_for_runs, workers_of
 
-from rotor_mbs.cli import main
-from rotor_mbs.runs import files
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs.pool import SerialPool
 from rotor_mbs.runs.sweeps import StoredSweep
+from rotor_mbs.runs.table import MISSING, Rows, stored_tables
+from rotor_mbs.runs.versions import code_digest
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep, sweep_of
+from rotor_mbs.studies.sweep import plan_sweep, run_sweep
 from rotor_mbs.studies.sweep_work import Chunk, perform
 
 _SWEEP = """
@@ -52,13 +54,19 @@ def _file(folder: Path, draws: int = 4, duration: float = 0.2, more: str = "") -
     return path
 
 
-def test_one_worker_or_two_fast_path_or_not_the_bytes_are_the_same(tmp_path: Path) -> None:
+@pytest.mark.full
+def test_one_worker_or_two_the_bytes_are_the_same(tmp_path: Path) -> None:
     path = _file(tmp_path)
     both = ["-m", "lagrange/taylor", "-m", "lagrange/dop853"]
-    for name, workers in (("one.h5", "1"), ("two.h5", "2")):
-        assert main(["sweep", str(path), "-o", str(tmp_path / name), "-j", workers, *both]) == 0
+    for name, workers in (("one.h5", 1), ("two.h5", 2)):
+        assert rotor_mbs("sweep", path, "-o", tmp_path / name, "-j", workers, *both).status == 0
     assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
-    with h5py.File(tmp_path / "one.h5") as file:
+
+
+def test_side_by_side_or_not_the_runs_are_the_same(tmp_path: Path) -> None:
+    sweep = load_sweep(_file(tmp_path))
+    run_local(sweep, tmp_path / "o.h5", 0, ["lagrange/taylor", "lagrange/dop853"])
+    with h5py.File(tmp_path / "o.h5") as file:
         by_taylor, by_dop853 = file["angles"][:8], file["angles"][8:]
         # 0.2 s of fig11 carries an error on tenfold; dop853's tolerance is 3e-14.
         np.testing.assert_allclose(by_taylor, by_dop853, rtol=0.0, atol=1e-11)
@@ -67,40 +75,85 @@ def test_one_worker_or_two_fast_path_or_not_the_bytes_are_the_same(tmp_path: Pat
         assert set(file["bearing_stiffness"][()].tolist()) == {0.0, 10.0}
         np.testing.assert_array_equal(file["angles"][:, 0, 1], file["initial_angles_1"])
         assert file["variant"][()].tolist() == [*range(8)] * 2
-        assert file["solver"][()].tolist() == [0] * 8 + [1] * 8
-        assert file["solver"].attrs["flag_meanings"].split() == ["lagrange/taylor", "lagrange/dop853"]
+        assert file["method_code"][()].tolist() == [0] * 8 + [1] * 8
+        assert file["method_code"].attrs["flag_meanings"].split() == ["lagrange/taylor", "lagrange/dop853"]
         assert file["split"][()].tolist()[:8] == file["split"][()].tolist()[8:]
         assert file["split"][:8].sum() == 2
         assert (file["energy_drift_max"][()] < 1e-11).all()
         assert file.attrs["seed"] == 0
 
 
-def test_a_finished_sweep_makes_nothing_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finished_sweep_makes_nothing_again_and_another_one_is_refused(tmp_path: Path) -> None:
     path, output = _file(tmp_path), tmp_path / "o.h5"
-    assert main(["sweep", str(path), "-o", str(output), "--json"]) == 0
-    before = output.stat().st_mtime_ns
-    capsys.readouterr()
-    assert main(["sweep", str(path), "-o", str(output), "--json"]) == 0
-    end = json.loads(capsys.readouterr().out.splitlines()[-1])
+    run_local(load_sweep(path), output, 0)
+    before = output.read_bytes()
+    ended = rotor_mbs("sweep", path, "-o", output, "--json", "-j", 1)
+    end = json.loads(ended.out.splitlines()[-1])
     assert (end["event"], end["runs"], end["made"], end["statuses"]) == ("end", 8, 0, {"ok": 8})
-    assert output.stat().st_mtime_ns == before
+    other = rotor_mbs("sweep", path, "-o", output, "-m", "lagrange/ode45", "-j", 1)
+    assert other.status == 2
+    assert "holds something else than this sweep; allowed: another output file" in other.err
+    assert output.read_bytes() == before
 
 
 def test_parts_of_a_job_array_are_the_slices_of_the_whole(tmp_path: Path) -> None:
-    path = _file(tmp_path)
-    main(["sweep", str(path), "-o", str(tmp_path / "whole.h5")])
+    sweep = load_sweep(_file(tmp_path))
+    run_local(sweep, tmp_path / "whole.h5", 0)
+    whole, parts = StoredSweep(tmp_path / "whole.h5"), []
     for k in (1, 2, 3):
-        main(["sweep", str(path), "-o", str(tmp_path / f"{k}.h5"), "--part", f"{k}/3"])
-    with h5py.File(tmp_path / "whole.h5") as whole:
-        for name in ("run", "angles", "initial_angles_1", "status", "split"):
-            parts = []
-            for k in (1, 2, 3):
-                with h5py.File(tmp_path / f"{k}.h5") as part:
-                    parts.append(part[name][()])
-            np.testing.assert_array_equal(np.concatenate(parts), whole[name][()], err_msg=name)
+        plan = plan_sweep(sweep, part=(k, 3))
+        run_sweep(plan, tmp_path / f"{k}.h5", SerialPool())
+        parts.append(StoredSweep(tmp_path / f"{k}.h5"))
+    for name in ("run", "angles", "initial_angles_1", "status", "split", "crc32"):
+        joined = np.concatenate([part.column(name) for part in parts])
+        np.testing.assert_array_equal(joined, whole.column(name), err_msg=name)
 
 
-def _killing(chunk: Chunk) -> Rows | NDArray[np.int8]:
+# Rows of other versions, and damaged ones
+
+
+def test_runs_of_other_versions_are_kept_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here a plug-in whose code is corrected under the same version; fresh: all runs are computed again."""
+    source, output, sweep = tmp_path / "plug_in.py", tmp_path / "o.h5", load_sweep(_file(tmp_path))
+    monkeypatch.setitem(find_method("lagrange/dop853").__dict__, "sources", (source,))
+
+    def swept(code: str, **options: bool) -> tuple[int, int]:
+        source.write_text(code)
+        code_digest.cache_clear()
+        result = run_local(sweep, output, 0, **options)
+        return result.made, result.older
+
+    assert swept("STEP = 0.1\n") == (8, 0)
+    assert swept("STEP = 0.1  # s\n") == (0, 0)
+    before = output.read_bytes()
+    assert swept("STEP = 0.2\n") == (0, 8)
+    assert output.read_bytes() == before
+    ended = rotor_mbs("sweep", tmp_path / "s.toml", "-o", output, "-j", 1)
+    assert "8 runs were computed by other versions; --fresh computes them again" in ended.err
+    assert swept("STEP = 0.2\n", fresh=True) == (8, 0)
+    assert swept("STEP = 0.2\n") == (0, 0)
+    assert output.read_bytes() != before  # the code of each row
+    monkeypatch.undo()
+    code_digest.cache_clear()
+    stored_tables(output)[""].place().mark_missing([3])
+    result = run_local(sweep, output, 0)
+    assert (result.made, result.older) == (1, 7)
+
+
+@pytest.mark.parametrize("column", ["angles", "status", "code", "message"])
+def test_a_damaged_run_is_computed_again_by_the_same_command(tmp_path: Path, column: str) -> None:
+    sweep, output = load_sweep(_file(tmp_path)), tmp_path / "o.h5"
+    run_local(sweep, output, 0)
+    before = output.read_bytes()
+    with h5py.File(output, "r+") as file:
+        values = file[column][()]
+        values[5:6].view(np.uint8).reshape(-1)[0] ^= 1
+        file[column][...] = values
+    assert run_local(sweep, output, 0).made == 1
+    assert output.read_bytes() == before
+
+
+def _killing(chunk: Chunk) -> Rows:
     """Run 5 kills its process, wherever it is tried, and leaves a mark each time."""
     if chunk.first <= 5 < chunk.first + len(chunk.values):
         with Path(os.environ["ROTOR_TEST_MARKS"]).open("a") as marks:
@@ -109,6 +162,7 @@ def _killing(chunk: Chunk) -> Rows | NDArray[np.int8]:
     return perform(chunk)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853"])
 def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str
@@ -131,7 +185,7 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     assert (again.made, again.statuses, again.is_ok, again.lost) == (1, {"ok": 32}, True, ())
 
 
-def _own_process(chunk: Chunk) -> Rows | NDArray[np.int8]:
+def _own_process(chunk: Chunk) -> Rows:
     assert os.getpid() == int(os.environ["ROTOR_TEST_PARENT"])
     return perform(chunk)
 
@@ -142,12 +196,13 @@ def test_no_workers_are_this_process_as_everywhere(tmp_path: Path, monkeypatch: 
     assert result.statuses == {"ok": 8}
 
 
-def _hanging(chunk: Chunk) -> Rows | NDArray[np.int8]:
+def _hanging(chunk: Chunk) -> Rows:
     if chunk.first == 2:
         time.sleep(600.0)
     return perform(chunk)
 
 
+@pytest.mark.full
 def test_a_run_that_hangs_is_ended_and_the_others_go_on(tmp_path: Path) -> None:
     output = tmp_path / "o.h5"
     result = run_local(load_sweep(_file(tmp_path)), output, workers=2, timeout_s=6.0, work=_hanging)
@@ -169,13 +224,14 @@ def test_progress_counts_what_was_there_and_what_is_made(tmp_path: Path) -> None
 
     for made in (8, 0):
         reports.clear()
-        result = run_local(sweep, output, workers=1, on_progress=report)
+        result = run_local(sweep, output, workers=0, on_progress=report)
         assert (result.runs, result.made, result.statuses, result.is_ok) == (8, made, {"ok": 8}, True)
         assert reports[0] == (8 - made, 8, 0)
         assert reports[-1][:2] == (8, 8)
         assert sum(new for _, _, new in reports) == made
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
 def test_killed_and_terminated_a_sweep_continues_and_ends_with_the_same_bytes(tmp_path: Path) -> None:
     path = _file(tmp_path, draws=30, duration=0.5)
@@ -196,7 +252,7 @@ def test_killed_and_terminated_a_sweep_continues_and_ends_with_the_same_bytes(tm
                 process.send_signal(getattr(signal, victim))
                 assert process.wait(30) == 130
                 assert process.stderr is not None
-                assert b"the same command goes on from there" in process.stderr.read()
+                assert b"finished runs are stored, the same command continues" in process.stderr.read()
         assert stored_runs(output) > stored, "finished runs were lost"
         stored = stored_runs(output)
     ended = subprocess.run(command(path, output, "--json"), check=True, capture_output=True)
@@ -217,8 +273,9 @@ normal = ["pi/4", 1e-3]
 """
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
-@pytest.mark.parametrize(("kills", "draws"), [(5, 500), pytest.param(100, 2000, marks=pytest.mark.full)])
+@pytest.mark.parametrize(("kills", "draws"), [(5, 500), pytest.param(100, 2000, marks=pytest.mark.nightly)])
 def test_killed_at_random_moments_the_fast_path_loses_nothing(tmp_path: Path, kills: int, draws: int) -> None:
     """Kills of the parent, every second one after one of a worker; the file opens in h5py and xarray all the time."""
     path = tmp_path / "s.toml"
@@ -261,25 +318,6 @@ def _open_everywhere(output: Path) -> None:
 
 
 @pytest.mark.full
-def test_one_time_of_all_runs_is_read_five_times_faster_than_with_a_chunk_per_run(tmp_path: Path) -> None:
-    """4,000 runs of 1,001 samples: medians of nine readings each, one after the other."""
-    values = np.random.default_rng(0).standard_normal((4000, 1001, 4))
-    for name, chunks in (("contiguous", None), ("chunked", (1, 1001, 4))):
-        with h5py.File(tmp_path / name, "w") as file:
-            file.create_dataset("angles", data=values, chunks=chunks)
-    spent: dict[str, list[float]] = {"contiguous": [], "chunked": []}
-    for _ in range(9):
-        for name, times in spent.items():
-            with h5py.File(tmp_path / name) as file:
-                start = time.perf_counter()
-                found = file["angles"][:, 500] if name == "chunked" else np.array(files.mapped(file["angles"])[:, 500])
-                times.append(time.perf_counter() - start)
-                np.testing.assert_array_equal(found, values[:, 500])
-    ratio = float(np.median(spent["chunked"]) / np.median(spent["contiguous"]))
-    print(f"\none time of all runs: {ratio:.1f} times faster")
-    assert ratio > 5.0
-
-
 def test_a_second_sweep_on_one_output_is_refused_with_one_line(tmp_path: Path) -> None:
     path, output = _file(tmp_path, draws=40, duration=3.0), tmp_path / "o.h5"
     with subprocess.Popen(command(path, output), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as first:
@@ -291,34 +329,39 @@ def test_a_second_sweep_on_one_output_is_refused_with_one_line(tmp_path: Path) -
     assert "another process is writing it now" in second.stderr
 
 
-def _small_files() -> None:
-    """As a full disk does, this stops a file from growing, in workers too."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
-
-
 def test_a_full_disk_is_one_line_before_the_first_run(tmp_path: Path) -> None:
-    path, output = _file(tmp_path, draws=6), tmp_path / "o.h5"
-    full = subprocess.run(command(path, output), capture_output=True, text=True, preexec_fn=_small_files)
-    assert full.returncode == 1
-    assert full.stderr.count("\n") == 1
-    assert "cannot be written: File too large" in full.stderr
+    """A limit on the size of files stops one from growing, as a full disk does."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    path = _file(tmp_path, draws=6)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        ended = rotor_mbs("sweep", path, "-o", tmp_path / "o.h5", "-j", 1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert ended.status == 1
+    assert ended.err.count("\n") == 1
+    assert "cannot be written: File too large" in ended.err
     assert not list(tmp_path.glob("*o.h5*"))
 
 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--engine", "dask:tcp://127.0.0.1:9"], "engine dask:tcp://127.0.0.1:9: no dask scheduler answers there"),
+        pytest.param(
+            ["--engine", "dask:tcp://127.0.0.1:9"],
+            "engine dask:tcp://127.0.0.1:9: no dask scheduler answers there",
+            marks=pytest.mark.full,
+        ),
         (["--engine", "slurm"], "no such engine; allowed: local, or dask:tcp://host:port"),
         (["-m", "lagrange/nothing"], "unknown method"),
     ],
 )
 def test_bad_usage_is_one_line_and_status_2_within_ten_seconds(tmp_path: Path, more: list[str], words: str) -> None:
     start = time.monotonic()
-    ended = subprocess.run(command(_file(tmp_path), tmp_path / "o.h5", *more), capture_output=True, text=True)
-    assert ended.returncode == 2
-    assert len(ended.stderr.splitlines()) == 1
-    assert words in ended.stderr
+    ended = rotor_mbs("sweep", _file(tmp_path), "-o", tmp_path / "o.h5", "-j", 1, *more)
+    assert ended.status == 2
+    assert len(ended.err.splitlines()) == 1
+    assert words in ended.err
     assert time.monotonic() - start < 10.0
 
 
@@ -339,28 +382,26 @@ def test_bad_usage_is_one_line_and_status_2_within_ten_seconds(tmp_path: Path, m
         ),
     ],
 )
-def test_methods_and_settings_of_the_file_are_told_with_their_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, words: str
-) -> None:
+def test_methods_and_settings_of_the_file_are_told_with_their_line(tmp_path: Path, line: str, words: str) -> None:
     path = _file(tmp_path)
     path.write_text(line + path.read_text().replace('methods = ["lagrange/dop853"]\n', ""))
-    assert main(["sweep", str(path), "-o", str(tmp_path / "o.h5")]) == 2
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 1
-    assert words in told[0]
+    ended = rotor_mbs("sweep", path, "-o", tmp_path / "o.h5", "-j", 1)
+    assert ended.status == 2
+    (told,) = ended.err.splitlines()
+    assert words in told
 
 
-def test_a_sweep_too_large_by_mistake_is_asked_for_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sweep", str(_file(tmp_path, draws=600_000)), "-o", str(tmp_path / "o.h5")]) == 2
-    assert "1,200,000 runs; allowed without --yes: at most 1,000,000" in capsys.readouterr().err
+def test_a_sweep_too_large_by_mistake_is_asked_for_twice(tmp_path: Path) -> None:
+    ended = rotor_mbs("sweep", _file(tmp_path, draws=600_000), "-o", tmp_path / "o.h5", "-j", 1)
+    assert ended.status == 2
+    assert "1,200,000 runs; allowed without --yes: at most 1,000,000" in ended.err
     assert not list(tmp_path.glob("o.h5*"))
 
 
-def test_a_dry_run_tells_runs_time_and_size_and_writes_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["sweep", str(_file(tmp_path)), "-o", str(tmp_path / "o.h5"), "--dry-run", "--json"]) == 0
-    facts = json.loads(capsys.readouterr().out)
+def test_a_dry_run_tells_runs_time_and_size_and_writes_nothing(tmp_path: Path) -> None:
+    ended = rotor_mbs("sweep", _file(tmp_path), "-o", tmp_path / "o.h5", "--dry-run", "--json", "-j", 1)
+    assert ended.status == 0
+    facts = json.loads(ended.out)
     assert facts["runs"] == 8
     assert 0.0 < facts["seconds"] < 60.0
     assert facts["bytes"] >= 8 * 21 * 4 * 8
@@ -379,16 +420,12 @@ def test_a_quantity_of_another_package_is_stored(tmp_path: Path, monkeypatch: py
     folder = tmp_path / "site"
     (folder / "pitch_squares-1.dist-info").mkdir(parents=True)
     (folder / "pitch_squares.py").write_text(_PLUG_IN)
-    (folder / "pitch_squares-1.dist-info" / "METADATA").write_text(
-        "Metadata-Version: 2.1\nName: pitch_squares\nVersion: 1\n"
-    )
-    (folder / "pitch_squares-1.dist-info" / "entry_points.txt").write_text(
-        "[rotor_mbs.quantities]\nsquares = pitch_squares:SQUARES\n"
-    )
+    description = folder / "pitch_squares-1.dist-info"
+    (description / "METADATA").write_text("Metadata-Version: 2.1\nName: pitch_squares\nVersion: 1\n")
+    (description / "entry_points.txt").write_text("[rotor_mbs.quantities]\nsquares = pitch_squares:SQUARES\n")
     monkeypatch.syspath_prepend(folder)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]))
     scene = find_scenes(["paper/fig11"])[0].replace(duration=0.2)
     sweep = sweep_of(scene, {"gravity": [9.0, 10.0]}, samples=5, outputs=["angles", "squares"], methods=[method])
-    run_local(sweep, tmp_path / "o.h5", workers=1)
+    run_local(sweep, tmp_path / "o.h5", workers=0)
     stored = StoredSweep(tmp_path / "o.h5")
     np.testing.assert_array_equal(stored.column("pitch_squares"), stored.column("angles")[:, :, 1:] ** 2)

@@ -98,6 +98,7 @@ def test_two_blades_feather_at_their_rate_and_the_third_stays() -> None:
     assert not moments[2]
 
 
+@pytest.mark.full
 def test_the_taylor_method_on_the_step_of_the_command() -> None:
     scene, exact = references.scene("turbine/pitch-step"), references.reference("turbine/pitch-step")
     found = references.run(scene).trajectory

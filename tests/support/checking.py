@@ -8,21 +8,20 @@ from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
-from rotor_mbs.runs.results_file import merge
-from rotor_mbs.runs.write import write_run
-
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.checks import Check
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
+from rotor_mbs.runs.results import Asked, fit, results_tables, row_of_run
 from rotor_mbs.scenario.accuracy_bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene import Blade, Scene, scene_hash
+from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.studies import check
 from rotor_mbs.studies.run import run_scenes
-from rotor_mbs.studies.stored_references import load_reference
+from rotor_mbs.studies.stored_references import reference_at
 
 
 def shipped(name: str) -> Scene:
@@ -38,12 +37,12 @@ def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], time
 
 def add_run(path: Path, scene: Scene, run: Solution) -> None:
     """A run into a file that has its scene's reference, judged as a batch judges it."""
-    judgement = judge(scene, run, load_reference(path, scene))
-    facts = {"status": judgement.status, "message": judgement.message, "false_success": judgement.false_success}
-    piece = path.with_name("piece.h5")
-    write_run(piece, scene_hash(scene), replace(run, scene=scene), {**facts, **judgement.metrics})
-    merge(path, [path, piece], {})
-    piece.unlink()
+    asked = Asked(scene, run.method, run.settings)
+    file = fit(path, results_tables([asked]))
+    judgement = judge(scene, run, reference_at(file.place(f"{scene.name}/{REFERENCE}"), scene))
+    run = replace(run, scene=scene, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
+    place = file.place(asked.run)
+    place.write(place.first, row_of_run(run, place, {"false_success": int(judgement.false_success)}))
 
 
 def judged(path: Path, bounds: Bounds | None = None) -> list[Check]:

@@ -59,7 +59,7 @@ class Target:
 
     group: str
     module: str
-    names: tuple[str, ...]  # "*": all of them
+    names: str  # with blanks between; "*": all of them
     share: float = 1e-6
 
 
@@ -82,131 +82,57 @@ class Mutant:
 _M, _L, _P = "rotor_mbs.models.exudyn", "rotor_mbs.models.lagrange", "rotor_mbs.models.printed"
 _J, _A = "rotor_mbs.models.mujoco", "rotor_mbs.analysis"
 _TARGETS = (
-    Target(
-        "lagrange", f"{_L}.closed_form", ("accelerations", "power", "rest_energy", "energies", "_kinetic", "point_path")
-    ),
-    Target(
-        "lagrange",
-        f"{_L}.parameters",
-        ("rotor_form", "_inertia_about_hub", "_rotor_inertia", "_coefficients", "_cosine_of_turn"),
-    ),
+    Target("lagrange", f"{_L}.closed_form", "accelerations power rest_energy energies _kinetic point_path"),
+    Target("lagrange", f"{_L}.parameters",
+           "rotor_form _inertia_about_hub _rotor_inertia _coefficients _cosine_of_turn"),
     # What all but the printed equations share: every group's checks see it.
-    Target(
-        "lagrange",
-        "rotor_mbs.scenario.time_table",
-        ("value_at", "constant_value", "values", "at", "segments", "_line", "values_before"),
-    ),
-    Target("multibody", "rotor_mbs.scenario.time_table", ("intervals", "steps_and_rows")),
-    Target("lagrange", f"{_L}.samples", ("trajectory", "_put_energies", "constant_work")),
-    Target("printed", f"{_P}.literal", ("*",)),
-    Target("printed", f"{_P}.matrices", ("*",)),
-    Target("printed", f"{_P}.derivation", ("*",)),
-    Target("printed", f"{_P}.observables", ("tip_path", "kinetic_energy", "potential_energy", "_sines")),
-    Target(
-        "multibody",
-        f"{_M}.geometry",
-        (
-            "rotation_y",
-            "rotation_z",
-            "_turn",
-            "_cos_sin",
-            "blade_body",
-            "hub_body",
-            "_turned",
-            "fixed_blade_rotation",
-            "on_body",
-        ),
-    ),
+    Target("lagrange", "rotor_mbs.scenario.time_table",
+           "value_at values_at constant_value values at segments _lines values_before"),
+    Target("multibody", "rotor_mbs.scenario.time_table", "intervals steps_and_rows"),
+    Target("lagrange", f"{_L}.samples", "trajectory _put_energies constant_work"),
+    Target("printed", f"{_P}.literal", "*"),
+    Target("printed", f"{_P}.matrices", "*"),
+    Target("printed", f"{_P}.derivation", "*"),
+    Target("printed", f"{_P}.observables", "tip_path kinetic_energy potential_energy _sines"),
+    Target("multibody", f"{_M}.geometry",
+           "rotation_y rotation_z mounting _turn blade_body hub_body fixed_blade_rotation on_body"),
     # About the common centre of mass, which a change moves to second order alone.
-    Target("multibody", f"{_M}.geometry", ("_joined",), 1e-3),
-    Target("multibody", f"{_M}.tree", ("_node", "_tree", "_torque")),
-    Target("multibody", f"{_M}.energy", ("*",)),
-    Target("multibody", f"{_M}.moments", ("at", "drives", "moment_on")),
-    Target("multibody", f"{_M}.sensor_samples", ("_fields", "_add_energies")),
-    Target("chain", f"{_M}.geometry", ("quaternion", "quaternion_rate"), 1e-2),
-    Target(
-        "chain",
-        f"{_M}.chain",
-        (
-            "rotation",
-            "placed_bodies",
-            "_body",
-            "_gravity",
-            "_marker",
-            "_on_body",
-            "_pitch_spring",
-            "_spring_torque",
-            "_rotor_torque",
-            "_tip_sensor",
-        ),
-        1e-2,
-    ),
-    Target("chain", f"{_M}.sensor_samples", ("_joint_motion", "_dot", "unwrap"), 1e-2),
+    Target("multibody", f"{_M}.geometry", "_joined", 0.001),
+    Target("multibody", f"{_M}.tree", "_node _tree _torque"),
+    Target("multibody", f"{_M}.energy", "*"),
+    Target("multibody", f"{_M}.moments", "at drives moment_on"),
+    Target("multibody", f"{_M}.sensor_samples", "_fields"),
+    Target("chain", f"{_M}.geometry", "quaternion quaternion_rate", 0.01),
+    Target("chain", f"{_M}.chain",
+           "rotation placed_bodies _body _gravity _marker _on_body _pitch_spring _spring_torque _rotor_torque "
+           "_tip_sensor", 0.01),
+    Target("chain", f"{_M}.sensor_samples", "_joint_motion _dot unwrap", 0.01),
     # A thousandth: of fourth order, this model is bound to 1e-8.
-    Target(
-        "mujoco", f"{_J}.mjcf", ("loads_of", "model", "_blade", "_joint", "_quaternion", "_inertial", "_possible"), 1e-3
-    ),
-    Target("mujoco", f"{_J}.solver", ("_advance", "observe", "_work", "_springs"), 1e-3),
-    Target(
-        "rules",
-        "rotor_mbs.solution.judgement",
-        (
-            "allowed_of",
-            "judge",
-            "_is_close",
-            "_broken_off",
-            "_through_singularity",
-            "_inaccurate",
-            "_unchecked",
-            "start_slack",
-            "energy_slack",
-            "energy_conditioning",
-            "_shares_at_quarter_turns",
-            "smallest_rotor_inertia_share",
-            "rotor_inertia_shares",
-            "_shaft_inertia_forms",
-            "_SINGULAR_SHARE",
-            "_ROUND_OFF",
-            "_RESEMBLES",
-            "_NO_INERTIA",
-        ),
-        0.5,
-    ),
-    Target(
-        "rules",
-        "rotor_mbs.solution.metrics",
-        (
-            "running_growth",
-            "horizon_samples",
-            "angle_error",
-            "energy_scale",
-            "_angle_errors",
-            "_relative_error",
-            "_motion_sizes",
-            "HORIZON_GROWTH",
-        ),
-        0.5,
-    ),
+    Target("mujoco", f"{_J}.mjcf", "loads_of model _blade _joint _quaternion _inertial _possible", 0.001),
+    Target("mujoco", f"{_J}.solver", "_advance observe _work _springs", 0.001),
+    Target("rules", "rotor_mbs.solution.judgement",
+           "allowed_of judge _is_close _broken_off _through_singularity _inaccurate _unchecked start_slack "
+           "energy_slack energy_conditioning _shares_at_quarter_turns smallest_rotor_inertia_share "
+           "rotor_inertia_shares _shaft_inertia_forms _SINGULAR_SHARE _ROUND_OFF _RESEMBLES _NO_INERTIA", 0.5),
+    Target("rules", "rotor_mbs.solution.metrics",
+           "running_growth horizon_samples angle_error energy_scale _angle_errors _motion_sizes "
+           "HORIZON_GROWTH", 0.5),
     # A thousandth: step rules and tableau; of a tableau's fractions any.
-    Target("ode45", "rotor_mbs.models.ode45", ("*",), 1e-3),
-    Target("schemes", f"{_M}.schemes", ("*",), 0.5),
-    Target(
-        "schemes", f"{_M}.methods", ("step", "_scheme", "_build_tree", "_build_chain", "__init__", "integrate"), 0.5
-    ),
-    Target(
-        "schemes", f"{_L}.methods", ("tolerance", "check_tolerance", "relative_tolerance", "absolute_tolerance"), 0.5
-    ),
-    Target("adapter", f"{_M}.adapter", ("*",), 0.5),
-    Target("integration", f"{_L}.ode_solvers", ("*",), 0.5),
-    Target("integration", f"{_L}.samples", ("over_segments", "loads_at", "loads_at_start", "at_constant_rests"), 0.5),
-    Target("integration", f"{_L}.taylor", ("*",), 0.5),
-    Target("reference", f"{_L}.reference", ("*",), 0.5),
-    Target("analysis", f"{_A}.exact", ("exact_rotor_angle", "_stays_at_zero_pitch", "_about_shaft", "_pendulum")),
-    Target("analysis", f"{_A}.kinematics", ("*",)),
-    Target("analysis", f"{_A}.checks", ("*",), 0.5),
-    Target("analysis", f"{_A}.run_integrity", ("*",), 0.5),
-    Target("analysis", f"{_A}.claims", ("*",), 0.5),
-)
+    Target("ode45", "rotor_mbs.models.ode45", "*", 0.001),
+    Target("schemes", f"{_M}.schemes", "*", 0.5),
+    Target("schemes", f"{_M}.methods", "step _scheme _build_tree _build_chain __init__ integrate", 0.5),
+    Target("schemes", f"{_L}.methods", "tolerance check_tolerance relative_tolerance absolute_tolerance", 0.5),
+    Target("adapter", f"{_M}.adapter", "*", 0.5),
+    Target("integration", f"{_L}.ode_solvers", "*", 0.5),
+    Target("integration", f"{_L}.samples", "over_segments loads_at loads_at_start at_constant_rests", 0.5),
+    Target("integration", f"{_L}.taylor", "*", 0.5),
+    Target("reference", f"{_L}.reference", "*", 0.5),
+    Target("analysis", f"{_A}.exact", "exact_rotor_angle _stays_at_zero_pitch _about_shaft _pendulum"),
+    Target("analysis", f"{_A}.kinematics", "*"),
+    Target("analysis", f"{_A}.checks", "*", 0.5),
+    Target("analysis", f"{_A}.run_integrity", "*", 0.5),
+    Target("analysis", f"{_A}.claims", "*", 0.5),
+)  # fmt: skip
 
 # An engine that is not installed has no mutants.
 TARGETS = tuple(one for one in _TARGETS if one.group != "mujoco" or importlib.util.find_spec("mujoco"))
@@ -312,15 +238,14 @@ _TESTS = {
         f"{_REFERENCE}amplification_of_a_stiff_oscillation_is_one",
         f"{_REFERENCE}growth_is_known_as_far_as_the_variational_equations_went",
         "studies/test_compare_data.py::test_growth_of_each_channel_is_at_most_that_of_all",
-        "models/test_lagrange.py::test_the_fallback_reference_states_its_uncertainty",
         "studies/test_compare_data.py::test_the_reference_at_the_times_of_the_data_is_the_frozen_one",
     ),
     f"{_A}.exact": ("analysis/test_exact.py",),
     f"{_A}.kinematics": ("analysis/test_checks.py",),
     f"{_A}.checks": (
         "analysis/test_checks.py",
-        f"{_CHECK}a_tampered_run_fails",
-        f"{_CHECK}a_touched_reference_in_the_file_fails",
+        f"{_CHECK}a_run_that_was_changed_together_with_its_checksum_fails",
+        f"{_CHECK}a_reference_that_is_altered_or_not_there_fails",
     ),
     f"{_A}.run_integrity": ("analysis/test_run_integrity.py",),
     f"{_A}.claims": ("analysis/test_claims.py",),
@@ -337,7 +262,7 @@ def mutants(target: Target) -> list[Mutant]:
     for name, scope in _scopes(tree):
         first = min(node.lineno for node in (scope, *getattr(scope, "decorator_list", ())))
         line = first if isinstance(scope, ast.FunctionDef) else 0
-        if name in target.names or target.names == ("*",):
+        if target.names == "*" or name in target.names.split():
             for number, (node, parents) in enumerate(_walk(scope)):
                 for what, change in _changes(node, parents, scope, target):
                     where = f"line {getattr(node, 'lineno', 0)}:{getattr(node, 'col_offset', 0)}: {what}"

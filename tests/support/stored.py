@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.results import Asked, fit, results_tables, row_of_run
+from rotor_mbs.runs.results import RUNS, Asked, TableFile, fit, results_tables, row_of_run
+from rotor_mbs.runs.table import Rows
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.solution import Solution
@@ -25,6 +26,7 @@ class Made:
 
     until      share of the scene's duration that the run reached
     gain       J that the total energy rises by, evenly over the time
+    versions   of what computed it, by default this installation's
     """
 
     scene: Scene
@@ -33,6 +35,7 @@ class Made:
     until: float = 1.0
     gain: float = 0.0
     attributes: dict[str, object] = field(default_factory=dict)
+    versions: dict[str, str] | None = None
 
     def run(self) -> Solution:
         scene = self.scene
@@ -65,7 +68,7 @@ class Made:
 def store(path: Path, runs: Sequence[Made]) -> Path:
     """The runs in one file, each compared with its scene's reference where there is one."""
     references = {made.scene.name: made.run().trajectory for made in runs if made.method == "reference"}
-    file = fit(path, results_tables([Asked(made.scene, made.method) for made in runs]))
+    file = fit(path, results_tables([Asked(made.scene, made.method, versions=made.versions) for made in runs]))
     for made in runs:
         run = made.run()
         metrics = metrics_of(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
@@ -101,3 +104,26 @@ class Arrays:
         if self.arrays[name] is None:
             raise StoreError(f"{name} changed after it was written")
         return self.arrays[name]
+
+
+def damage(path: Path, run: str, column: str, at: int = 0) -> None:
+    """Change a byte of a stored row: of the column, `at` bytes from its end."""
+    place = TableFile(path).place(run)
+    with path.open("r+b") as file:
+        file.seek(place.offsets[column] + place.row[column].itemsize - 1 - at)
+        byte = file.read(1)[0]
+        file.seek(-1, 1)
+        file.write(bytes([byte ^ 1]))
+
+
+def change_row(path: Path, run: str, change: Callable[[Rows], None]) -> None:
+    """Change the columns of a stored run in place; its row has the checksum of what it holds then."""
+    place = TableFile(path).place(run)
+    row = {name: values.copy() for name, values in place.read().items()}
+    change({name: values[0, ...] for name, values in row.items()})
+    place.write(place.first, row)
+
+
+def drop(path: Path, run: str) -> None:
+    """Take a run out of a file."""
+    fit(path, [], dropped=[(RUNS, run)])

@@ -15,7 +15,6 @@ import numpy as np
 from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.scenario.sweep import Sweep, load_sweep
 from rotor_mbs.studies.sweep import SweepResult, plan_sweep, run_sweep
-from rotor_mbs.studies.sweep_work import rows_of
 
 MAP = """title = "Speed & stiffness"
 scene = "paper/fig06"
@@ -34,23 +33,20 @@ linear = {start = 0.25, end = 20, count = 4}
 """
 
 
-def made_sweep(folder: Path, text: str = MAP) -> Path:
-    """The dataset of the sweep file `text`, complete, made in this process."""
-    (folder / "s.toml").write_text(text)
-    plan = plan_sweep(load_sweep(folder / "s.toml"))
-    with plan.opened(folder / "s.h5") as (runs, statuses):
-        for chunk in plan.chunks([(0, plan.runs)]):
-            statuses[chunk.first : chunk.last] = runs.write(chunk.first, rows_of(chunk))
-    return folder / "s.h5"
-
-
 def run_local(
     sweep: Sweep, output: Path, workers: int, methods: Sequence[str] = (), timeout_s: float = 60.0, **options: Any
 ) -> SweepResult:
-    """The sweep by workers of this machine; options: of `run_sweep`."""
+    """The sweep by worker processes of this machine, 0: by this process; options: of `run_sweep`."""
     plan = plan_sweep(sweep, methods, time_limit_s=timeout_s)
     with open_task_pool("local", workers) as pool:
         return run_sweep(plan, output, pool, **options)
+
+
+def made_sweep(folder: Path, text: str = MAP) -> Path:
+    """The dataset of the sweep file `text`, made in this process."""
+    (folder / "s.toml").write_text(text)
+    run_local(load_sweep(folder / "s.toml"), folder / "s.h5", 0)
+    return folder / "s.h5"
 
 
 def command(path: Path, output: Path, *more: str) -> list[str]:

@@ -1,7 +1,4 @@
-"""The one place that imports Exudyn: builds a system from its parts, runs it, returns recorded rows.
-
-The engine runs without window, console output or files, in its fast build (no range checks).
-"""
+"""The one place that imports Exudyn: without window, console output or files, in its fast build (no range checks)."""
 
 from __future__ import annotations
 
@@ -44,10 +41,8 @@ class Linearized(NamedTuple):
 
 
 class System:
-    """An assembled system of the engine. Each `integrate` starts from the initial state the parts were given.
-
-    Raises MethodRefusal, with the engine's reason, where the engine does not take the parts.
-    """
+    """An assembled system of the engine, which each `integrate` starts anew. Raises MethodRefusal, with the engine's
+    reason, where it does not take the parts."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
         self._container = _engine.SystemContainer()
@@ -85,10 +80,8 @@ class System:
         return stored
 
     def linearized(self, step: float) -> Linearized:
-        """The engine's own linearization at the initial state, its difference quotients taken with `step` (rad, m).
-
-        The quotients are one-sided, so that their error is of the first order in `step`.
-        """
+        """The engine's own linearization at the initial state, by one-sided difference quotients with `step` (rad,
+        m)."""
         settings = _engine.SimulationSettings()
         settings.solution.file.write = False
         differences = settings.staticSolver.newton.numericalDifferentiation
@@ -109,7 +102,6 @@ class System:
 
     @property
     def coordinates(self) -> Array:
-        """(n,) displacement coordinates of the initial state."""
         return np.array(self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Initial))
 
     @coordinates.setter
@@ -123,54 +115,68 @@ class System:
         rows_between: bool,
         before_interval: Callable[[Interval], None],
     ) -> Integration:
-        """From the initial state to the end of the last interval, or to the first failure, which is in the result.
-
-        Parameters
-        ----------
-        intervals : of constant or linear loads, one after the other
-        rows_between : keep rows between samples too
-        before_interval : called with each interval first
-
-        Raises
-        ------
-        KeyboardInterrupt
-            If interrupted.
-        """
+        """From the initial state through the intervals of linear loads, or to the first failure, which is in the
+        result; `rows_between` keeps rows between samples, too; `before_interval` is called with each interval first."""
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
         settings = _settings(scheme, data.ODE2Size(), data.AEsize())
-        trials = self._limit_trials(scheme) if scheme.trial_steps else []
+        integration = settings.timeIntegration
+        trials: list[float] = []
+        if scheme.trial_steps:
+
+            def before_trial(_system: object, time: float) -> bool:
+                trials.append(time)
+                if len(trials) > scheme.trial_steps:
+                    raise RuntimeError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
+                return True
+
+            self._mbs.SetPreStepUserFunction(before_trial)
         total = Integration(True)
         for interval in intervals:
             before_interval(interval)
             if interval is intervals[0] and scheme.lacks_initial_accelerations:
-                self._find_initial_accelerations()
+                # What sensors of accelerations read at the initial state: only an implicit solver computes it. From a
+                # singular start the run itself will fail.
+                plain, implicit = _engine.SimulationSettings(), _engine.MainSolverImplicitSecondOrder()
+                plain.solution.file.write = False
+                with contextlib.suppress(_engine.ExudynError, RuntimeError):
+                    implicit.InitializeSolver(self._mbs, plain)
+                    for name in self._of_accelerations:
+                        values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
+                        self._initial_values[name] = np.array(values, dtype=float)
+                    implicit.FinalizeSolver(self._mbs, plain)
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
-            _schedule(settings, scheme, interval, rows_between)
+            span = (interval.end - interval.start) / interval.sample_intervals
+            steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
+            integration.startTime, integration.endTime = interval.start, interval.end
+            integration.numberOfSteps = steps * scheme.refinement * interval.sample_intervals
+            every_step = scheme.step is None and rows_between
+            # The engine adds up periods: shortened by a tenth of a step over the whole interval, rounding makes none
+            # come late.
+            period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
+            settings.solution.sensors.writePeriod = 0.0 if every_step else period
             solver = _engine.MainSolverExplicit() if scheme.stages else _engine.MainSolverImplicitSecondOrder()
             failure = self._solve(solver, settings)
-            _count(total, scheme, interval, solver.it, failure)
+            # The engine's index is one ahead of the steps it took, and two where the last one failed; an implicit step
+            # evaluates its residual once more than it iterates.
+            it = solver.it
+            taken = max(0, it.currentStepIndex - (2 if failure else 1))
+            tried = taken + it.rejectedAutomaticStepSizeSteps
+            total.steps = (total.steps or 0) + taken
+            evaluations = tried * scheme.stages if scheme.stages else it.newtonStepsCount + taken
+            total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
+            total.success, total.message = not failure, failure
+            total.out_of_time = failure == MESSAGE
+            total.time_reached = max(interval.start, it.currentTime - it.currentStepSize) if failure else interval.end
             if failure:
                 break
             data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
             # The engine would cut a longer step itself, with another rounding.
-            settings.timeIntegration.initialStepSize = min(solver.it.currentStepSize, interval.end - interval.start)
+            integration.initialStepSize = min(it.currentStepSize, interval.end - interval.start)
         return total
 
-    def _find_initial_accelerations(self) -> None:
-        """What sensors of accelerations read at the initial state: only an implicit solver computes it."""
-        settings, solver = _engine.SimulationSettings(), _engine.MainSolverImplicitSecondOrder()
-        settings.solution.file.write = False
-        with contextlib.suppress(_engine.ExudynError, RuntimeError):  # of a singular start: the run itself will fail
-            solver.InitializeSolver(self._mbs, settings)
-            for name in self._of_accelerations:
-                values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
-                self._initial_values[name] = np.array(values, dtype=float)
-            solver.FinalizeSolver(self._mbs, settings)
-
     def _solve(self, solver: Any, settings: Any) -> str:
-        """Why the engine says it failed; empty where it says it did not."""
         try:
             if solver.SolveSystem(self._mbs, settings):
                 return ""
@@ -182,18 +188,6 @@ class System:
                 return MESSAGE
             reason = _one_line(str(exc))
         return reason or _one_line(solver.GetErrorString()) or "the engine gave no reason"
-
-    def _limit_trials(self, scheme: Scheme) -> list[float]:
-        trials: list[float] = []
-
-        def before_trial(_system: object, time: float) -> bool:
-            trials.append(time)
-            if len(trials) > scheme.trial_steps:
-                raise RuntimeError(f"no progress in {scheme.trial_steps} trial steps near t = {time:.6g} s")
-            return True
-
-        self._mbs.SetPreStepUserFunction(before_trial)
-        return trials
 
 
 # Coordinates and constraints of a chain of twelve blades, from which on a sparse factorization costs less than a dense
@@ -225,33 +219,6 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     if not constraints and coordinates >= _OLD_JACOBIAN_FROM:
         integration.newton.modifiedNewtonJacUpdatePerStep = False
     return settings
-
-
-def _schedule(settings: Any, scheme: Scheme, interval: Interval, rows_between: bool) -> None:
-    integration = settings.timeIntegration
-    span = (interval.end - interval.start) / interval.sample_intervals
-    steps, rows = (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
-    integration.startTime, integration.endTime = interval.start, interval.end
-    integration.numberOfSteps = steps * scheme.refinement * interval.sample_intervals
-    every_step = scheme.step is None and rows_between
-    # The engine adds up periods: shortened by a tenth of a step over the whole interval, rounding makes none come late.
-    period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
-    settings.solution.sensors.writePeriod = 0.0 if every_step else period
-
-
-def _count(total: Integration, scheme: Scheme, interval: Interval, it: Any, failure: str) -> None:
-    """Add one interval's outcome; an implicit step evaluates its residual once more than it iterates.
-
-    The engine's index is one ahead of the steps it took, and two where the last one failed.
-    """
-    steps = max(0, it.currentStepIndex - (2 if failure else 1))
-    tried = steps + it.rejectedAutomaticStepSizeSteps
-    total.steps = (total.steps or 0) + steps
-    evaluations = tried * scheme.stages if scheme.stages else it.newtonStepsCount + steps
-    total.rhs_evaluations = (total.rhs_evaluations or 0) + evaluations
-    total.success, total.message = not failure, failure
-    total.out_of_time = failure == MESSAGE
-    total.time_reached = max(interval.start, it.currentTime - it.currentStepSize) if failure else interval.end
 
 
 def _caused_by(exc: BaseException | None, kind: type[BaseException]) -> bool:

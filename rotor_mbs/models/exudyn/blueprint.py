@@ -42,7 +42,6 @@ def sensor(name: str, type_: str, quantity: str, detail: str = "", **where: obje
 
 
 def items(parts: Sequence[Part]) -> list[BuiltItem]:
-    """The parts as a reader wants them listed."""
     return [
         BuiltItem(part.kind, part.name, f"{part.type}: {part.detail}" if part.detail else part.type) for part in parts
     ]

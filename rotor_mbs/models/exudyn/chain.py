@@ -1,9 +1,5 @@
-"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates.
-
-Every node stands at its body's centre of mass, so masses and inertias go in as the scene has them. A hub without mass
-or inertia is a body with none: its joints fix it, the constrained system is regular, and no inertia has to be invented
-for it.
-"""
+"""The rotor as a chain of free bodies connected by joints: ground, hub, blades; redundant coordinates. Nodes stand at
+centres of mass. A hub without mass or inertia is a body with none: its joints fix it."""
 
 from __future__ import annotations
 
@@ -12,21 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotor_mbs.models.exudyn import geometry
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
-from rotor_mbs.models.exudyn.geometry import (
-    ALONG_SHAFT,
-    Body,
-    blade_body,
-    hub_body,
-    mounting,
-    on_body,
-    pitching,
-    quaternion,
-    quaternion_rate,
-    rotation_vector,
-    rotation_y,
-    rotation_z,
-)
 from rotor_mbs.models.exudyn.loads import chain_sensors
 from rotor_mbs.models.exudyn.moments import Loads, Moment, is_driven, moment_on
 from rotor_mbs.scenario.scene import Scene
@@ -38,26 +21,18 @@ NODES = ("euler_parameters", "rotation_vector")
 
 @dataclass(frozen=True)
 class Placed:
-    """A body at the start.
-
-    Attributes
-    ----------
-    about_shaft, pitch : rad, of its orientation
-    axis : (3,) in the base frame, that it turns about in its bearing
-    omega : (3,) rad/s in the base frame, angular velocity
-    """
+    """A body at the start."""
 
     name: str
-    body: Body
-    about_shaft: float
+    body: geometry.Body
+    about_shaft: float  # rad, of its orientation
     pitch: float
-    axis: Array
-    omega: Array
+    axis: Array  # (3,) in the base frame, that it turns about in its bearing
+    omega: Array  # (3,) rad/s in the base frame, angular velocity
 
     @property
     def rotation(self) -> Array:
-        """(3, 3) body frame to base frame."""
-        return rotation_y(np.cos(self.about_shaft), np.sin(self.about_shaft)) @ rotation_z(self.pitch)
+        return geometry.rotation_y(np.cos(self.about_shaft), np.sin(self.about_shaft)) @ geometry.rotation_z(self.pitch)
 
 
 def placed_bodies(scene: Scene) -> list[Placed]:
@@ -65,12 +40,12 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     rotor, rate = scene.initial_angles[0], scene.initial_rates[0]
     shaft = np.array([0.0, 1.0, 0.0])
     spin = rate * shaft
-    bodies = [Placed("hub", hub_body(scene), rotor, 0.0, shaft, spin)]
-    for i in pitching(scene):
+    bodies = [Placed("hub", geometry.hub_body(scene), rotor, 0.0, shaft, spin)]
+    for i in geometry.pitching(scene):
         pitch, pitch_rate = scene.initial_angles[1 + i], scene.initial_rates[1 + i]
         about_shaft = rotor + scene.phases[i]
         axis = np.array([np.sin(about_shaft), 0.0, np.cos(about_shaft)])
-        body = blade_body(scene.blades[i])
+        body = geometry.blade_body(scene.blades[i])
         bodies.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, axis, spin + pitch_rate * axis))
     return bodies
 
@@ -82,18 +57,42 @@ def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
     for placed in (hub, *blades):
         built += _body(placed, node)
         if scene.gravity != 0.0 and placed.body.mass:
-            built += _gravity(placed, scene.gravity)
-    ground = _marker("ground", "at shaft", ALONG_SHAFT, np.zeros(3))
-    built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", ALONG_SHAFT))
-    for i, blade in zip(pitching(scene), blades, strict=True):
-        seat = _on_body(hub, f"at bearing {i + 1}", mounting(i, len(scene.blades)))
+            mass = Part("marker", f"{placed.name} mass", "MarkerBodyMass", {"bodyNumber": Ref("object", placed.name)})
+            weight = {"markerNumber": Ref("marker", mass.name), "loadVector": [0.0, 0.0, -scene.gravity]}
+            built += [mass, Part("load", f"gravity on {placed.name}", "LoadMassProportional", weight)]
+    ground = _marker("ground", "at shaft", geometry.ALONG_SHAFT, np.zeros(3))
+    built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", geometry.ALONG_SHAFT))
+    for i, blade in zip(geometry.pitching(scene), blades, strict=True):
+        seat = _on_body(hub, f"at bearing {i + 1}", geometry.mounting(i, len(scene.blades)))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
         built += _pitch_spring(scene, loads, i, seat.name, f"{blade.name} at bearing")
     if scene.shaft_damping:
         built.append(_spring("shaft damper", "ground at shaft", "hub at shaft", damping=scene.shaft_damping))
     if scene.has_torque:
-        built.append(_rotor_torque(scene, moment_on(scene, loads, 0)))
-    return built + _sensors(scene, [hub, *blades])
+        load: dict[str, object] = {
+            "markerNumber": Ref("marker", "hub at shaft"),
+            "loadVector": [0.0, scene.rotor_torque[0][1], 0.0],
+        }
+        if not scene.has_constant_torque:
+            load["loadVectorUserFunction"] = moment_on(scene, loads, 0).about_y
+        detail = "constant" if scene.has_constant_torque else "over time"
+        built.append(Part("load", "rotor torque", "LoadTorqueVector", load, detail))
+    bodies = [hub, *blades]
+    for placed in bodies:
+        name, of_node = placed.name, Ref("node", placed.name)
+        built.append(sensor(f"{name} position", "SensorNode", "Position", nodeNumber=of_node))
+        built.append(sensor(f"{name} rotation", "SensorNode", "RotationMatrix", nodeNumber=of_node))
+        built.append(sensor(f"{name} spin", "SensorNode", "AngularVelocityLocal", nodeNumber=of_node))
+        if scene.wants("energy") and placed.body.mass:
+            built.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=of_node))
+    if scene.wants("tip"):
+        for i, tip in enumerate(blade.tip for blade in scene.blades):
+            number, point = geometry.on_body(scene, i, tip)
+            body, position = Ref("object", bodies[number].name), list(point - bodies[number].body.com)
+            built.append(sensor(f"tip {i + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=position))
+    if scene.wants("loads"):
+        built += chain_sensors(scene, hub.body)
+    return built
 
 
 def _body(placed: Placed, node: str) -> list[Part]:
@@ -101,11 +100,11 @@ def _body(placed: Placed, node: str) -> list[Part]:
     position = placed.rotation @ body.com
     with np.errstate(over="ignore", invalid="ignore"):  # of a rate that has no bound: the run says so
         velocity = np.cross(placed.omega, position)
-    p = quaternion(placed.about_shaft, placed.pitch)
+    p = geometry.quaternion(placed.about_shaft, placed.pitch)
     if node == "euler_parameters":
-        type_, pose, motion = "NodeRigidBodyEP", p, quaternion_rate(p, placed.omega)
+        type_, pose, motion = "NodeRigidBodyEP", p, geometry.quaternion_rate(p, placed.omega)
     else:  # its velocity coordinates are the angular velocity in the body's frame
-        type_, pose, motion = "NodeRigidBodyRotVecLG", rotation_vector(p), placed.rotation.T @ placed.omega
+        type_, pose, motion = "NodeRigidBodyRotVecLG", geometry.rotation_vector(p), placed.rotation.T @ placed.omega
     parameters = {
         "referenceCoordinates": [*position, *pose],
         "initialCoordinates": [0.0] * (3 + len(pose)),
@@ -124,14 +123,7 @@ def _body(placed: Placed, node: str) -> list[Part]:
     ]
 
 
-def _gravity(placed: Placed, gravity: float) -> list[Part]:
-    marker = Part("marker", f"{placed.name} mass", "MarkerBodyMass", {"bodyNumber": Ref("object", placed.name)})
-    load = {"markerNumber": Ref("marker", marker.name), "loadVector": [0.0, 0.0, -gravity]}
-    return [marker, Part("load", f"gravity on {placed.name}", "LoadMassProportional", load)]
-
-
 def _on_body(placed: Placed, where: str, rotation: Array) -> Part:
-    """A marker at the hub centre, fixed on the body."""
     return _marker(placed.name, where, rotation, -placed.body.com)
 
 
@@ -142,7 +134,6 @@ def _marker(body: str, where: str, rotation: Array, position: Array) -> Part:
 
 
 def _bearing(name: str, first: Part, second: Part) -> list[Part]:
-    """A joint that leaves the two markers free to turn about their common z."""
     markers = (Ref("marker", first.name), Ref("marker", second.name))
     return [first, second, Part("object", name, "ObjectJointRevoluteZ", {"markerNumbers": markers})]
 
@@ -188,36 +179,3 @@ def _spring(name: str, first: str, second: str, counter: str = "", **constants: 
         parameters["nodeNumber"] = Ref("node", counter)
     detail = ", ".join(f"{key} {value:g}" for key, value in constants.items())
     return Part("object", name, "ObjectConnectorTorsionalSpringDamper", parameters, detail)
-
-
-def _rotor_torque(scene: Scene, moment: Moment) -> Part:
-    load: dict[str, object] = {
-        "markerNumber": Ref("marker", "hub at shaft"),
-        "loadVector": [0.0, scene.rotor_torque[0][1], 0.0],
-    }
-    if not scene.has_constant_torque:
-        load["loadVectorUserFunction"] = moment.about_y
-    detail = "constant" if scene.has_constant_torque else "over time"
-    return Part("load", "rotor torque", "LoadTorqueVector", load, detail)
-
-
-def _sensors(scene: Scene, bodies: list[Placed]) -> list[Part]:
-    sensors = []
-    for placed in bodies:
-        name, node = placed.name, Ref("node", placed.name)
-        sensors.append(sensor(f"{name} position", "SensorNode", "Position", nodeNumber=node))
-        sensors.append(sensor(f"{name} rotation", "SensorNode", "RotationMatrix", nodeNumber=node))
-        sensors.append(sensor(f"{name} spin", "SensorNode", "AngularVelocityLocal", nodeNumber=node))
-        if scene.wants("energy") and placed.body.mass:
-            sensors.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=node))
-    if scene.wants("tip"):
-        sensors += [_tip_sensor(scene, blade, bodies) for blade in range(len(scene.blades))]
-    if scene.wants("loads"):
-        sensors += chain_sensors(scene, bodies[0].body)
-    return sensors
-
-
-def _tip_sensor(scene: Scene, blade: int, bodies: list[Placed]) -> Part:
-    number, point = on_body(scene, blade, scene.blades[blade].tip)
-    body, position = Ref("object", bodies[number].name), list(point - bodies[number].body.com)
-    return sensor(f"tip {blade + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=position)

@@ -1,8 +1,5 @@
-"""Rotations and rigid bodies of the rotor, from raw scene data.
-
-Base frame: z up, the shaft along y. Blade i stands in the hub frame turned by its phase about y, and turns by its
-pitch about its own z: R_i = Ry(rotor + phase_i) Rz(pitch_i).
-"""
+"""Rotations and rigid bodies of the rotor. Base frame: z up, the shaft along y. Blade i stands in the hub frame turned
+by its phase about y, and turns by its pitch about its own z: R_i = Ry(rotor + phase_i) Rz(pitch_i)."""
 
 from __future__ import annotations
 
@@ -21,18 +18,11 @@ ALONG_SHAFT = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body in its own frame, whose origin is the hub centre.
+    """A rigid body in its own frame, whose origin is the hub centre."""
 
-    Attributes
-    ----------
-    mass : kg
-    com : (3,) m, centre of mass
-    inertia : (3, 3) kg m² about the centre of mass
-    """
-
-    mass: float
-    com: Array
-    inertia: Array
+    mass: float  # kg
+    com: Array  # (3,) m, centre of mass
+    inertia: Array  # (3, 3) kg m² about the centre of mass
 
 
 def rotation_y(cosine: float, sine: float) -> Array:
@@ -41,7 +31,6 @@ def rotation_y(cosine: float, sine: float) -> Array:
 
 
 def rotation_z(angle: float) -> Array:
-    """(3, 3) turn about the pitch axis, angle in rad."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -102,16 +91,12 @@ def on_body(scene: Scene, index: int, point: Sequence[float]) -> tuple[int, Arra
 
 
 def blade_body(blade: Blade) -> Body:
-    """The blade with the scene's own numbers."""
     return Body(blade.mass, np.array(blade.centre_of_mass), blade.inertia_tensor)
 
 
 def hub_body(scene: Scene) -> Body:
-    """The hub as a thin disc about the shaft, with every blade that cannot pitch made part of it.
-
-    A hub that turns about its principal axis y only feels its axial inertia; the disc's other two, half of it, make
-    it a body that can exist.
-    """
+    """The hub as a thin disc about the shaft, with every blade that cannot pitch made part of it. The disc's other two
+    moments, half of the axial one, are never felt: they make it a body that can exist."""
     half = 0.5 * scene.hub_inertia
     parts = [Body(0.0, np.zeros(3), np.diag([half, scene.hub_inertia, half]))]
     for index, blade in enumerate(scene.blades):

@@ -1,10 +1,6 @@
-"""The engine's models linearized by the engine: the tree in steady rotation or at rest, the chain at rest.
-
-The engine differentiates its forces by one-sided quotients; here they are taken with several steps and extrapolated to
-none. For joints it leaves out the geometric stiffness, by which constraint forces turn with the bodies: it is added
-here, from the engine's own constraint Jacobian beside the state. (Without it the chain's frequencies at a rest under
-gravity are wrong by percents.)
-"""
+"""The engine's models linearized by it, its one-sided quotients extrapolated. For joints it leaves out the geometric
+stiffness, by which constraint forces turn with the bodies: that is added from its constraint Jacobian beside the state.
+(Without it the chain's frequencies under gravity are wrong by percents.)"""
 
 from __future__ import annotations
 
@@ -26,10 +22,8 @@ _STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 
 
 def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """The kinematic tree about `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m.
-
-    Raises MethodRefusal where the engine does not take the scene.
-    """
+    """The tree about `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under `torque` N m. Raises
+    MethodRefusal where the engine does not take the scene."""
     state = scene_at(scene, angles, speed, torque)
     system = System(tree.parts(state, Loads(state)))
     linear = _extrapolated(system.linearized)
@@ -38,12 +32,8 @@ def linearize_tree(scene: Scene, angles: Sequence[float] | Array, speed: float, 
 
 
 def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """The chain of bodies and joints at rest at `angles` (1 + blades,) rad, in the rotor's and the pitch angles.
-
-    With N a basis of what the joints allow and λ the joint forces at rest, its stiffness is Nᵀ (K + ∂(C λ)/∂q) N.
-
-    Raises MethodRefusal where the engine does not take the scene, or the state is not at rest.
-    """
+    """The chain at rest at `angles`: with N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K
+    + ∂(C λ)/∂q) N. Raises MethodRefusal, also where the state is not at rest."""
     if speed or torque:
         raise MethodRefusal("exudyn_chain: linearized at rest alone")
     state = scene_at(scene, angles, 0.0, 0.0)
@@ -58,8 +48,25 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     vectors, singular_values, _ = np.linalg.svd(linear.C)
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
     N: Array = np.asarray(vectors[:, rank:])
-    geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
-    joint = _joint_angles(state) @ N
+    # Difference quotients of C λ along each column of N.
+    start, here = system.coordinates, system.linearized(_STEPS[0]).C @ multipliers
+    quotients = []
+    for step in _STEPS:
+        columns = []
+        for direction in N.T:
+            system.coordinates = start + step * direction
+            columns.append((system.linearized(_STEPS[0]).C @ multipliers - here) / step)
+        quotients.append(np.array(columns).T)
+    geometric = limit_at_zero(quotients, 2.0)
+    # Rates of the joint angles from those of the bodies' coordinates, positions and Euler parameters p; the angular
+    # velocity is 2 (e0 ė - ė0 e + e × ė).
+    bodies = chain.placed_bodies(state)
+    by_coordinates = np.zeros((len(bodies), 7 * len(bodies)))
+    for k, placed in enumerate(bodies):
+        p = quaternion(placed.about_shaft, placed.pitch)
+        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
+        by_coordinates[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
+    joint = by_coordinates @ N
     mass = N.T @ linear.M @ N
 
     def in_joint_angles(matrix: Array) -> Array:
@@ -72,29 +79,3 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
 
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
     return Linearized(*(limit_at_zero(matrices, 2.0) for matrices in zip(*map(linearized, _STEPS), strict=True)))
-
-
-def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
-    """(n, free): difference quotients of C λ along each column of N."""
-    start = system.coordinates
-    here = system.linearized(_STEPS[0]).C @ multipliers
-    columns = []
-    for direction in N.T:
-        system.coordinates = start + step * direction
-        columns.append((system.linearized(_STEPS[0]).C @ multipliers - here) / step)
-    system.coordinates = start
-    return np.array(columns).T
-
-
-def _joint_angles(scene: Scene) -> Array:
-    """(1 + pitching, n): rates of the joint angles from the velocities of the bodies' coordinates at rest.
-
-    A body's coordinates are its position and its Euler parameters p; its angular velocity is 2 (e0 ė - ė0 e + e × ė).
-    """
-    bodies = chain.placed_bodies(scene)
-    by_coordinates = np.zeros((len(bodies), 7 * len(bodies)))
-    for k, placed in enumerate(bodies):
-        p = quaternion(placed.about_shaft, placed.pitch)
-        spin = np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
-        by_coordinates[k, 7 * k + 3 : 7 * k + 7] = 2.0 * placed.axis @ spin
-    return by_coordinates

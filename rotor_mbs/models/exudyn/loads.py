@@ -1,8 +1,5 @@
-"""Loads from what the engine records. The chain: multipliers of its joints, moments of its connectors. The tree, and a
-blade that is part of the hub: Newton's and Euler's laws on the engine's accelerations.
-
-Forces in N and moments in N m act on the blade at its root (hub on blade) and on the hub (bearing on rotor).
-"""
+"""Loads in N and N m on blade roots and hub. The chain: multipliers of joints, moments of connectors. The tree, and a
+blade that is part of the hub: Newton's and Euler's laws on the engine's accelerations."""
 
 from __future__ import annotations
 
@@ -31,10 +28,8 @@ def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
 
 
 def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array, Array]:
-    """(n, 3) force, (n, 3) moment about the root in the frame of blade i; (n, 3, 3) that frame to the base frame.
-
-    F = m (a + g e_z),  M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it.
-    """
+    """(n, 3) force, moment about the root in the frame of blade i; (n, 3, 3) that frame to the base frame. F = m (a + g
+    e_z), M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it."""
     blade, name = scene.blades[i], f"blade {i + 1} root"
     # From the blade's frame to the engine's body that it is, or, where it cannot pitch, is part of.
     turned = np.eye(3) if i in pitching(scene) else fixed_blade_rotation(scene, i)
@@ -50,10 +45,8 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
 
 
 def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: Sampled) -> dict[str, Array]:
-    """Loads of the kinematic tree: every blade by Newton and Euler, and their sum with the hub's share at the shaft.
-
-    The moment of a pitch actuator is what they leave about the pitch axis.
-    """
+    """Every blade by Newton and Euler, their sum with the hub's share at the shaft; the moment of a pitch actuator is
+    what they leave about the pitch axis."""
     blades = [_newton_euler(scene, i, sampled) for i in range(len(scene.blades))]
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
     shaft_moment = sum(_in_base(frames, moment) for _, moment, frames in blades)
@@ -69,7 +62,6 @@ def tree_loads(scene: Scene, segments: Sequence[Segment], time: Array, sampled: 
 
 
 def tree_sensors(scene: Scene, on_link: Callable[[str, str, int, Array], Part]) -> list[Part]:
-    """What `tree_loads` reads; on_link: (name, output, link, point) -> sensor."""
     sensors = []
     for i, blade in enumerate(scene.blades):
         place = on_body(scene, i, blade.centre_of_mass)
@@ -103,7 +95,6 @@ def _joint_sensors(joint: str, connector: str) -> list[Part]:
 
 
 def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
-    """Loads of the chain: what its joints and its connectors transmit."""
     hub = matrices(sampled("hub rotation"))
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
     for i in range(len(scene.blades)):
@@ -124,13 +115,8 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
 
 
 def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> tuple[Array, Array]:
-    """(n, 3) force and moment of a joint on its second body, in the base frame.
-
-    seat, root   (n, 3, 3) frames of the joint on its first and its second body, to the base frame
-
-    The engine gives the force on the first body in its frame, and as torque the multipliers λ of the conditions
-    x₁·z₀ = 0 and y₁·z₀ = 0; on the second body they are the moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
-    """
+    """(n, 3) force and moment of a joint on its second body, base frame, from its (n, 3, 3) frames on both. The engine
+    gives the force on the first body, and multipliers λ of x₁·z₀ = 0, y₁·z₀ = 0: a moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁."""
     force = -_in_base(seat, sampled(f"{joint} force"))
     multipliers = sampled(f"{joint} torque")
     x, y, z = root[:, :, 0], root[:, :, 1], seat[:, :, 2]
@@ -138,7 +124,6 @@ def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> t
 
 
 def matrices(rows: Array) -> Array:
-    """(n, 3, 3) of the (n, 9) that a sensor keeps of rotations."""
     return rows.reshape(-1, 3, 3)
 
 

@@ -40,21 +40,15 @@ class Loads:
         self.segment = self.segments[0]
 
     def enter(self, interval: Interval) -> None:
-        """From now on the loads of that interval act."""
         self.segment = interval.segment
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A moment as a load function of the engine: the sum of factors times loads.
+    """A moment as a load function of the engine: the sum of factors times loads."""
 
-    Attributes
-    ----------
-    loads : over time
-    terms : (place in `Scene.load_tables`, factor); the factor of a rest angle is the spring's stiffness, N m/rad
-    """
-
-    loads: Loads
+    loads: Loads  # over time
+    # (place in `Scene.load_tables`, factor); the factor of a rest angle is the spring's stiffness, N m/rad
     terms: tuple[tuple[int, float], ...]
 
     def at(self, time: float) -> float:
@@ -62,7 +56,6 @@ class Moment:
         return sum(factor * self.loads.segment.at(load, time) for load, factor in self.terms)
 
     def scalar(self, _system: object, time: float, _load: float) -> float:
-        """Load function of a coordinate."""
         return self.at(time)
 
     def about_y(self, _system: object, time: float, _load: object) -> list[float]:
@@ -71,7 +64,6 @@ class Moment:
 
 
 def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
-    """Of all that drives a coordinate (0: rotor)."""
     return Moment(loads, tuple((drive.load, drive.factor) for drive in drives(scene) if drive.coordinate == coordinate))
 
 

@@ -12,25 +12,15 @@ _END_ACCELERATIONS = "explicit.computeEndOfStepAccelerations"
 
 @dataclass(frozen=True)
 class Scheme:
-    """A time integration.
-
-    Attributes
-    ----------
-    solver : the engine's name of it.
-    stages : evaluations in a step; 0 for an implicit one.
-    options : by dotted path below the engine's settings of a time integration.
-    step : s, the largest; None where the scheme chooses its own.
-    trial_steps : of a scheme that chooses its step: trials within one integration interval after which the run is given
-        up (the engine itself repeats a rejected smallest step for ever).
-    refinement : how many equal steps take the place of each step that fits the sample interval.
-    """
-
-    solver: str
-    stages: int
+    solver: str  # the engine's name of it
+    stages: int  # evaluations in a step; 0 for an implicit one
+    # by dotted path below the engine's settings of a time integration
     options: Mapping[str, object] = field(default_factory=dict)
-    step: float | None = None
+    step: float | None = None  # s, the largest; None where the scheme chooses its own
+    # of a scheme that chooses its step: trials within one integration interval after which the run is given up (the
+    # engine itself repeats a rejected smallest step for ever)
     trial_steps: int = 0
-    refinement: int = 1
+    refinement: int = 1  # how many equal steps take the place of each step that fits the sample interval
 
     def with_accelerations(self) -> Scheme:
         """This scheme with accelerations at the end of every step; an implicit one has them anyway."""
@@ -68,12 +58,8 @@ class Rk67Settings(Settings):
 
 @dataclass(frozen=True)
 class Dopri5Settings(Settings):
-    """Dormand-Prince 5(4) with the engine's step control.
-
-    The engine scales the error by absolute + relative · max(x, x_new) and takes no magnitude of x: the scale vanishes
-    at x = -absolute/relative, where a step may be refused for ever, or, where it is exactly zero, accepted whatever
-    its error. With a relative tolerance of 0 both signs of x are treated alike, which is why that is the default.
-    """
+    """Dormand-Prince 5(4) with the engine's step control. It scales the error by absolute + relative · max(x, x_new),
+    without the magnitude of x, which vanishes at x = -absolute/relative: hence a relative tolerance of 0."""
 
     relative_tolerance: float = number(0.0, at_least=0.0, doc="of the local error")
     absolute_tolerance: float = number(1e-11, above=0.0, doc="of the local error, rad and rad/s")

@@ -1,7 +1,4 @@
-"""A scene as a Python script for Exudyn that needs nothing of this package: the kinematic tree, the same step.
-
-Its text is `script.py.txt`.
-"""
+"""A scene as a Python script for Exudyn alone, the kinematic tree with the same step; its text is `script.py.txt`."""
 
 from __future__ import annotations
 
@@ -29,7 +26,6 @@ _COMMENTS = {  # by kind; parts of another kind are left out
 
 
 def exudyn_script(scene: Scene) -> str:
-    """The text of the script."""
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
     moving = [0, *(1 + i for i in pitching(scene))]
     calls = []

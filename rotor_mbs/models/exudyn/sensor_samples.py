@@ -1,4 +1,4 @@
-"""From the recorded rows of the sensors of both models to a trajectory."""
+"""From the recorded rows of the sensors of both models to a trajectory; energy of the springs, work of the loads."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.models.exudyn import chain, energy, tree
+from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, pitching
 from rotor_mbs.models.exudyn.loads import chain_loads, matrices, tree_loads
+from rotor_mbs.models.exudyn.moments import ROTOR, drives
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import Segment
+from rotor_mbs.scenario.time_table import Segment, is_constant, values_at
 from rotor_mbs.solution.trajectory import Array, Trajectory, all_coordinates, finite_rows, finite_samples, sample_times
+
+# Points of the local polynomial that stands in for the power between rows.
+_POINTS = 8
 
 
 class _Reader:
@@ -35,13 +39,11 @@ class _Reader:
         self.samples: NDArray[np.intp] = rows if met.all() else rows[: int(np.argmin(met))]
 
     def all(self, name: str) -> Array:
-        """(n, k): every kept row."""
         if name not in self._tables:
             self._tables[name] = self._recorded(name)
         return self._tables[name][self._rows, 1:]
 
     def sampled(self, name: str) -> Array:
-        """(samples, k)."""
         return self.all(name)[self.samples]
 
 
@@ -94,7 +96,6 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    """(n,) from two (n, 3)."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
@@ -112,8 +113,8 @@ def _fields(
         tips = [read.sampled(f"tip {i + 1}") for i in range(len(scene.blades))]
         fields["tip"] = np.stack(tips, axis=1)
     if scene.wants("energy"):
-        fields["work"] = energy.work(scene, segments, read.time, angles, rates)[read.samples]
-        fields["potential_energy"], of_rests = energy.springs(scene, fields["angles"])
+        fields["work"] = work(scene, segments, read.time, angles, rates)[read.samples]
+        fields["potential_energy"], of_rests = springs(scene, fields["angles"])
         if any(scene.bearing_rest):
             fields["work"] += of_rests
         fields["kinetic_energy"] = np.zeros(len(read.samples))
@@ -130,13 +131,70 @@ def _fields(
 
 
 def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
-    """(n,) rad: angles known but for whole turns, made continuous with the help of the measured rates (rad/s).
-
-    The angle is predicted by the mean rate between two rows; the turn nearest to that is taken, so many turns between
-    rows do no harm as long as the prediction is right to half a turn. The first row gets the turns of `start`.
-    """
+    """(n,) rad: angles known but for whole turns, made continuous: the turn nearest to what the mean of the measured
+    rates (rad/s) predicts from row to row; the first row gets the turns of `start`."""
     turn = 2.0 * np.pi
     predicted = 0.5 * np.diff(time) * (rates[1:] + rates[:-1])
     gained = np.round((predicted - np.diff(wrapped)) / turn)
     turns = np.round((start - wrapped[0]) / turn) + np.concatenate([[0.0], np.cumsum(gained)])
     return np.asarray(wrapped + turn * turns)
+
+
+def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
+    """(n,) J at the first n samples: energy ½ k (θ - r)² of the springs, and what `work` leaves out of the work -∫ k (θ
+    - r) dr of rest angles r that move, jumps included: the change of ½ k r (r - 2θ); `work` has ∫ k r dθ."""
+    energy, of_rests = np.zeros((2, len(angles)))
+    for i in pitching(scene):
+        stiffness, table = scene.bearing(i)[0], scene.pitch_load(i)[1]
+        if stiffness:
+            rest = values_at(table, sample_times(scene)[: len(angles)])
+            energy += 0.5 * stiffness * (angles[:, 1 + i] - rest) ** 2
+            if not is_constant(table):
+                moved = 0.5 * stiffness * rest * (rest - 2.0 * angles[:, 1 + i])
+                of_rests += moved - moved[:1]
+    return energy, of_rests
+
+
+def work(scene: Scene, segments: Sequence[Segment], time: Array, angles: Array, rates: Array) -> Array:
+    """(n,) J of the torques less what the dampers took, from all rows, samples among them: s, rad, rad/s. A spring
+    whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see `springs`."""
+    if not scene.work_needs_path:
+        turned, torques = angles - angles[:1], segments[0].values
+        exact: Array = torques[ROTOR] * turned[:, 0]
+        for column, load, _ in drives(scene):
+            exact = exact + torques[load] * turned[:, column] if column else exact
+        return exact
+    losses = rates**2 @ np.array(scene.dampings)
+    out, done = np.zeros(len(time)), 0.0
+    slack = 1e-9 * scene.duration / (scene.samples - 1)
+    for segment in segments:
+        first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
+        if last - first < 2:
+            break
+        inside = slice(first, last)
+        power = -losses[inside]
+        for column, load, factor in drives(scene):
+            power = power + factor * segment.at(load, time[inside]) * rates[inside, column]
+        out[inside] = done + cumulative_integral(time[inside], power)
+        done = out[last - 1]
+    return out
+
+
+def cumulative_integral(time: Array, values: Array) -> Array:
+    """(n,) integral from the first row to each row, by a local polynomial through the eight nearest rows, which need
+    not be equally spaced; exact by Gauss-Legendre points."""
+    points = min(_POINTS, len(time))
+    first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
+    window = first[:, None] + np.arange(points)
+    nodes, known = time[window], values[window]
+    abscissae, weights = np.polynomial.legendre.leggauss((points + 1) // 2)
+    half = 0.5 * np.diff(time)
+    at = (time[:-1] + half)[:, None] + half[:, None] * abscissae
+    polynomial = np.zeros_like(at)
+    for j in range(points):
+        basis = np.ones_like(at)
+        for k in range(points):
+            if k != j:
+                basis *= (at - nodes[:, k, None]) / (nodes[:, j] - nodes[:, k])[:, None]
+        polynomial += basis * known[:, j, None]
+    return np.concatenate([[0.0], np.cumsum(half * (polynomial @ weights))])

@@ -1,7 +1,4 @@
-"""The rotor as a kinematic tree: hub and blades as links, rotor angle and pitch angles as the only coordinates.
-
-Exact zeros stay exact: no coordinate is ever computed from another.
-"""
+"""The rotor as a kinematic tree, hub and blades as links; its coordinates are the angles: exact zeros stay exact."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ import numpy as np
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
 from rotor_mbs.models.exudyn.geometry import Body, blade_body, hub_body, mounting, on_body, pitching
 from rotor_mbs.models.exudyn.loads import tree_sensors
-from rotor_mbs.models.exudyn.moments import Loads, Moment, moment_on
+from rotor_mbs.models.exudyn.moments import Loads, moment_on
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
@@ -20,14 +17,26 @@ _NODE = Ref("node", "joint angles")
 
 
 def parts(scene: Scene, loads: Loads) -> list[Part]:
-    """Everything the engine has of this scene, in the order it is built."""
-    built = [_node(scene), _tree(scene)]
-    for number, column in enumerate(scene.moving_coordinates):
+    moving = scene.moving_coordinates
+    node = {
+        "referenceCoordinates": [0.0] * len(moving),
+        "initialCoordinates": [scene.initial_angles[column] for column in moving],
+        "initialCoordinates_t": [scene.initial_rates[column] for column in moving],
+        "numberOfODE2Coordinates": len(moving),
+    }
+    built = [Part("node", _NODE.name, "NodeGenericODE2", node, f"{len(moving)} coordinates"), _tree(scene)]
+    for number, column in enumerate(moving):
         moment = moment_on(scene, loads, column)
         if moment.terms:
             what, which = ("pitch", f" {column}") if column else ("rotor", "")
             is_fixed = all(is_constant(scene.load_tables[load]) for load, _ in moment.terms)
-            built += _torque(f"{what} torque{which}", f"{what} angle{which}", number, moment, is_fixed)
+            marker = {"nodeNumber": _NODE, "coordinate": number}
+            load: dict[str, object] = {"markerNumber": Ref("marker", f"{what} angle{which}"), "load": moment.at(0.0)}
+            if not is_fixed:
+                load["loadUserFunction"] = moment.scalar
+            detail = "constant" if is_fixed else "over time"
+            built.append(Part("marker", f"{what} angle{which}", "MarkerNodeCoordinate", marker))
+            built.append(Part("load", f"{what} torque{which}", "LoadCoordinate", load, detail))
     built += [
         sensor("angles", "SensorNode", "Coordinates", "joint angles", nodeNumber=_NODE),
         sensor("rates", "SensorNode", "Coordinates_t", "joint rates", nodeNumber=_NODE),
@@ -54,19 +63,7 @@ def bodies(scene: Scene) -> list[Body]:
 
 
 def link_name(link: int) -> str:
-    """The hub, or link k for the k-th blade that pitches."""
     return f"link {link}" if link else "hub"
-
-
-def _node(scene: Scene) -> Part:
-    moving = scene.moving_coordinates
-    parameters = {
-        "referenceCoordinates": [0.0] * len(moving),
-        "initialCoordinates": [scene.initial_angles[column] for column in moving],
-        "initialCoordinates_t": [scene.initial_rates[column] for column in moving],
-        "numberOfODE2Coordinates": len(moving),
-    }
-    return Part("node", _NODE.name, "NodeGenericODE2", parameters, f"{len(moving)} coordinates")
 
 
 def _tree(scene: Scene) -> Part:
@@ -95,15 +92,6 @@ def _tree(scene: Scene) -> Part:
         parameters["jointVelocityOffsetVector"] = [0.0 for _ in links]
         detail += ", damping"
     return Part("object", _TREE.name, "ObjectKinematicTree", parameters, detail)
-
-
-def _torque(name: str, where: str, coordinate: int, moment: Moment, is_fixed: bool) -> list[Part]:
-    """A load on a coordinate of the tree."""
-    marker = Part("marker", where, "MarkerNodeCoordinate", {"nodeNumber": _NODE, "coordinate": coordinate})
-    load: dict[str, object] = {"markerNumber": Ref("marker", marker.name), "load": moment.at(0.0)}
-    if not is_fixed:
-        load["loadUserFunction"] = moment.scalar
-    return [marker, Part("load", name, "LoadCoordinate", load, "constant" if is_fixed else "over time")]
 
 
 def _link_sensor(name: str, quantity: str, link: int, point: Array) -> Part:

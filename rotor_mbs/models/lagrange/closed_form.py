@@ -23,18 +23,11 @@ Function = Callable[[Any], Any]
 
 @dataclass(frozen=True, slots=True)
 class LoadValues:
-    """Loads at one time, or over time as arrays.
+    """Loads at one time, or over time as arrays."""
 
-    Attributes
-    ----------
-    rotor : N m on the rotor
-    pitches : (form.blades,) N m between hub and blade; () for none
-    rests : (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
-    """
-
-    rotor: Number
-    pitches: Sequence[Number] = ()
-    rests: Sequence[Number] = ()
+    rotor: Number  # N m on the rotor
+    pitches: Sequence[Number] = ()  # (form.blades,) N m between hub and blade; () for none
+    rests: Sequence[Number] = ()  # (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
 
 
 def load_values(values: Sequence[Any]) -> LoadValues:
@@ -46,15 +39,8 @@ def load_values(values: Sequence[Any]) -> LoadValues:
 def accelerations(
     angles: Sequence[Number], rates: Sequence[Number], form: RotorForm, loads: LoadValues, sin: Function, cos: Function
 ) -> list[Number]:
-    """Rotor, then pitch accelerations in rad/s², by Lagrange's equations of T - V above.
-
-    Singular where S = 0: point-mass blades all at ±π/2 on a massless hub.
-
-    Parameters
-    ----------
-    angles, rates : 1 + len(form.blades) numbers, rad and rad/s: rotor, then the pitches that move
-    sin, cos : of the same kind of numbers
-    """
+    """Rotor, then pitch accelerations in rad/s², by Lagrange's equations of T - V above, from 1 + len(form.blades)
+    angles and rates. Singular where S = 0: point-mass blades all at ±π/2 on a massless hub."""
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
     schur = form.inertia
@@ -100,11 +86,8 @@ def pitches(
 
 
 def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number:
-    """W: of the torques and of the moments k r of springs at rest at r, less what shaft and bearing dampers take.
-
-    The work of a spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of
-    `rest_energy`.
-    """
+    """W: of the torques and of the moments k r of springs at rest at r, less what the dampers take. The work of a
+    spring whose rest angle moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of `rest_energy`."""
     spin = rates[0]
     total = loads.rotor * spin - form.shaft_damping * (spin * spin)
     for blade, rate, _, torque, rest in pitches(form, rates, rates, loads):

@@ -1,10 +1,6 @@
-"""Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure.
-
-In Hamilton's variables, whose equations take fewer and cheaper steps; what is stored are rates, as of a run alone.
-
-A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a sweep gives the same
-bits. Runs in one process and one thread: processes are the parallelism.
-"""
+"""Many runs of lagrange/taylor at once: heyoka's batch integrator, one run per SIMD lane, one compile per structure, in
+Hamilton's variables. A run's numbers do not depend on its neighbours in the other lanes, so that any partition of a
+sweep gives the same bits. One thread: processes are the parallelism."""
 
 from __future__ import annotations
 
@@ -16,18 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange import closed_form, hamilton
+from rotor_mbs.models.lagrange import closed_form, hamilton, taylor
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.samples import constant_work
-from rotor_mbs.models.lagrange.taylor import (
-    build_system,
-    compiled,
-    equation_numbers,
-    is_compact,
-    set_parameters,
-    state_symbols,
-)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
 
@@ -43,7 +31,6 @@ _OBSERVED_PER_CALL = 1024
 
 
 def empty_block(scenes: Sequence[Scene]) -> RunBlock:
-    """Room for their samples, all of which are to be put there."""
     first, runs = scenes[0], len(scenes)
     time = np.linspace(0.0, np.array([scene.duration for scene in scenes]), first.samples, axis=1)
     blades = len(first.blades)
@@ -67,18 +54,8 @@ def lanes() -> int:
 
 
 def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
-    """Run all scenes; a run that breaks off is in the result, cut and with its reason.
-
-    Parameters
-    ----------
-    scenes : with the same number of blades and samples and the same outputs, loads not among them
-    tolerance : of the local error, absolute and relative
-
-    Raises
-    ------
-    MethodRefusal
-        Where heyoka is not installed.
-    """
+    """Run all scenes, with the same number of blades and samples and the same outputs, loads not among them; a run that
+    breaks off is in the result, cut and with its reason. Raises MethodRefusal where heyoka is not installed."""
     block = empty_block(scenes)
     rotors: dict[tuple[object, ...], _RotorNumbers] = {}
     groups: dict[tuple[int, ...], list[int]] = {}
@@ -94,7 +71,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
         key = scene.rotor_key
         if key not in rotors:
             parameters = Parameters()
-            equation_numbers(scene, parameters)
+            taylor.equation_numbers(scene, parameters)
             _tip_numbers(scene, parameters)
             structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
             rotors[key] = array_of(parameters.values, quad=False), structure
@@ -106,23 +83,13 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
 
 def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
-    """Compiled once per computer (engine's cache on disk)."""
 
     def make() -> Any:
-        equations, _ = build_system(example, in_momenta=True)
-        options = {"tol": tolerance, "compact_mode": is_compact(example), "high_accuracy": True}
+        equations, _ = taylor.build_system(example, in_momenta=True)
+        options = {"tol": tolerance, "compact_mode": taylor.is_compact(example), "high_accuracy": True}
         return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
 
-    return compiled(("batch", tolerance, structure), make)
-
-
-def _momenta(example: Scene) -> Any:
-    """Compiled code from angles and rates to momenta."""
-    engine, parameters = heyoka(), Parameters()
-    form, _ = equation_numbers(example, parameters)
-    angles, rates = state_symbols(form)
-    rows = [engine.expression(0.0) + row for row in hamilton.momenta(angles, rates, form, engine.sin, engine.cos)]
-    return engine.cfunc(rows, [*angles, *rates], compact_mode=is_compact(example))
+    return taylor.compiled(("batch", tolerance, structure), make)
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
@@ -133,14 +100,12 @@ def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
 
 
 def _observables(example: Scene) -> Any:
-    """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta.
-
-    It takes a tenth of the time that NumPy takes for the same formulas, a quarter of a run with 1,001 samples.
-    """
+    """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta: a tenth of
+    NumPy's time for the same formulas."""
     engine, parameters = heyoka(), Parameters()
-    form, loads = equation_numbers(example, parameters)
+    form, loads = taylor.equation_numbers(example, parameters)
     points = _tip_numbers(example, parameters)
-    angles, momenta = state_symbols(form)
+    angles, momenta = taylor.state_symbols(form)
     rates = hamilton.rates(angles, momenta, form, engine.sin, engine.cos)
     moving = dict(zip(example.moving_coordinates, angles, strict=True))
     pitches = [moving[i] if i in moving else parameters.own(Fraction(0)) for i in range(1, 1 + len(example.blades))]
@@ -152,16 +117,12 @@ def _observables(example: Scene) -> Any:
         observables += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
     # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
     rows = [engine.expression(0.0) + row for row in observables]
-    return engine.cfunc(rows, [*angles, *momenta], compact_mode=is_compact(example))
+    return engine.cfunc(rows, [*angles, *momenta], compact_mode=taylor.is_compact(example))
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
-    """(rows, runs, samples): what a compiled function gives, such as x y z in m of each tip, or the energies in J.
-
-    `states` are (variables, runs, samples), of what moves: angles in rad, then rates or momenta; `numbers` are
-    (parameters, runs), of equations and tips, then the pitches that are fixed. The runs must fill the processor's
-    lanes, once or more: what is left over is rounded by other instructions.
-    """
+    """(rows, runs, samples) of compiled code at (variables, runs, samples) states of what moves; `numbers` (parameters,
+    runs) as of `_Group`. The runs must fill the lanes: what is left over is rounded by other instructions."""
     _, runs, samples = states.shape
     parts = []
     for i in range(0, samples, _OBSERVED_PER_CALL):
@@ -174,15 +135,7 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 
 
 class _Group:
-    """Runs of one structure, and the compiled code for them.
-
-    Attributes
-    ----------
-    places, scenes : of each run, in the block
-    initial : (variables, k) state
-    times : (samples, k) s
-    numbers : (parameters, k) of the rotor, then the pitches that are fixed
-    """
+    """Runs of one structure, and the compiled code for them; places: of each run in the block."""
 
     def __init__(
         self, places: list[int], scenes: list[Scene], rotors: Sequence[_RotorNumbers], tolerance: float
@@ -191,8 +144,17 @@ class _Group:
         self.places, self.scenes = places, scenes
         self.integrator = _integrator(structure, tolerance, example)
         outputs = example.wants("tip"), example.wants("energy")
-        self.observables = compiled(("observables", *outputs, structure), lambda: _observables(example))
-        self.momenta = compiled(("momenta", structure), lambda: _momenta(example))
+        self.observables = taylor.compiled(("observables", *outputs, structure), lambda: _observables(example))
+
+        def momenta() -> Any:
+            engine, parameters = heyoka(), Parameters()
+            form, _ = taylor.equation_numbers(example, parameters)
+            symbols, speeds = taylor.state_symbols(form)
+            rows = hamilton.momenta(symbols, speeds, form, engine.sin, engine.cos)
+            rows = [engine.expression(0.0) + row for row in rows]
+            return engine.cfunc(rows, [*symbols, *speeds], compact_mode=taylor.is_compact(example))
+
+        self.momenta = taylor.compiled(("momenta", structure), momenta)
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
@@ -200,6 +162,7 @@ class _Group:
         self.initial = np.zeros((self.integrator.state.shape[0], len(scenes)))
         self.initial[: 2 * len(self.moving)] = np.concatenate([angles[self.moving], rates[self.moving]])
         self.times = np.linspace(0.0, np.array([scene.duration for scene in scenes]), example.samples)
+        # (parameters, k) of the rotor, then the pitches that are fixed
         self.numbers = np.concatenate([np.stack([numbers for numbers, _ in rotors], axis=1), angles[fixed]])
 
     def solve(self, columns: Sequence[int]) -> tuple[Array, Array, list[Integration]]:
@@ -215,7 +178,7 @@ class _Group:
             lanes = slice(i, i + width)
             self.integrator.set_time(np.zeros(width))
             self.integrator.state[:] = start[:, lanes]
-            set_parameters(self.integrator, numbers[:, lanes])
+            taylor.set_parameters(self.integrator, numbers[:, lanes])
             states[:, lanes] = self.integrator.propagate_grid(times[:, lanes])[1].transpose(1, 2, 0)
             for result in self.integrator.propagate_res:
                 message = failure(result[0])
@@ -260,7 +223,6 @@ class _Group:
 
 
 def _propagate(block: RunBlock, group: _Group) -> None:
-    """All its runs into the block."""
     width = group.integrator.state.shape[1]
     runs = len(group.scenes)
     chunk = max(_SAMPLES_PER_CHUNK // len(group.times) // width, 1) * width

@@ -1,9 +1,5 @@
-"""A rotor that turns under gravity: its periodic motion at a mean speed, and the transition matrix over one turn.
-
-Under gravity a turning rotor has no equilibrium. What takes its place is a motion that comes back after one turn, with
-the rotor one turn further; small departures from it are carried over a turn by the state transition matrix, whose
-eigenvalues are the Floquet multipliers. Needs heyoka: the variational equations are differentiated by it.
-"""
+"""A rotor that turns under gravity: its periodic motion at a mean speed, the rotor one turn further after each, and the
+state transition matrix over one turn, whose eigenvalues are the Floquet multipliers. Needs heyoka."""
 
 from __future__ import annotations
 
@@ -17,14 +13,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
-from rotor_mbs.models.lagrange.linearization import (
-    Jet,
-    cosine,
-    holding_torque,
-    linearize,
-    sine,
-    steady_rotation,
-)
+from rotor_mbs.models.lagrange.linearization import Jet, cosine, holding_torque, linearize, sine, steady_rotation
 from rotor_mbs.models.lagrange.parameters import load_tables, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.models.lagrange.taylor import compiled
@@ -46,49 +35,27 @@ _LOST = 20.0
 
 @dataclass(frozen=True)
 class Turn:
-    """A motion that repeats itself after a turn, and how small departures from it grow over that turn.
+    """A motion that repeats itself after a turn, and how small departures from it grow over that turn."""
 
-    Attributes
-    ----------
-    speed : rad/s, of the rotor, averaged over the turn
-    start : (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
-    torque : N m on the rotor, constant: what the dampers take in a turn is put in by it
-    transition : (2n, 2n) state transition matrix over the turn
-    gradient : (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where dampers
-        take energy
-    flow : (2n,) time derivative of the state at the start
-    trace_integral : ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the
-        determinant of `transition`, computed without it
-    mismatch : largest difference between end and start: rad, and rates as shares of the speed
-    message : why no periodic motion was found; "" where it was
-    """
-
-    speed: float
-    start: Array
-    torque: float
-    transition: Array
+    speed: float  # rad/s, of the rotor, averaged over the turn
+    start: Array  # (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
+    torque: float  # N m on the rotor, constant: what the dampers take in a turn is put in by it
+    transition: Array  # (2n, 2n) state transition matrix over the turn
+    # (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero where dampers take
+    # energy
     gradient: Array
-    flow: Array
+    flow: Array  # (2n,) time derivative of the state at the start
+    # ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of the determinant of
+    # `transition`, computed without it
     trace_integral: float
-    mismatch: float
-    message: str = ""
+    mismatch: float  # largest difference between end and start: rad, and rates as shares of the speed
+    message: str = ""  # why no periodic motion was found; "" where it was
 
 
 def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:
-    """The periodic motion of `scene` at a mean speed, its rotor starting at the scene's initial angle.
-
-    By Newton's method; the constant torque is an unknown. Where there is no such motion, `message` says why.
-
-    Parameters
-    ----------
-    speed : rad/s, above 0
-    guess : motion at a speed nearby to start from; None for steady rotation without gravity
-
-    Raises
-    ------
-    MethodRefusal
-        Where heyoka is not installed.
-    """
+    """The periodic motion of `scene` at a mean `speed` above 0 in rad/s, from the scene's initial rotor angle, by
+    Newton's method; the torque is an unknown. `guess` is a motion at a speed nearby, else steady rotation without
+    gravity. Where there is no such motion, `message` says why. Raises MethodRefusal where heyoka is not installed."""
     try:
         return _closed_turn(scene, speed, guess)
     except InputError as exc:
@@ -110,6 +77,7 @@ def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
     period = 2.0 * math.pi / speed
     shift = np.zeros(2 * n)
     shift[0] = 2.0 * math.pi
+    form = rotor_form(scene)
     best: Turn | None = None
     for _ in range(_MAX_CORRECTIONS):
         end, derivatives, trace = system.propagate(state, torque, period)
@@ -117,7 +85,16 @@ def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
         residual = (end - state - shift) / units
         mismatch = float(np.abs(residual).max())
         if best is None or mismatch < best.mismatch:
-            best = Turn(speed, state, torque, by_state, *_invariants(scene, state, torque), trace, mismatch)
+            # Gradient of energy less the torques' work, zero where dampers act; and the state's time derivative.
+            variables, loads = Jet.variables(state), loads_at_start(scene, torque)
+            kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
+            gradient = (kinetic + potential).slope
+            gradient[:n] -= [torque, *loads.pitches]
+            gradient = np.zeros(2 * n) if scene.has_damping else gradient
+            angles, rates = state[:n].tolist(), state[n:].tolist()
+            accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
+            flow = np.array([*rates, *accelerations])
+            best = Turn(speed, state, torque, by_state, gradient, flow, trace, mismatch)
         if mismatch < _CLOSED or mismatch > _LOST:
             break
         jacobian = np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
@@ -128,19 +105,6 @@ def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
         left = math.inf if best is None else best.mismatch
         raise InputError(f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
     return best
-
-
-def _invariants(scene: Scene, state: Array, torque: float) -> tuple[Array, Array]:
-    """(2n,) gradient of energy less the torques' work, zero where dampers act; (2n,) time derivative of the state."""
-    form, n = rotor_form(scene), len(state) // 2
-    variables = Jet.variables(state)
-    loads = loads_at_start(scene, torque)
-    kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
-    gradient = (kinetic + potential).slope
-    gradient[:n] -= [torque, *loads.pitches]
-    angles, rates = state[:n].tolist(), state[n:].tolist()
-    accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
-    return (np.zeros(2 * n) if scene.has_damping else gradient), np.array([*rates, *accelerations])
 
 
 class _Variational:
@@ -172,10 +136,8 @@ class _Variational:
         self._frequency = math.sqrt(np.abs(still.stiffness).max())
 
     def propagate(self, state: Array, torque: float, period: float) -> tuple[Array, Array, float]:
-        """(2n,) state after a turn, (2n, 2n + 1) its derivatives by initial state and torque, and ∫ tr A dt.
-
-        Raises InputError where it does not get there.
-        """
+        """(2n,) state after a turn, (2n, 2n + 1) its derivatives by initial state and torque, and ∫ tr A dt; raises
+        InputError."""
         count, integrator = len(state), self._integrator
         integrator.pars[:] = [*self._values[:-1], torque][: len(integrator.pars)]
         integrator.time = 0.0

@@ -44,14 +44,9 @@ def compile_anew() -> None:
 
 
 class Parameters:
-    """Turns numbers into runtime parameters: equal ones share a parameter, exact zeros vanish from the equations.
-
-    Attributes
-    ----------
-    values : the numbers, by parameter index
-    structure : the index (-1: zero) of every number in the order asked for; equal structures give equal equations, so
-        that one compiled integrator serves every scene of that structure
-    """
+    """Turns numbers into runtime parameters: equal ones share one of the `values`, exact zeros vanish from the
+    equations. `structure` has the index (-1: zero) of every number in the order asked for: one compiled integrator
+    serves every scene of an equal structure."""
 
     def __init__(self) -> None:
         self.values: list[Fraction] = []

@@ -1,8 +1,5 @@
-"""Exact derivatives of the closed form, and its steady states: equilibrium at rest, steady rotation without gravity.
-
-The closed form is evaluated with numbers that carry their derivatives through each of its operations: no formula is
-written twice and no difference quotient is taken. Needs NumPy only.
-"""
+"""Exact derivatives of the closed form, evaluated with numbers that carry them, and its steady states: equilibrium at
+rest, steady rotation without gravity."""
 
 from __future__ import annotations
 
@@ -37,7 +34,6 @@ class Jet:
 
     @classmethod
     def variables(cls, values: Sequence[float] | Array) -> list[Jet]:
-        """The independent variables themselves."""
         unit, zero = np.eye(len(values)), np.zeros((len(values), len(values)))
         return [cls(float(value), unit[k], zero) for k, value in enumerate(values)]
 
@@ -77,13 +73,11 @@ class Jet:
 
 
 def sine(x: Jet) -> Jet:
-    """sin x with its derivatives."""
     s, c = math.sin(x.value), math.cos(x.value)
     return x.function(s, c, -s)
 
 
 def cosine(x: Jet) -> Jet:
-    """cos x with its derivatives."""
     s, c = math.sin(x.value), math.cos(x.value)
     return x.function(c, -s, -c)
 
@@ -91,25 +85,8 @@ def cosine(x: Jet) -> Jet:
 def linearize(
     scene: Scene, angles: Sequence[float] | Array, rates: Sequence[float] | Array, torque: float
 ) -> Linearization:
-    """The closed form linearized in `scene.moving_coordinates`; pitch torques and rest angles are those at t = 0.
-
-    Parameters
-    ----------
-    angles, rates : (1 + blades,) rad and rad/s
-    torque : N m on the rotor
-
-    Raises
-    ------
-    ZeroDivisionError
-        At the singular configuration.
-
-    Examples
-    --------
-    >>> import rotor_mbs.scenario.catalogue as catalogue
-    >>> scene = catalogue.find_scenes(["stiff/nrel-5mw"])[0]
-    >>> linearize(scene, (0, 0, 0, 0), (0, 0, 0, 0), 0.0).stiffness.shape
-    (4, 4)
-    """
+    """The closed form linearized in `scene.moving_coordinates` at (1 + blades,) rad and rad/s, `torque` N m on the
+    rotor, other loads as at t = 0. Raises ZeroDivisionError at the singular configuration."""
     form, columns = rotor_form(scene), scene.moving_coordinates
     n = len(columns)
     state = Jet.variables([*(angles[i] for i in columns), *(rates[i] for i in columns)])
@@ -125,23 +102,15 @@ def holding_torque(scene: Scene, speed: float) -> float:
 
 
 def steady_rotation(scene: Scene, speed: float) -> Array:
-    """(1 + blades,) rad: angles at which the rotor turns steadily at `speed` rad/s, no gravity acting.
-
-    The pitches are stationary points of the amended potential V - ½ Ω² a - Σ τ θ, found downhill from the scene's
-    initial pitches; where those are stationary already, stable or not, they are kept. The drive holds the speed.
-
-    Raises InputError where there is none within 200 steps.
-    """
+    """(1 + blades,) rad: angles at which the rotor turns steadily at `speed` rad/s, no gravity acting: stationary
+    points of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches, kept where they are stationary already,
+    stable or not. Raises InputError where there is none within 200 steps."""
     return _stationary(replace(scene, gravity=0.0), speed, fixed_rotor=True)
 
 
 def equilibrium(scene: Scene) -> Array:
-    """(1 + blades,) rad: angles at which the rotor rests under gravity and bearing springs, without a rotor torque.
-
-    Found downhill from the scene's initial angles; where those are an equilibrium, stable or not, they are kept.
-
-    Raises InputError where there is none within 200 steps.
-    """
+    """(1 + blades,) rad: angles at which the rotor rests under gravity and springs, without a rotor torque, found as by
+    `steady_rotation`."""
     return _stationary(scene, 0.0, fixed_rotor=scene.gravity == 0.0)
 
 
@@ -175,19 +144,15 @@ def _stationary(scene: Scene, speed: float, *, fixed_rotor: bool) -> Array:
 
 
 def _is_lower(trial: Jet, start: Jet, step: Array, free: slice) -> bool:
-    """Whether a step went downhill, also where the rounding of the potential hides by how much.
-
-    Source: the approximate Wolfe condition of W. W. Hager and H. Zhang, SIAM J. Optim. 16 (2005) 170-192.
-    """
+    """Whether a step went downhill, also where rounding hides by how much: the approximate Wolfe condition of W. W.
+    Hager and H. Zhang, SIAM J. Optim. 16 (2005) 170-192."""
     allowed = start.value + 1e-12 * abs(start.value)
     return trial.value <= allowed and bool(trial.slope[free] @ step <= -0.8 * (start.slope[free] @ step))
 
 
 def amended_potential(form: RotorForm, angles: Sequence[float] | Array, speed: float, loads: LoadValues) -> Jet:
-    """V - T in J, the pitches at rest and the rotor turning at `speed` rad/s, with its derivatives by the angles.
-
-    V has the potential of the constant pitch torques, too; the rotor's torque is left out.
-    """
+    """V - T in J, with its derivatives by the angles: the pitches at rest, their constant torques in V, the rotor
+    turning at `speed` rad/s without its torque."""
     variables = Jet.variables(list(angles))
     rates = [speed, *(0.0 for _ in form.blades)]
     kinetic, potential = closed_form.energies(variables, rates, form, loads, sine, cosine)

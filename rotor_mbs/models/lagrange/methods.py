@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.methods.base import Method, Solver, late
-from rotor_mbs.methods.ladders import Ladder, tolerance_ladder, tolerance_pair
+from rotor_mbs.methods.base import Ladder, Method, Solver, late, tolerance_ladder, tolerance_pair
 from rotor_mbs.methods.settings import Settings, number
-from rotor_mbs.models.equation_items import equation_items
-from rotor_mbs.models.ode45_settings import Ode45Settings
+from rotor_mbs.models.equations import Ode45Settings, equation_items
 
 if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.scenario.scene import Scene
@@ -23,15 +21,11 @@ _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 
 @dataclass(frozen=True)
 class TaylorSettings(Settings):
-    """Of heyoka's adaptive Taylor method."""
-
     tolerance: float = number(_EPS, above=0.0, doc="of the local error, absolute and relative")
 
 
 @dataclass(frozen=True)
 class ReferenceSettings(Settings):
-    """Of the two runs in quad precision."""
-
     tolerance: float = number(1e-33, above=0.0, doc="of the run that is kept")
     check_tolerance: float = number(1e-30, above=0.0, doc="of the run whose distance the uncertainty follows from")
 
@@ -47,16 +41,12 @@ def _absolute(default: float) -> Any:
 
 @dataclass(frozen=True)
 class Dop853Settings(Settings):
-    """Of SciPy's DOP853."""
-
     relative_tolerance: float = _relative(3e-14)
     absolute_tolerance: float = _absolute(1e-16)
 
 
 @dataclass(frozen=True)
 class RadauSettings(Settings):
-    """Of SciPy's Radau."""
-
     relative_tolerance: float = _relative(1e-8)
     absolute_tolerance: float = _absolute(1e-11)
 
@@ -80,7 +70,6 @@ def _linearize(scene: Scene, angles: Any, speed: float, torque: float) -> Linear
 
 
 def _scipy_method(solver: str, settings: type[Settings], ladder: Ladder, relative_cost: float) -> Method:
-    """SciPy's method of that name."""
 
     def build(scene: Scene, chosen: Any) -> Solver:
         from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator

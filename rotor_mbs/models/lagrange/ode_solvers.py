@@ -26,13 +26,8 @@ Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Any integrator over the scene, one call per segment of the loads; see `rotor_mbs.methods.base.Solver`.
-
-    Parameters
-    ----------
-    times : as of `taylor.Propagation`, as is the attribute `states`
-    accelerations : the equations, where they are not the closed form as it is
-    """
+    """Any integrator over the scene, one call per segment of the loads; `times` as of `taylor.Propagation`,
+    `accelerations` in place of the closed form's."""
 
     def __init__(
         self,
@@ -91,11 +86,8 @@ class OdeSolver:
 
 
 def work_unit(scene: Scene) -> float:
-    """J of the work variable: the power of two below the scene's energies and torques, at least 1.
-
-    In J its absolute tolerance would be far below its own rounding: where the drive balances megawatts of damping, no
-    step is short enough for that.
-    """
+    """J of the work variable: the power of two below the scene's energies and torques, at least 1. In J its absolute
+    tolerance could be far below its own rounding."""
     form, columns = rotor_form(scene), scene.moving_coordinates
     angles, rates = ([values[i] for i in columns] for values in (scene.initial_angles, scene.initial_rates))
     kinetic, _ = closed_form.energies(angles, rates, form, loads_at_start(scene), math.sin, math.cos)

@@ -1,9 +1,5 @@
-"""A scene's numbers as the closed form needs them: coefficients, loads, units of rates.
-
-Coefficients are in exact rational arithmetic until the last step. Why: for a point mass the coefficients
-Jxx - Jxz²/Jzz and z + x·Jxz/Jzz vanish identically. Formed in floating point they leave a rounding remainder, and near
-a pitch of ±π/2 that remainder, not the physics, would be the inertia.
-"""
+"""A scene's numbers as the closed form needs them. Coefficients are in exact rational arithmetic until the last step:
+of a point mass some vanish identically, and near a pitch of ±π/2 a rounding remainder would be the inertia."""
 
 from __future__ import annotations
 
@@ -29,75 +25,49 @@ PI = Fraction("3.141592653589793238462643383279502884197169399375105820974944592
 
 @dataclass(frozen=True, slots=True)
 class BladeForm:
-    """Coefficients of one blade; s, c are sine and cosine of its pitch θ.
+    """Coefficients of one blade; s, c are sine and cosine of its pitch θ."""
 
-    Attributes
-    ----------
-    cos_phase, sin_phase : of its mounting angle about the shaft
-    schur_ss, schur_cc, schur_sc : kg m², its share of the Schur complement, a quadratic form in (s, c)
-    half_slope_sc, half_slope_cs : kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
-    coupling_s, coupling_c : kg m², b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
-    ratio_s, ratio_c : b / Jzz
-    pitch_inertia : kg m², Jzz
-    weight_x, weight_y, weight_z : N m, m g (x, y, z) of the centre of mass
-    lever_ss, lever_cc, lever_sc : N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
-    stiffness, damping : N m/rad, N m s/rad
-    inertia_ss, inertia_cc, inertia_sc : kg m², a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
-    """
-
-    cos_phase: Number
+    cos_phase: Number  # of its mounting angle about the shaft
     sin_phase: Number
-    schur_ss: Number
+    schur_ss: Number  # kg m², its share of the Schur complement, a quadratic form in (s, c)
     schur_cc: Number
     schur_sc: Number
-    half_slope_sc: Number
+    half_slope_sc: Number  # kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
     half_slope_cs: Number
-    coupling_s: Number
+    coupling_s: Number  # kg m², b = coupling_s·s + coupling_c·c, the rotor-pitch entry of the mass matrix
     coupling_c: Number
-    ratio_s: Number
+    ratio_s: Number  # b / Jzz
     ratio_c: Number
-    pitch_inertia: Number
-    weight_x: Number
+    pitch_inertia: Number  # kg m², Jzz
+    weight_x: Number  # N m, m g (x, y, z) of the centre of mass
     weight_y: Number
     weight_z: Number
-    lever_ss: Number
+    lever_ss: Number  # N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
     lever_cc: Number
     lever_sc: Number
-    stiffness: Number
+    stiffness: Number  # N m/rad, N m s/rad
     damping: Number
-    inertia_ss: Number
+    inertia_ss: Number  # kg m², a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
     inertia_cc: Number
     inertia_sc: Number
 
 
 @dataclass(frozen=True, slots=True)
 class RotorForm:
-    """Coefficients of the whole rotor.
+    """Coefficients of the whole rotor."""
 
-    Attributes
-    ----------
-    blades : the blades whose pitch moves, in order
-    fixed : (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
-    inertia : kg m², hub and the blades that are fixed
-    shaft_damping : N m s/rad
-    """
-
-    blades: tuple[BladeForm, ...]
+    blades: tuple[BladeForm, ...]  # the blades whose pitch moves, in order
+    # (weight_z, cos_phase, sin_phase) of each blade without pitch inertia, a part of the rotor
     fixed: tuple[tuple[Number, Number, Number], ...]
-    inertia: Number
-    shaft_damping: Number
+    inertia: Number  # kg m², hub and the blades that are fixed
+    shaft_damping: Number  # N m s/rad
 
 
 def rotor_form(
     scene: Scene, convert: Convert = float, phases: Sequence[tuple[Fraction, Fraction]] | None = None
 ) -> RotorForm:
-    """The coefficients of `scene`; its doubles are taken as exact, so that every precision solves the same rotor.
-
-    Parameters
-    ----------
-    convert : rounds each coefficient once from its exact value
-    phases : (blades,) cosines and sines of the mounting angles, where they are not those of `Scene.phases`
-    """
+    """The coefficients of `scene`, whose doubles are taken as exact; `convert` rounds each once. `phases`: (blades,)
+    cosines and sines of the mounting angles, where they are not those of `Scene.phases`."""
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
     forms: list[BladeForm] = []
@@ -179,7 +149,6 @@ def load_tables(scene: Scene) -> tuple[Table, ...]:
 
 
 def changing_loads(scene: Scene) -> tuple[int, ...]:
-    """Which of `load_tables` change over time."""
     return tuple(i for i, table in enumerate(load_tables(scene)) if not is_constant(table))
 
 
@@ -198,12 +167,9 @@ _UNIT_FREQUENCY = 100.0
 
 
 def rate_units(scene: Scene) -> Array:
-    """(1 + moving blades,) rad/s: 1, or a coordinate's own frequency where that is above 100 rad/s.
-
-    Without it the quarter period that turns an angle into a rate would count as growth of an error: 1e5-fold on a
-    bearing of 1e12 N m/rad, where nothing grows at all. The frequency is that of the bearing's spring, of gravity on
-    the offset mass and of the rotor's turning, at the start.
-    """
+    """(1 + moving blades,) rad/s: 1, or a coordinate's own frequency at the start (spring, gravity, turning) above 100
+    rad/s. Else the quarter period that turns an angle into a rate would count as growth of an error: 1e5-fold on a
+    bearing of 1e12 N m/rad."""
     form = rotor_form(scene)
     spin = abs(scene.initial_rates[0])
     frequencies = [0.0]

@@ -1,18 +1,22 @@
-"""reference: the closed form in quad precision, a bound on its error from two tolerances, and the growth of errors."""
+"""The closed form in quad precision, a bound on its error from two tolerances, and the growth of errors; in doubles at
+chosen times, as it is, with terms left out, or with blades elsewhere."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
-from rotor_mbs.models.lagrange.loads import quad_loads
-from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
-from rotor_mbs.models.lagrange.parameters import rate_units
+from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
+from rotor_mbs.models.lagrange.parameters import Number, rate_units, rotor_form
+from rotor_mbs.models.lagrange.samples import quad_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
@@ -36,15 +40,9 @@ _PERTURBATION = 1e-9
 
 
 class ReferenceSolver:
-    """Two runs over the scene's sample times, and how errors grow along them.
-
-    The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka a hundredth): their
-    distance is the truncation error of the other, or, where both are at round-off, of the size of that.
-
-    Parameters
-    ----------
-    epsilon : of the runs' arithmetic
-    """
+    """Two runs over the scene's sample times, and how errors grow along them. The tolerance of the run that is kept,
+    the first, is a thousandth of the other's (without heyoka a hundredth): their distance is the truncation error of
+    the other."""
 
     def __init__(self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float) -> None:
         self._scene, self._runs, self._epsilon = scene, runs, epsilon
@@ -73,18 +71,9 @@ class ReferenceSolver:
 
 
 def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
-    """(n,) rad: a bound on the error of the angles, from how far two runs of unlike tolerance are apart.
-
-    `SAFETY` times the sum of the difference and of the rounding of the largest angle (at least 1 rad), because two runs
-    may round alike; of it the largest so far, because two runs may meet at a sample by chance. It does not contain the
-    rounding of the angles to double precision when they are stored, at most half a unit in the last place.
-
-    Parameters
-    ----------
-    difference : (n,) rad, largest over the angles
-    angles : (n, 1 + blades) rad
-    epsilon : of the runs' arithmetic
-    """
+    """(n,) rad: a bound on the error of (n, 1 + blades) angles, but for their rounding to doubles: `SAFETY` times the
+    sum of the difference of two runs, (n,) rad, and of the rounding of the largest angle, because two runs may round
+    alike; of it the largest so far, because they may meet by chance. `epsilon` is that of their arithmetic."""
     largest = np.maximum(np.abs(angles).max(axis=1), 1.0)
     return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
 
@@ -108,11 +97,8 @@ def _in_doubles(scene: Scene, tolerances: tuple[float, float], times: Array | No
 
 
 def error_growth(scene: Scene) -> Array:
-    """(samples,) How many times a small error of the initial state may have grown by each sample, at most.
-
-    The largest singular value of the state transition matrix (angles in rad, rates in `rate_units`), from the
-    variational equations of the closed form; infinite once it is past what double precision can hold.
-    """
+    """(samples,) How many times a small error of the initial state may have grown, at most: the largest singular value
+    of the state transition matrix (rad, `rate_units`); infinite once past what double precision can hold."""
     return _largest_growth(scene, _variational_matrices(scene))
 
 
@@ -129,7 +115,6 @@ def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
-    """From one more run for each initial value, perturbed."""
     moving = scene.moving_coordinates
 
     def states(start: Scene) -> Array:
@@ -158,7 +143,6 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
 
 
 def _in_units(scene: Scene, matrices: Array) -> Array:
-    """State transition matrices for angles in rad and rates in `rate_units`."""
     units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
     return np.asarray(matrices * units / units[:, None])
 
@@ -168,26 +152,18 @@ _QUAD_TOLERANCE = 1e-30  # its error, grown 1e10-fold, is still below what a dou
 
 @dataclass(frozen=True)
 class TimedReference:
-    """The reference of a scene at chosen times.
+    """The reference of a scene at chosen times."""
 
-    Attributes
-    ----------
-    trajectory : as far as it got: time, angles, rates, error_growth
-    growth : (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs
-        may be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
-    units : (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
-    """
-
-    trajectory: Trajectory
+    trajectory: Trajectory  # as far as it got: time, angles, rates, error_growth
+    # (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs may
+    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
     growth: Array
-    units: Array
+    units: Array  # (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
 
 
 def reference_at(scene: Scene, times: Array) -> TimedReference:
-    """The reference at `times`, (n,) s, increasing from 0 to the scene's duration; nothing is interpolated.
-
-    In quad precision with heyoka, else by DOP853 at its tightest.
-    """
+    """The reference at `times`, (n,) s, increasing from 0 to the duration, nothing interpolated: in quad precision with
+    heyoka, else by DOP853 at its tightest."""
     run = _in_quad(scene, _QUAD_TOLERANCE, times) if is_available() else _in_doubles(scene, _TIGHTEST, times)
     run.integrate()
     trajectory, matrices = run.observe(), _transition_matrices(scene, times)
@@ -202,3 +178,44 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
         norms = np.linalg.norm(_in_units(scene, matrices[:known]), axis=2)
     growth[np.ix_(range(known), columns)] = np.where(np.isfinite(norms), norms, np.inf)
     return TimedReference(trajectory, growth, units)
+
+
+def motion_at(scene: Scene, times: Array, equations: Accelerations | None = None) -> Trajectory:
+    """The motion at `times`, (n,) s, increasing from 0 up to the duration at most; fewer rows where it ends early. By
+    `equations` in place of the closed form, one of `LEFT_OUT` or of `at_azimuths`, where they are given."""
+    if equations is None and is_available():
+        # Compact: a scene of another structure is compiled anew, and is mostly run a few times.
+        run = Propagation(scene, times=times, tol=2.0**-52, compact_mode=True, high_accuracy=True)
+        run.integrate()
+        return run.observe()
+    solver = OdeSolver(scene, scipy_integrator("DOP853", 1e-12, 1e-14), times, equations)
+    solver.integrate()
+    return solver.observe()
+
+
+def at_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
+    """The closed form with each blade at another angle about the shaft than `Scene.phases`: (blades,) rad."""
+    form = rotor_form(scene, phases=[(Fraction(math.cos(angle)), Fraction(math.sin(angle))) for angle in azimuths])
+    return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, form, *rest)
+
+
+def _sum(*parts: tuple[float, float, float]) -> Accelerations:
+    """The sum of (weight, factor of the rotor's rate, factor of the pitches' rates)."""
+
+    def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
+        total = np.zeros(len(rates))
+        for weight, spin, pitch in parts:
+            parted = [spin * rates[0], *(pitch * rate for rate in rates[1:])]
+            total += weight * np.array(closed_form.accelerations(angles, parted, *rest))
+        return total.tolist()
+
+    return equations
+
+
+# The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with one kind of rate at a
+# time, and with rates reversed, each kind of product is taken out without another text of the equations.
+LEFT_OUT: Mapping[str, Accelerations] = {
+    "Coriolis terms (products of rotor rate and pitch rate)": _sum((1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)),
+    "centrifugal terms (square of the rotor rate)": _sum((1.0, 1, 1), (-0.5, 1, 0), (-0.5, -1, 0), (1.0, 0, 0)),
+    "terms with products of rates": _sum((0.5, 1, 1), (-0.5, -1, -1), (1.0, 0, 0)),
+}

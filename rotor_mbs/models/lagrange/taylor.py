@@ -12,7 +12,7 @@ import numpy as np
 
 from rotor_mbs.methods import time_limit as deadline
 from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.models.equation_items import equation_items
+from rotor_mbs.models.equations import equation_items
 from rotor_mbs.models.lagrange import closed_form, hamilton, samples
 from rotor_mbs.models.lagrange.closed_form import LoadValues, load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
@@ -33,23 +33,9 @@ _UNROLLED_BLADES = 4
 
 
 def build_system(scene: Scene, *, in_momenta: bool = False) -> tuple[list[tuple[Any, Any]], Parameters]:
-    """The closed form of the scene in heyoka's symbols.
-
-    Parameters
-    ----------
-    in_momenta : in Hamilton's variables: momenta in place of rates
-
-    Returns
-    -------
-    equations : first-order, [(symbol, right-hand side)], of angles, rates, and the work where it is not known in closed
-        form
-    parameters : their numbers, of which the last are offset and slope of each of `changing_loads`
-
-    Raises
-    ------
-    MethodRefusal
-        Where heyoka is not installed.
-    """
+    """First-order equations [(symbol, right-hand side)] in heyoka's symbols, of angles, rates (or momenta), and the
+    work where it is integrated; and their parameters, the last of which are offset and slope of each of
+    `changing_loads`. Raises MethodRefusal where heyoka is not installed."""
     engine = heyoka()
     parameters = Parameters()
     form, loads = equation_numbers(scene, parameters)
@@ -106,24 +92,10 @@ def is_compact(scene: Scene) -> bool:
 
 
 class Propagation:
-    """The equations of a scene under heyoka's Taylor method; see `rotor_mbs.methods.base.Solver`.
-
-    Parameters
-    ----------
-    quad : in quad precision; the scene's doubles are taken as exact
-    variational : with the state transition matrix (without the work) as further variables, row by row
-    times : (n,) s, of the samples, increasing from 0 up to the duration; the scene's where it is left out
-    options : of the engine's integrator
-
-    Attributes
-    ----------
-    states : (n, variables) at the samples of the last run, cut before the first row that is not finite
-
-    Raises
-    ------
-    MethodRefusal
-        Where heyoka is not installed.
-    """
+    """The equations of a scene under heyoka's Taylor method, in quad precision or doubles, with the state transition
+    matrix row by row where `variational`; times: (n,) s of the samples where not the scene's; options: of the engine.
+    `states` has the rows of the last run before the first that is not finite. Raises MethodRefusal where heyoka is not
+    installed."""
 
     def __init__(
         self,

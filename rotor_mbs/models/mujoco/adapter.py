@@ -30,33 +30,21 @@ _PORTION = 10_000
 
 @dataclass
 class Poses:
-    """Every body and site at n states, world frame; world body left out.
+    """Every body and site at n states, world frame; world body left out."""
 
-    Attributes
-    ----------
-    centre : (n, bodies, 3) m, centres of mass
-    velocity : (n, bodies, 3) m/s, of the centres of mass
-    spin : (n, bodies, 3) rad/s, along the principal axes
-    site : (n, sites, 3) m
-    acceleration : (n, coordinates) rad/s²
-    frame : (n, bodies, 3, 3) body's frame to world frame
-    wrench : (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
-    """
-
-    centre: Array
-    velocity: Array
-    spin: Array
-    site: Array
-    acceleration: Array
-    frame: Array
+    centre: Array  # (n, bodies, 3) m, centres of mass
+    velocity: Array  # (n, bodies, 3) m/s, of the centres of mass
+    spin: Array  # (n, bodies, 3) rad/s, along the principal axes
+    site: Array  # (n, sites, 3) m
+    acceleration: Array  # (n, coordinates) rad/s²
+    frame: Array  # (n, bodies, 3, 3) body's frame to world frame
+    # (n, bodies, 6) N m and N, world frame: moment about its origin and force of a body's parent on the body
     wrench: Array
 
 
 class Engine:
-    """A compiled model and its state. Masses and moments of `least` (kg, kg m²) or less are set to zero once compiled.
-
-    Raises MethodRefusal, with MuJoCo's reason, where it does not take the model.
-    """
+    """A compiled model and its state; masses and moments of `least` or less are then set to zero. Raises MethodRefusal,
+    with MuJoCo's reason, where it does not take the model."""
 
     def __init__(self, mjcf: str, least: float) -> None:
         try:
@@ -75,17 +63,8 @@ class Engine:
         self._data.qpos[:], self._data.qvel[:] = angles, rates
 
     def advance(self, step: float, steps: int, loads: Sequence[float], slopes: Sequence[float]) -> tuple[int, str]:
-        """Take `steps` equal steps of `step` s.
-
-        Parameters
-        ----------
-        loads, slopes : by actuator, activation (N m or rad) at the start and its slope per s
-
-        Returns
-        -------
-        taken, message
-            The steps taken, and why it ended before all were: the time limit, or a state that is not finite; else "".
-        """
+        """Takes equal steps of `step` s, each actuator's activation (N m or rad) at the start and its slope per s
+        given; the steps taken, and why it ended before all were: time limit, a state that is not finite, ""."""
         model, data = self._model, self._data
         model.opt.timestep = step
         if loads:
@@ -106,7 +85,6 @@ class Engine:
 
     @property
     def state(self) -> tuple[Array, Array]:
-        """(coordinates,) rad and rad/s."""
         return self._data.qpos, self._data.qvel
 
     def poses(self, angles: Array, rates: Array, loads: Array) -> Poses:
@@ -115,7 +93,6 @@ class Engine:
         return Poses(*map(np.array, zip(*rows, strict=True)))
 
     def _pose(self, angles: Array, rates: Array, loads: Array) -> tuple[Array, ...]:
-        """The fields of `Poses`, of one state."""
         model, data = self._model, self._data
         data.qpos[:], data.qvel[:], data.act[:] = angles, rates, loads
         _engine.mj_forward(model, data)

@@ -8,8 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial
-from rotor_mbs.methods.ladders import step_ladder
+from rotor_mbs.methods.base import BuiltItem, Method, Solver, late, stability_polynomial, step_ladder
 from rotor_mbs.methods.settings import Settings, step
 
 if TYPE_CHECKING:
@@ -21,8 +20,6 @@ _MAX_STEPS = 1e10
 
 @dataclass(frozen=True)
 class Rk4Settings(Settings):
-    """Classical Runge-Kutta, order 4."""
-
     step: float = step(2.5e-4)
 
 

@@ -9,13 +9,10 @@ slope in N m/s. So a torque that is linear in time enters every stage of a step 
 angle is its `springref` where it is constant; where it changes, it is the activation (rad) of an actuator whose gain is
 the spring's stiffness.
 
-Least inertia
--------------
-MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less. In this text a point
-mass, and a hub without inertia, therefore have `LEAST` = 2e-15 kg or kg m². `adapter.Engine` sets these values to zero
-in the compiled model, where they are allowed, so this package's runs have no such error. A file that MuJoCo itself
-loads keeps them: relative to the moment J of a blade about its pitch axis that is LEAST / J, 2e-17 and below
-round-off for the paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
+MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less: in this text a point mass,
+and a hub without inertia, have `LEAST`. `adapter.Engine` sets them to zero in the compiled model. A file that MuJoCo
+itself loads keeps them, an error of LEAST / J for a blade's moment J about its pitch axis: below round-off for the
+paper's blade (J = 110 kg m²), but 1e-5 for a toy of 1 g with J = 2.5e-10 kg m².
 """
 
 from __future__ import annotations
@@ -39,16 +36,11 @@ _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco
 
 @dataclass(frozen=True)
 class Load:
-    """A moment `gain` times a table over time, on a coordinate (0 = rotor).
-
-    Attributes
-    ----------
-    gain : 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
-    """
+    """A moment `gain` times a table over time, on a coordinate (0 = rotor)."""
 
     name: str
     coordinate: int
-    gain: float
+    gain: float  # 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time
     table: Table
 
 
@@ -70,7 +62,6 @@ def load_segments(scene: Scene) -> tuple[Segment, ...]:
 
 
 def joint_name(coordinate: int) -> str:
-    """Name of the hinge of a coordinate: "rotor", or "pitch i"."""
     return f"pitch {coordinate}" if coordinate else "rotor"
 
 
@@ -105,13 +96,11 @@ def model(scene: Scene, integrator: str, step: float) -> ET.Element:
 
 
 def text(root: ET.Element) -> str:
-    """The model as XML text, indented."""
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def items(scene: Scene) -> list[BuiltItem]:
-    """What is built for the scene, in order."""
     kinds = {"body": "object", "joint": "node", "site": "marker", "general": "load"}
     built = []
     for element in model(scene, "rk4", 1.0).iter():
@@ -127,7 +116,10 @@ def items(scene: Scene) -> list[BuiltItem]:
 def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     blade, phase = scene.blades[number - 1], scene.phases[number - 1]
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
-    body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(*_quaternion(phase, pitch)))
+    # The quaternion of Ry(phase) Rz(pitch), scalar part first.
+    c, s = math.cos(0.5 * phase), math.sin(0.5 * phase)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    body = ET.SubElement(hub, "body", name=f"blade {number}", quat=numbers(c * cp, s * sp, s * cp, c * sp))
     if blade.has_pitch_inertia:
         stiffness, damping = scene.bearing(number - 1)
         _joint(body, number, "0 0 1", stiffness, damping, constant_value(scene.pitch_load(number - 1)[1]))
@@ -146,13 +138,6 @@ def _joint(body: ET.Element, coordinate: int, axis: str, stiffness: float, dampi
         joint.set("damping", numbers(damping))
 
 
-def _quaternion(about_shaft: float, pitch: float) -> tuple[float, float, float, float]:
-    """The quaternion of Ry(about_shaft) Rz(pitch), angles in rad; scalar part first."""
-    c, s = math.cos(0.5 * about_shaft), math.sin(0.5 * about_shaft)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    return c * cp, s * sp, s * cp, c * sp
-
-
 def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: Sequence[float]) -> None:
     """Mass and principal moments; inertia: xx yy zz xy xz yz about the centre of mass, kg m²."""
     element = ET.SubElement(body, "inertial", pos=numbers(*centre), mass=numbers(max(mass, LEAST)))
@@ -166,27 +151,20 @@ def _inertial(body: ET.Element, mass: float, centre: Iterable[float], inertia: S
 
 
 def _possible(moments: list[float]) -> list[float]:
-    """Three principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others.
-
-    A scene's inertia may break the triangle inequality by the rounding of its digits (1e-9, see `scenario.scene`).
-    """
+    """Principal moments that MuJoCo takes: none below `LEAST`, none above the sum of the others by rounding."""
     least = [max(moment, LEAST) for moment in moments]
     total = sum(least)
     return [min(moment, total - moment) for moment in least]
 
 
 def numbers(*values: float) -> str:
-    """Numbers with all their digits."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def mjcf_file(scene: Scene) -> str:
-    """The MJCF text of a scene, for plain MuJoCo: with its initial state, its loads and something to look at.
-
-    Its time step is a whole part of the sample interval. The keyframe "start" has the initial state and the loads at
-    t = 0. A numeric "segment i" has the time in s from which loads follow it, then each actuator's torque in N m (or
-    rest angle in rad), then each one's slope per s.
-    """
+    """The MJCF text of a scene for plain MuJoCo, with a step that is a whole part of the sample interval, initial state
+    and loads at t = 0 in the keyframe "start", a numeric "segment i" (time, torques or rest angles, slopes), and
+    capsules to look at."""
     spacing = scene.duration / (scene.samples - 1)
     steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
     root, has_loads = model(scene, "rk4", spacing / steps), bool(loads_of(scene))

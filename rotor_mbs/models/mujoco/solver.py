@@ -15,14 +15,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, Segment, intervals, is_constant, steps_and_rows, values_at
 from rotor_mbs.solution.linearization import Linearization, limit_at_zero, scene_at
 from rotor_mbs.solution.quantities import named_loads
-from rotor_mbs.solution.trajectory import (
-    Array,
-    Integration,
-    Trajectory,
-    all_coordinates,
-    finite_samples,
-    sample_times,
-)
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates, finite_samples, sample_times
 
 # rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the step's square.
 _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)
@@ -42,18 +35,8 @@ class _Row(NamedTuple):
 
 
 class MujocoSolver:
-    """See `rotor_mbs.methods.base.Solver`.
-
-    Parameters
-    ----------
-    integrator : a key of `mjcf.INTEGRATORS`
-    step : s, the largest time step
-
-    Raises
-    ------
-    MethodRefusal
-        With the engine's reason, where the engine does not take the model.
-    """
+    """See `methods.base.Solver`; integrator: a key of `mjcf.INTEGRATORS`, step: s, the largest. Raises MethodRefusal,
+    with the engine's reason, where the engine does not take the model."""
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
@@ -64,7 +47,6 @@ class MujocoSolver:
         self.engine = Engine(mjcf.text(mjcf.model(scene, integrator, step)), mjcf.LEAST)
 
     def integrate(self) -> Integration:
-        """From the initial state, every time; bit for bit the same."""
         scene, self._rows = self._scene, []
         self.engine.start(
             *([values[i] for i in self._moving] for values in (scene.initial_angles, scene.initial_rates))
@@ -102,7 +84,6 @@ class MujocoSolver:
         self._rows.append(_Row(time, angles.copy(), rates.copy(), segment, is_sample))
 
     def observe(self) -> Trajectory:
-        """Samples of the last integration, cut before the first that is not finite."""
         scene, rows = self._scene, self._rows
         angles, rates = (np.array([getattr(row, name) for row in rows]) for name in ("angles", "rates"))
         at = [i for i, row in enumerate(rows) if row.is_sample]
@@ -137,11 +118,8 @@ class MujocoSolver:
         return named_loads(zip(*roots, strict=True), force[:, 0], shaft_moment, actuators)
 
     def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
-        """(n,) J of the actuators, less what the dampers took; from rows of rad, rad/s, rad/s², (n, loads) N m or rad.
-
-        Constant loads: torque times angle. Otherwise the power is integrated from row to row by the trapezoidal rule
-        with its end correction, ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here.
-        """
+        """(n,) J of the actuators, less what the dampers took. Constant loads: torque times angle. Else from row to row
+        ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best integrator here."""
         loads = mjcf.loads_of(self._scene)
         columns = [self._moving.index(load.coordinate) for load in loads]
         gains = np.array([load.gain for load in loads])
@@ -160,8 +138,8 @@ class MujocoSolver:
 
 
 def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
-    """J at the first n samples, from (n, 1 + blades) rad: (n,) energy of the bearing springs, and (n,) the work
-    -∫ k (θ - r) dr of rest angles that change, less the ∫ k r dθ that actuators did."""
+    """(n,) J at the first n samples: energy of the springs, and the work -∫ k (θ - r) dr of rest angles that change,
+    less the ∫ k r dθ that actuators did."""
     energy, work = np.zeros((2, len(angles)))
     for number in scene.moving_coordinates[1:]:
         stiffness, table = scene.bearing(number - 1)[0], scene.pitch_load(number - 1)[1]
@@ -175,10 +153,7 @@ def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
 
 def linearize(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Linearization:
-    """About `angles` (1 + blades,) rad, the rotor turning at `speed` rad/s under `torque` N m.
-
-    Raises MethodRefusal, with the engine's reason, where the engine does not take the scene.
-    """
+    """About `angles` (1 + blades,) rad, the rotor turning at `speed` rad/s under `torque` N m. Raises MethodRefusal."""
     state = scene_at(scene, angles, speed, torque)
     columns = state.moving_coordinates
     engine = Engine(mjcf.text(mjcf.model(state, "rk4", 1e-3)), mjcf.LEAST)

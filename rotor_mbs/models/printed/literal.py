@@ -120,22 +120,16 @@ def gravity_three(
 
 
 def rotor_gravity(m: Any, c: Any, g: Any, s2: Any, c2: Any, c3: Any, c4: Any, c5: Any, root3: Any = ROOT3) -> Any:
-    """First row of (56) as it is run, N m: its factor c m g multiplied into the three terms.
-
-    Equal to the printed form but for rounding, which decides Fig. 5: it starts at rest in an unstable equilibrium of
-    these equations, so that its motion is amplified rounding error. There the printed bracket is exactly zero, and
-    nothing moves; the three terms leave -4.2e-13 N m, with which the three published numbers come out for T = 12 s.
-    Other ways of writing the row: reference/claims.json.
-    """
+    """First row of (56) as it is run, N m: its factor c m g multiplied into the three terms. Rounding decides Fig. 5,
+    which starts at rest in an unstable equilibrium: the printed bracket is exactly zero there, and nothing moves; the
+    three terms leave -4.2e-13 N m, with which the published numbers come out for T = 12 s. Other ways:
+    reference/claims.json."""
     second, third = c2 / 2 + root3 / 2 * s2, c2 / 2 - root3 / 2 * s2
     return -c * m * g * c2 * c3 + c * m * g * second * c4 + c * m * g * third * c5
 
 
 def fixed_pitch_acceleration(m: float, d: float, g: float, torque: float, q2: float, phases: Sequence[float]) -> float:
-    """q̈2 in rad/s² where c = 0: a pitch has no inertia, (47) is zero, and the first row of (33) is a pendulum's.
-
-    Summed over the blades at the given phases (rad).
-    """
+    """q̈2 in rad/s² where c = 0: (47) is zero, and the first row of (33) is a pendulum's, summed over the blades."""
     inertia = moment = 0.0
     for phase in phases:
         s2, c2 = math.sin(q2 + phase), math.cos(q2 + phase)
@@ -164,10 +158,8 @@ def one_blade_accelerations(
 def three_blade_accelerations(
     m: float, c: float, d: float, g: float, torques: Sequence[float], state: Sequence[float]
 ) -> tuple[float, float, float, float]:
-    """(39)-(56) solved for q̈2..q̈5 in rad/s²; torques (4,): τ2..τ5 in N m; state (8,): q2..q5, q̇2..q̇5.
-
-    By (39)-(41) each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one by one.
-    """
+    """(39)-(56) solved for q̈2..q̈5 in rad/s²; torques (4,): τ2..τ5 in N m; state (8,): q2..q5, q̇2..q̇5. By (39)-(41)
+    each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one by one."""
     q2, q3, q4, q5, v2, v3, v4, v5 = state
     s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
     s4, c4, s5, c5 = math.sin(q4), math.cos(q4), math.sin(q5), math.cos(q5)

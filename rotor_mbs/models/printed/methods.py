@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Method
-from rotor_mbs.models.equation_items import equation_items
-from rotor_mbs.models.ode45_settings import Ode45Settings
+from rotor_mbs.models.equations import Ode45Settings, equation_items
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor
 from rotor_mbs.models.printed.matrices import Errata
@@ -20,7 +19,7 @@ if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.models.printed.observables import PointMassRotor
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.scenario.time_table import Table
-    from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+    from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 # (torques in N m, angles and rates) -> accelerations; all of the coordinates that move.
 Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
@@ -59,13 +58,18 @@ class PrintedSolver:
         import numpy as np
 
         from rotor_mbs.models.printed.observables import torque_work
-        from rotor_mbs.solution.trajectory import Trajectory, sample_times
+        from rotor_mbs.solution.trajectory import Trajectory, all_coordinates, sample_times
 
         scene, rotor, result = self._scene, self._rotor, self._result
         time = sample_times(scene)
         time = time[time <= result.time[-1]]
-        angles, rates = self._coordinates(result.at(time))
-        trajectory = Trajectory(time, angles, rates, **self._refined(result))
+        states = result.at(time)
+        angles, rates = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
+        trajectory = Trajectory(time, angles, rates)
+        if self._keeps_refined:  # ode45's own output points: the paper's numbers are read off at them
+            trajectory.refined_time, states = result.refined()
+            refined = all_coordinates(scene, states[:, : self._moving], states[:, self._moving :])
+            trajectory.refined_angles, trajectory.refined_rates = refined
         if scene.wants("tip"):
             trajectory.tip = rotor.tip_path(angles)
         if scene.wants("energy"):
@@ -78,31 +82,11 @@ class PrintedSolver:
         if scene.wants("loads"):
             before = np.nextafter(time, 0.0)  # where a torque jumps, the value before it
             torque = np.array([scene.torque_at(t) for t in before.tolist()])
-            accelerations = self._accelerations(before, result.at(time))
+            accelerations = np.zeros((len(time), len(scene.initial_angles)))  # zero of a fixed pitch
+            for k, (t, state) in enumerate(zip(before.tolist(), result.at(time).tolist(), strict=True)):
+                accelerations[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
             trajectory.quantities |= rotor.loads(angles, rates, accelerations, torque)
         return trajectory
-
-    def _accelerations(self, time: Array, states: Array) -> Array:
-        """(n, 1 + blades) rad/s² by the equations that are run; zero of a fixed pitch."""
-        import numpy as np
-
-        accelerations = np.zeros((len(time), len(self._scene.initial_angles)))
-        for k, (t, state) in enumerate(zip(time.tolist(), states.tolist(), strict=True)):
-            accelerations[k, : self._moving] = self._right_hand_side(t, state)[self._moving :]
-        return accelerations
-
-    def _refined(self, result: Ode45Result) -> dict[str, Array]:
-        """ode45's own output points, of the equations as printed alone: the paper's numbers are read off at them."""
-        if not self._keeps_refined:
-            return {}
-        time, states = result.refined()
-        angles, rates = self._coordinates(states)
-        return {"refined_time": time, "refined_angles": angles, "refined_rates": rates}
-
-    def _coordinates(self, states: Array) -> tuple[Array, Array]:
-        from rotor_mbs.solution.trajectory import all_coordinates
-
-        return all_coordinates(self._scene, states[:, : self._moving], states[:, self._moving :])
 
 
 class PrintedModel:
@@ -115,16 +99,14 @@ class PrintedModel:
     def items(self, scene: Scene) -> list[BuiltItem]:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""
         self._rotor(scene)
-        return equation_items(scene, self._sources(len(scene.blades)))
-
-    def _sources(self, blades: int) -> tuple[str, str]:
-        """Where in the paper the rotor's row and a pitch's stand, in the form that is run."""
+        # Where in the paper the rotor's row and a pitch's stand, in the form that is run.
         if self._errata:
             left = " ".join(name.upper() for name, is_left in asdict(self._errata).items() if is_left)
-            return (f"(24)-(38) derived anew, {left} left in",) * 2
-        if blades == 1:
-            return "(33), rotor row", "(33), pitch row"
-        return "(42)-(45), (52), (56) with its factor multiplied in", "(46)-(51), (53)-(56)"
+            return equation_items(scene, (f"(24)-(38) derived anew, {left} left in",) * 2)
+        if len(scene.blades) == 1:
+            return equation_items(scene, ("(33), rotor row", "(33), pitch row"))
+        rows = "(42)-(45), (52), (56) with its factor multiplied in", "(46)-(51), (53)-(56)"
+        return equation_items(scene, rows)
 
     def build(self, scene: Scene, settings: Ode45Settings) -> PrintedSolver:
         """Raises MethodRefusal where the printed equations cannot represent the scene."""

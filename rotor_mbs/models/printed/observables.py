@@ -1,9 +1,6 @@
-"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3).
-
-Energies and loads are the physical ones, with the velocities and accelerations that (3) implies, whatever equations
-made the motion. The sum of the energies less the work of the torque tells how much energy those equations make; the
-moments about the pitch axes and the shaft, which nothing transmits there, how large their fictitious moments are.
-"""
+"""Tip path, energies, work and loads of the printed model's motion, from the paper's matrix (3). Energies and loads are
+the physical ones, whatever equations made the motion: they tell how much energy those equations make, and how large
+their fictitious moments are."""
 
 from __future__ import annotations
 
@@ -25,17 +22,14 @@ _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 @dataclass(frozen=True, slots=True)
 class PointMassRotor:
-    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²).
-
-    phases   (blades,) rad
-    tip      (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame
-    """
+    """The printed symbols of a scene: blades alike, each a mass m (kg) at (c, 0, d) (m); gravity g (m/s²)."""
 
     m: float
     c: float
     d: float
     g: float
-    phases: tuple[float, ...]
+    phases: tuple[float, ...]  # (blades,) rad
+    # (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade frame
     tip: tuple[float, float, float]
 
     @property
@@ -110,11 +104,9 @@ class PointMassRotor:
 
 
 def torque_work(table: Table, run: Ode45Result, column: int, times: Array) -> Array:
-    """(n,) J done up to each of `times` (s) by a torque over time (N m) on the coordinate whose angle is this `column`.
-
-    Where τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the interpolant, a quartic in each
-    step. No column of rates enters: the work is that of the angles that are reported.
-    """
+    """(n,) J done up to each of `times` (s) by a torque over time (N m) on the coordinate in `column`, from angles
+    alone. Where τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the interpolant, a quartic in
+    each step."""
     parts = segments([table], float(times[-1])) if len(times) > 1 else ()
     grids = [np.unique([part.start, *_inside(run.time, part), *_inside(times, part), part.end]) for part in parts]
     done = [np.zeros(1)]

@@ -1,13 +1,21 @@
-"""What the models that are equations list as built for a scene: the printed ones and the closed form."""
+"""What the models that are equations share: the items of a scene, and the settings of ode45. Needs no NumPy."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rotor_mbs.methods.base import BuiltItem
+from rotor_mbs.methods.settings import Settings, number
 
 if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
+
+
+@dataclass(frozen=True)
+class Ode45Settings(Settings):
+    relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
+    absolute_tolerance: float = number(1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s")
 
 
 def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[BuiltItem]:

@@ -1,0 +1,282 @@
+"""Runs into a results file: what is stored stays, what was lost is tried again, and nothing but what was asked for."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from support.commands import rotor_mbs
+from support.references import reference
+from support.scenes import paper
+
+import rotor_mbs as rm
+from rotor_mbs.errors import StoreError
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.runs.pool import SerialPool
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.results import TableFile
+from rotor_mbs.runs.table import Rows
+from rotor_mbs.runs.versions import code_digest, row_versions
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.studies.run import Outcome, RunReport, RunTask, perform_run, run_scenes
+
+SCENE = paper("fig08")
+METHODS = ("lagrange/dop853", "exudyn_tree/rk67", "lagrange/ode45")
+REFERENCE, FIRST = f"{SCENE.name}/reference", f"{SCENE.name}/{METHODS[0]}"
+
+
+def blank(task: RunTask) -> Rows:
+    """A row without samples in place of a run."""
+    return task.failed("ok", task.asked.method)
+
+
+def run(path: Path, methods: Sequence[str] = METHODS, **options: object) -> RunReport:
+    given = {"workers": 0, "timeout_s": 60.0, "perform": blank, **options}
+    return run_scenes([SCENE], {SCENE.name: methods}, path, **given)  # type: ignore[arg-type]
+
+
+def made(report: RunReport) -> list[str]:
+    return [outcome.method for outcome in report.made if outcome.is_stored]
+
+
+def stored(path: Path) -> list[str]:
+    file = TableFile(path)
+    return [label for label in file.tables["runs"].runs.tolist() if file.place(label).is_stored]
+
+
+def flip(path: Path, label: str, column: str) -> None:
+    """Changes the last bit of the first byte of a row's column."""
+    offset = TableFile(path).place(label).offsets[column]
+    with path.open("r+b") as file:
+        file.seek(offset)
+        byte = file.read(1)[0]
+        file.seek(offset)
+        file.write(bytes([byte ^ 1]))
+
+
+# What a file has
+
+
+def test_a_run_comes_back_bit_for_bit(results: Path) -> None:
+    solved = rm.run("paper/fig11", "exudyn_tree/rk67")
+    read = rm.open(results)["paper/fig11/exudyn_tree/rk67"]
+    assert solved.quantities.keys() == read.quantities.keys()
+    for name, values in {"time": solved.time, **solved.quantities}.items():
+        np.testing.assert_array_equal(read[name], values, err_msg=name)
+    assert (read.status, read.message, read.settings) == (solved.status, solved.message, solved.settings)
+    assert read.metrics == read.metrics | {name: float(value) for name, value in solved.metrics.items()}
+    exact = rm.open(results)["paper/fig11/reference"].trajectory
+    for name, values in reference("paper/fig11").quantities.items():
+        np.testing.assert_array_equal(exact.quantities[name], values, err_msg=name)
+
+
+def test_only_what_was_asked_for_is_stored(tmp_path: Path) -> None:
+    scene = find_scenes(["check/held"])[0].replace(outputs=["tip"])
+    run_scenes([scene], {scene.name: METHODS[:1]}, tmp_path / "r.h5", workers=0, timeout_s=60.0)
+    with open_results(tmp_path / "r.h5") as results:
+        by_dop853, exact = (results.scenes[scene.name].runs[name] for name in (METHODS[0], "reference"))
+        assert set(by_dop853.names) == {"time", "blade", "axis", "coordinate", "tip"}
+        assert {"angles", "rates", "error_growth"} <= set(exact.names)  # which other runs are judged by
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert "kinetic_energy" not in file[scene.name]
+
+
+def test_names_and_units_keep_the_contract(results: Path) -> None:
+    with h5py.File(results) as file:
+        assert file.attrs["format"] == "rotor_mbs"
+        assert file.attrs["format_version"] == 2
+        assert file.attrs["Conventions"].startswith("CF-")
+        scene, runs = file["paper/fig11"], file["runs"]
+        units = {"angles": "rad", "rates": "rad/s", "tip": "m", "kinetic_energy": "J", "work": "J", "time": "s"}
+        assert {name: scene[name].attrs["units"] for name in units} == units
+        assert {"title", "figures", "blades", "scene_toml", "scene_hash"} <= set(scene.attrs)
+        columns = (
+            "scene method_name status message settings samples time_reached time_limit_s steps rhs_evaluations "
+            "setup_time_s run_time_s run_time_min_s repeats angle_error_max energy_drift_max horizon_s rotor_angle_max "
+            "engine_success engine_message versions crc32"
+        )
+        assert set(columns.split()) <= set(runs)
+
+
+@pytest.mark.skipif(shutil.which("h5dump") is None, reason="h5dump is not installed here")
+def test_opens_in_h5dump(results: Path) -> None:
+    dump = subprocess.run(["h5dump", "-H", results], capture_output=True, text=True, check=True).stdout
+    assert 'DATASET "angles"' in dump
+    assert "DIMENSION_LIST" in dump
+
+
+# What a call computes
+
+
+def test_references_come_first_and_what_is_stored_is_skipped(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    first = run(path, METHODS[:2])
+    assert made(first)[0] == "reference"
+    assert sorted(made(first)) == sorted(["reference", *METHODS[:2]])
+    assert first.made[-1].share == 1.0
+    assert made(run(path)) == [METHODS[2]]
+    before = path.read_bytes()
+    again = run(path)
+    assert (again.made, again.kept) == ([], 4)
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["r.h5"]
+
+
+def without_memory(task: RunTask) -> Rows:
+    if task.asked.method == "reference":
+        raise MemoryError("no room")
+    return blank(task)
+
+
+def test_runs_whose_reference_was_not_computed_are_not_computed(tmp_path: Path) -> None:
+    report = run(tmp_path / "r.h5", perform=without_memory)
+    assert [outcome.status for outcome in report.not_computed] == ["worker_died", *["no_reference"] * 3]
+    assert stored(tmp_path / "r.h5") == []
+    assert len(made(run(tmp_path / "r.h5"))) == 4
+
+
+def dying(task: RunTask) -> Rows:
+    if task.asked.method == METHODS[1]:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return blank(task)
+
+
+@pytest.mark.full
+def test_a_worker_that_dies_leaves_nothing_and_the_same_call_tries_again(tmp_path: Path) -> None:
+    report = run(tmp_path / "r.h5", perform=dying, workers=2)
+    (lost,) = report.not_computed
+    assert (lost.method, lost.status) == (METHODS[1], "worker_died")
+    assert lost.message.endswith("and again when it was tried alone")
+    assert f"{SCENE.name}/{METHODS[1]}" not in stored(tmp_path / "r.h5")
+    assert made(run(tmp_path / "r.h5")) == [METHODS[1]]
+
+
+def test_an_interrupted_call_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    def interrupt(done: int, total: int, _outcome: Outcome) -> None:
+        assert total == 4
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path / "r.h5", on_progress=interrupt)
+    kept = stored(tmp_path / "r.h5")
+    assert len(kept) in (2, 3)  # one more may have ended
+    assert len(made(run(tmp_path / "r.h5"))) == 4 - len(kept)
+
+
+class Remote(SerialPool):
+    """Workers that do not see the file: what they return is written by this process."""
+
+    shares_disk = False
+
+
+def test_workers_that_do_not_share_the_disk_store_the_same(tmp_path: Path) -> None:
+    run(tmp_path / "remote.h5", workers=Remote())
+    run(tmp_path / "local.h5")
+    for label in stored(tmp_path / "local.h5"):
+        rows = [TableFile(tmp_path / name).place(label).read() for name in ("remote.h5", "local.h5")]
+        assert all(rows[0][name].tobytes() == rows[1][name].tobytes() for name in rows[0])
+    assert len(stored(tmp_path / "remote.h5")) == 4
+
+
+@pytest.mark.parametrize("column", ["angles", "status", "steps", "crc32"])
+def test_a_damaged_row_is_computed_again_by_the_same_command(tmp_path: Path, column: str) -> None:
+    path = tmp_path / "r.h5"
+    run(path)
+    before = path.read_bytes()
+    flip(path, FIRST, column)
+    assert made(run(path)) == [METHODS[0]]
+    assert path.read_bytes() == before
+
+
+def test_runs_of_a_damaged_reference_are_computed_again_with_it(tmp_path: Path) -> None:
+    run(tmp_path / "r.h5")
+    flip(tmp_path / "r.h5", REFERENCE, "error_growth")
+    assert sorted(made(run(tmp_path / "r.h5"))) == sorted(["reference", *METHODS])
+
+
+def test_a_run_that_a_shorter_limit_ended_is_computed_again(tmp_path: Path) -> None:
+    def slow(task: RunTask) -> Rows:
+        return task.failed("timed_out", "too slow") if task.asked.method == METHODS[0] else blank(task)
+
+    run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
+    again = run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
+    assert made(again) == []
+    assert again.stored_failures == [f"{SCENE.name} {METHODS[0]} timed_out: too slow"]
+    assert made(run(tmp_path / "r.h5", timeout_s=4.0)) == []
+    assert made(run(tmp_path / "r.h5", timeout_s=6.0)) == [METHODS[0]]
+
+
+def test_an_error_of_a_method_is_a_run_that_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def build(*_: object) -> object:
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setitem(find_method(METHODS[0]).__dict__, "build", build)
+    (failure,) = run(tmp_path / "r.h5", METHODS[:1], perform=perform_run).failures
+    assert (failure.status, failure.message) == ("solver_failed", "ZeroDivisionError: by nothing")
+    assert stored(tmp_path / "r.h5") == [REFERENCE, FIRST]
+
+
+# Versions
+
+
+def test_a_row_says_what_computed_it(results: Path) -> None:
+    with open_results(results) as file:
+        versions = json.loads(file.scenes["paper/fig11"].runs["exudyn_tree/rk67"].known["versions"])
+    assert versions == row_versions(find_method("exudyn_tree/rk67"))
+    assert {"rotor_mbs", "python", "numpy", "exudyn", "code"} <= set(versions)
+    assert "heyoka" not in versions  # which this method does not use
+
+
+@pytest.mark.parametrize(
+    ("text", "is_other"),
+    [
+        ("STEP = 0.2\n", True),
+        ('"""What it is."""\nSTEP = 0.1  # s\n', False),
+        ('"""What it is.\n\nAnd more."""\n\n\nSTEP = 0.1\n', False),
+        ('STEP = 0.1\nNAME = "# no comment"\n', True),
+    ],
+)
+def test_a_plug_in_whose_code_is_corrected_is_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, is_other: bool
+) -> None:
+    """Under the same version; a comment or a docstring changes nothing."""
+    source = tmp_path / "plug_in.py"
+    source.write_text("STEP = 0.1\n")
+    monkeypatch.setitem(find_method(METHODS[0]).__dict__, "sources", (source,))
+    code_digest.cache_clear()
+    run(tmp_path / "r.h5")
+    source.write_text(text)
+    code_digest.cache_clear()
+    assert made(run(tmp_path / "r.h5")) == [METHODS[0]] * is_other
+
+
+# A disk that is full
+
+
+def test_a_full_disk_is_one_line_and_what_was_stored_stays(tmp_path: Path) -> None:
+    """A limit on the size of files stops one from growing, as a full disk does."""
+    path = tmp_path / "r.h5"
+    run(path, METHODS[:1])
+    before = path.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before), limits[1]))
+    try:
+        with pytest.raises(StoreError, match="cannot be written: File too large"):
+            run(path)
+        ended = rotor_mbs("run", "paper/fig08", "-m", METHODS[0], "-m", METHODS[1], "-o", path, "-j", "1")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert ended.status != 0
+    assert ended.err.count("\n") == 1
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["r.h5"]
