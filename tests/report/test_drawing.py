@@ -14,6 +14,7 @@ from support.stored import rotor
 
 from rotor_mbs.analysis.campbell import FloquetTable, SceneModes
 from rotor_mbs.methods.catalogue import ladders, method_names
+from rotor_mbs.report import plots as figures
 from rotor_mbs.report.core import canvas, numbers, svg
 from rotor_mbs.report.core.canvas import panels
 from rotor_mbs.report.core.elements import MARKS
@@ -21,8 +22,7 @@ from rotor_mbs.report.core.looks import COLOURS, GREY, PALETTE, Look, class_of, 
 from rotor_mbs.report.mode_study import ModePlots
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.index import energy_of_scenes
-from rotor_mbs.report.pages.scene import Mark
-from rotor_mbs.report.plots import time_histories as figures
+from rotor_mbs.report.plots import Series, paths, projected
 
 LOOK = Look("#0072b2", "-", "o")
 PRINTED, CORRECTED = look_of("printed/ode45"), look_of("lagrange/taylor")
@@ -127,7 +127,7 @@ def test_the_view_keeps_what_lies_across_it_and_drops_what_lies_along_it() -> No
 
 def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
     series = [Series(TIME, 2.7 * np.sin(0.2 * TIME), PRINTED), Series(TIME, 0.3 * TIME, CORRECTED)]
-    mark = Mark(0, 2.7315, "published 2.7315 rad")
+    mark = (0, 2.7315, "published 2.7315 rad")
     (axes,) = scene_page.departure([("rotor angle (rad)", series)], [mark], 6.0, 1.5).axes
     assert [line.get_ydata()[0] for line in axes.get_lines() if line.get_linestyle() == ":"] == [2.7315]
     assert [text.get_text().strip() for text in axes.texts] == ["published 2.7315 rad", "0.05 rad apart at 1.5 s"]
@@ -243,7 +243,7 @@ def test_powers_of_ten_are_labelled_within_the_axes_alone() -> None:
     picture.axes[0].plot([0.0, 1.0], [1e-16, 1e-13])
     canvas.log_axis(picture.axes[0], 1e-16, 1e-13)
     for shown, labels in (
-        (ModePlots(SceneModes("s", "", 1, 9.8, floquet=table)).multipliers(), ["10⁻²", "10⁻¹", "10⁰"]),
+        (ModePlots(SceneModes("s", "t", 1, 9.8, floquet=table)).multipliers(), ["10⁻²", "10⁻¹", "10⁰"]),
         (picture, ["10⁻¹⁶", "10⁻¹⁵", "10⁻¹⁴", "10⁻¹³"]),
     ):
         text = str(svg.picture(shown, "n", "t").svg)
