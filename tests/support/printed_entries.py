@@ -12,7 +12,7 @@ import csv
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -314,7 +314,7 @@ def write_table(path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(CheckedEntry._fields)
-        writer.writerows(astuple(entry) for entry in check_errata())
+        writer.writerows(check_errata())
 
 
 if __name__ == "__main__":
