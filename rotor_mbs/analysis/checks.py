@@ -276,11 +276,8 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
                 yield _of(stored, "reference", name, off, bounds, "rad, rad/s", hint)
         for name, check_name in (("error_growth", "growth"), ("angle_uncertainty", "uncertainty")):
             if name in shipped:
-                first, second, off = (
-                    shipped.array(name),
-                    stored.array(name) if name in stored else np.empty(0),
-                    math.nan,
-                )
+                first, off = shipped.array(name), math.nan
+                second = stored.array(name) if name in stored else np.empty(0)
                 if first.shape == second.shape and second.dtype.kind == "f":
                     used = np.isfinite(first) & (first > 0.0)  # the ratio, as far as both are positive and finite
                     off = float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))

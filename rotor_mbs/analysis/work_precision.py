@@ -120,7 +120,7 @@ def own_points(scene: StoredScene) -> list[Record]:
 
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:
     """The curves of each scene, in order."""
-    found: dict[str, list[Record]] = {}
+    curves_by_scene: dict[str, list[Record]] = {}
     for curve in curves:
-        found.setdefault(curve.scene, []).append(curve)
-    return found
+        curves_by_scene.setdefault(curve.scene, []).append(curve)
+    return curves_by_scene
