@@ -19,8 +19,8 @@ from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.sweeps import AMPLIFICATION, METRICS
 from rotor_mbs.runs.table import Rows, blank_rows, characters
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.sweep import Variants
 from rotor_mbs.scenario.toml_file import TableError
-from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities

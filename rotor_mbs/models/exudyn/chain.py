@@ -16,8 +16,6 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
 
-NODES = ("euler_parameters", "rotation_vector")
-
 
 @dataclass(frozen=True)
 class Placed:
@@ -50,8 +48,8 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     return bodies
 
 
-def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
-    """Everything the engine has of this scene, in the order it is built; `node` is one of NODES."""
+def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Part]:
+    """Everything the engine has of this scene, in the order it is built; `node` as in the settings."""
     hub, *blades = placed_bodies(scene)
     built = [Part("object", "ground", "ObjectGround")]
     for placed in (hub, *blades):
