@@ -20,8 +20,9 @@ from support.sweeps import command, run_local, stored_runs, wait_for_runs, worke
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.pool import SerialPool
+from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING, Rows, stored_tables
+from rotor_mbs.runs.table import MISSING, Rows
 from rotor_mbs.runs.versions import code_digest
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep, sweep_of
@@ -135,7 +136,7 @@ def test_runs_of_other_versions_are_kept_and_counted(tmp_path: Path, monkeypatch
     assert output.read_bytes() != before  # the code of each row
     monkeypatch.undo()
     code_digest.cache_clear()
-    stored_tables(output)[""].place().mark_missing([3])
+    TableFile(output).table("").place().mark_missing([3])
     result = run_local(sweep, output, 0)
     assert (result.made, result.older) == (1, 7)
 
