@@ -8,12 +8,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 from matplotlib.lines import Line2D
-from rotor_mbs.report.plots.paths import paths, projected
-from rotor_mbs.report.plots.time_histories import Series
 from support.stored import rotor
 
 from rotor_mbs.analysis.campbell import FloquetTable, SceneModes
 from rotor_mbs.methods.catalogue import ladders, method_names
+from rotor_mbs.report import plots as figures
 from rotor_mbs.report.core import canvas, numbers, svg
 from rotor_mbs.report.core.canvas import panels
 from rotor_mbs.report.core.elements import MARKS
@@ -22,7 +21,7 @@ from rotor_mbs.report.mode_study import ModePlots
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.index import energy_of_scenes
 from rotor_mbs.report.pages.scene import Mark
-from rotor_mbs.report.plots import time_histories as figures
+from rotor_mbs.report.plots import Series, paths, projected
 
 LOOK = Look("#0072b2", "-", "o")
 PRINTED, CORRECTED = look_of("printed/ode45"), look_of("lagrange/taylor")
