@@ -20,7 +20,6 @@ from rotor_mbs.report.core.looks import COLOURS, GREY, PALETTE, Look, class_of, 
 from rotor_mbs.report.mode_study import ModePlots
 from rotor_mbs.report.pages import scene as scene_page
 from rotor_mbs.report.pages.index import energy_of_scenes
-from rotor_mbs.report.pages.scene import Mark
 from rotor_mbs.report.plots import Series, paths, projected
 
 LOOK = Look("#0072b2", "-", "o")
@@ -126,7 +125,7 @@ def test_the_view_keeps_what_lies_across_it_and_drops_what_lies_along_it() -> No
 
 def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
     series = [Series(TIME, 2.7 * np.sin(0.2 * TIME), PRINTED), Series(TIME, 0.3 * TIME, CORRECTED)]
-    mark = Mark(0, 2.7315, "published 2.7315 rad")
+    mark = (0, 2.7315, "published 2.7315 rad")
     (axes,) = scene_page.departure([("rotor angle (rad)", series)], [mark], 6.0, 1.5).axes
     assert [line.get_ydata()[0] for line in axes.get_lines() if line.get_linestyle() == ":"] == [2.7315]
     assert [text.get_text().strip() for text in axes.texts] == ["published 2.7315 rad", "0.05 rad apart at 1.5 s"]
