@@ -27,8 +27,9 @@ from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, Sto
 from rotor_mbs.methods.catalogue import REFERENCE, check_names
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import StoredRun, StoredScene, is_sweep, open_results
+from rotor_mbs.runs.results import RUNS
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.runs.table import MISSING
+from rotor_mbs.runs.table import MISSING, table_groups
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.plausibility import doubts
 from rotor_mbs.scenario.scene import Scene
@@ -266,7 +267,10 @@ def open(path: str | os.PathLike[str]) -> Runs:
     >>> runs["paper/fig11/lagrange/taylor"].angles.shape      # doctest: +SKIP
     (1001, 4)
     """
-    return Runs(Path(path))
+    file = Path(path)
+    if not is_sweep(file) and RUNS not in table_groups(file):
+        raise StoreError(f"{file}: has no runs; allowed: a file that `rotor-mbs run`, `reproduce` or `sweep` wrote")
+    return Runs(file)
 
 
 class _TemporaryFolder:

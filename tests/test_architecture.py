@@ -96,7 +96,7 @@ def test_a_scene_key_is_the_scene_and_the_physics_it_changes() -> None:
         "methods/selection.py",
         "solution/impulse.py",
         "analysis/exact.py",
-        "report/pages/drive.py",
+        "report/pages/scene.py",
     }
 
 

@@ -36,12 +36,9 @@ _SLOW = 1e-3
 class LinearModes(ModeSet):
     """The modes of one source over speed, the same mode in the same place at every speed.
 
-    names       "collective pitch" where symmetry tells the modes apart, else "mode 2"
-    source      "lagrange", "exudyn_tree", ...; label: as a reader calls it
-    kind        REST or ROTATION
-    coordinates names of the coordinates that move; angles: their (speeds, n) steady values, rad
-    stiffness, damping   (speeds, n, n), the mass matrix divided out
-    messages    why there is nothing at a speed; "" where there is
+    names: "collective pitch" where symmetry tells the modes apart, else "mode 2". kind: REST or ROTATION. angles:
+    (speeds, n) rad, steady values of the `coordinates` that move. stiffness, damping: (speeds, n, n), the mass matrix
+    divided out. messages: why there is nothing at a speed, or "".
     """
 
     source: str
@@ -75,12 +72,10 @@ class LinearModes(ModeSet):
 
 @dataclass(frozen=True)
 class FloquetTable:
-    """Multipliers of a turn under gravity over speed.
+    """Multipliers (speeds, 2n) of a turn under gravity over speed; largest: modulus of those that are not always 1.
 
-    multipliers     (speeds, 2n); largest: modulus of those that are not always 1
-    stable          1, 0, or -1 where no periodic motion was found
-    product_error   logarithm of their product less the integrated trace; NaN where rounding hides it
-    torque, mismatch   N m on the rotor, and rad that a turn misses
+    stable: 1, 0, or -1 where no periodic motion was found. product_error: logarithm of their product less the
+    integrated trace; NaN where rounding hides it. torque: N m on the rotor; mismatch: rad that a turn misses.
     """
 
     speeds: Array
@@ -110,11 +105,7 @@ class StabilityChart:
 
 @dataclass(frozen=True)
 class SceneModes:
-    """All that is known of a scene's modes.
-
-    rest, rotation   by source, in the order of the catalogue; the first one is the closed form
-    notes            what could not be done, and why
-    """
+    """The modes of a scene: by source, the closed form first; notes: what could not be done, and why."""
 
     scene: str
     title: str

@@ -44,12 +44,7 @@ class Where(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A number against its bound, both in `unit`; `hint` says where a failure would come from.
-
-    >>> check = Check("energy", Where("paper/fig08", "exudyn_tree/rk67", "balance"), 2.5e-10, 1e-9, "", "of scale")
-    >>> check.passed, check.margin
-    (True, 4.0)
-    """
+    """A number against its bound, both in `unit`; `hint` says where a failure would come from."""
 
     name: str
     where: Where
@@ -78,16 +73,9 @@ def make_check(bounds: Bounds, name: str, where: Where, value: float, unit: str,
 def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Check]:
     """Every check that an open file allows, in the order of its scenes.
 
-    Parameters
-    ----------
-    results : the file, opened with verify=False: a row that has changed is judged, too.
-    frozen : the shipped references.
-    bounds : the bounds; those that methods declare go before them.
+    The file is opened with verify=False: a row that has changed is judged, too. frozen: the shipped references.
 
-    Raises
-    ------
-    InputError
-        Where a stored scene is none.
+    Raises InputError where a stored scene is none.
     """
     bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
     shipped = {name: scene for file in frozen for name, scene in file.scenes.items()}
@@ -198,7 +186,14 @@ def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution
     yield _of(run, "times", "time", off, bounds, "of duration", "samples are equally spaced, both ends included")
     if not scene.wants("angles"):
         return
-    yield _of(run, "start", "angles, rates", _start_off(scene, trajectory), bounds, "rad, rad/s", "the initial state")
+    # A pitch without inertia is fixed: its rate is zero, whatever the scene says.
+    free = [True, *(blade.has_pitch_inertia for blade in scene.blades)]
+    rates = np.where(free, scene.initial_rates, 0.0)
+    off = float(np.abs(trajectory.angles[0] - scene.initial_angles).max())
+    if scene.wants("rates"):
+        off = max(off, float(np.abs(trajectory.rates[0] - rates).max()))
+    size = max(1.0, *map(abs, scene.initial_angles), *map(abs, rates.tolist()))
+    yield _of(run, "start", "angles, rates", off / size, bounds, "rad, rad/s", "the initial state")
     if trajectory.tip is not None:
         away = np.linalg.norm(trajectory.tip - kinematics.tip_paths(scene, trajectory.angles), axis=2).max()
         length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
@@ -211,38 +206,21 @@ def _of_samples(run: StoredRun, bounds: Bounds, scene: Scene, recorded: Solution
         scale = energy_scale(scene, trajectory) or 1.0
         yield _of(run, "energies", "energy error", off / scale, bounds, "of scale", hint)
     if scene.wants("rates") and trajectory.kinetic_energy is not None:
-        for name, off in _energies_off(scene, trajectory).items():
-            hint = "its own angles and rates give another energy: a mass, an inertia, a spring"
-            yield _of(run, "energies", name, off, bounds, "of scale", hint)
-
-
-def _start_off(scene: Scene, trajectory: Trajectory) -> float:
-    angles = np.abs(trajectory.angles[0] - scene.initial_angles)
-    # A pitch without inertia is fixed: its rate is zero, whatever the scene says.
-    given = [scene.initial_rates[0]] + [
-        rate if blade.has_pitch_inertia else 0.0
-        for rate, blade in zip(scene.initial_rates[1:], scene.blades, strict=True)
-    ]
-    rates = np.abs(trajectory.rates[0] - given) if scene.wants("rates") else np.zeros(1)
-    size = max(1.0, *map(abs, scene.initial_angles), *map(abs, given))
-    return max(float(angles.max()), float(rates.max())) / size
-
-
-def _energies_off(scene: Scene, trajectory: Trajectory) -> dict[str, float]:
-    angles, rates = trajectory.angles, trajectory.rates
-    kinetic = kinematics.kinetic_energy(scene, angles, rates)
-    formulas: dict[str, tuple[Array | None, Array | None]] = {
-        "kinetic energy": (trajectory.kinetic_energy, kinetic),
-        "potential energy": (trajectory.potential_energy, kinematics.potential_energy(scene, trajectory.time, angles)),
-        "work": (trajectory.work, kinematics.work_of_constant_loads(scene, angles)),
-        "work at the start": (None if trajectory.work is None else trajectory.work[:1], np.zeros(1)),
-    }
-    scale = max(energy_scale(scene, trajectory), float(np.abs(kinetic).max())) or 1.0
-    return {
-        name: float(np.abs(stored - own).max()) / scale
-        for name, (stored, own) in formulas.items()
-        if stored is not None and own is not None
-    }
+        angles, work = trajectory.angles, trajectory.work
+        kinetic = kinematics.kinetic_energy(scene, angles, trajectory.rates)
+        potential = kinematics.potential_energy(scene, trajectory.time, angles)
+        formulas: dict[str, tuple[Array | None, Array | None]] = {
+            "kinetic energy": (trajectory.kinetic_energy, kinetic),
+            "potential energy": (trajectory.potential_energy, potential),
+            "work": (work, kinematics.work_of_constant_loads(scene, angles)),
+            "work at the start": (None if work is None else work[:1], np.zeros(1)),
+        }
+        scale = max(energy_scale(scene, trajectory), float(np.abs(kinetic).max())) or 1.0
+        hint = "its own angles and rates give another energy: a mass, an inertia, a spring"
+        for name, (stored, own) in formulas.items():
+            if stored is not None and own is not None:
+                off = float(np.abs(stored - own).max()) / scale
+                yield _of(run, "energies", name, off, bounds, "of scale", hint)
 
 
 def _of_corrected_model(run: StoredRun, bounds: Bounds, stored: Rehydrated, trajectory: Trajectory) -> Iterator[Check]:
@@ -292,27 +270,18 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
     elif shipped is not None:
         for name in ("angles", "rates"):
             if name in stored:
-                off = _distance(shipped.array(name), stored.array(name))
+                first, second, off = shipped.array(name), stored.array(name), math.nan
+                if first.shape == second.shape and second.dtype.kind == "f":
+                    off = float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max(initial=0.0))
                 yield _of(stored, "reference", name, off, bounds, "rad, rad/s", hint)
         for name, check_name in (("error_growth", "growth"), ("angle_uncertainty", "uncertainty")):
             if name in shipped:
-                off = _log_distance(shipped, stored, name)
+                first, off = shipped.array(name), math.nan
+                second = stored.array(name) if name in stored else np.empty(0)
+                if first.shape == second.shape and second.dtype.kind == "f":
+                    used = np.isfinite(first) & (first > 0.0)  # the ratio, as far as both are positive and finite
+                    off = float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
                 yield _of(stored, check_name, name.replace("_", " "), off, bounds, "log", hint)
-
-
-def _distance(first: Array, second: Array) -> float:
-    if first.shape != second.shape or second.dtype.kind != "f":
-        return math.nan
-    return float((np.abs(first - second) / np.maximum(1.0, np.abs(first))).max()) if first.size else 0.0
-
-
-def _log_distance(shipped: StoredRun, stored: StoredRun, name: str) -> float:
-    """Largest |ln| of the ratio, as far as both are positive and finite; NaN where one is missing."""
-    first, second = shipped.array(name), stored.array(name) if name in stored else np.empty(0)
-    if first.shape != second.shape or second.dtype.kind != "f":
-        return math.nan
-    used = np.isfinite(first) & (first > 0.0)
-    return float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
 
 
 def _of_paper(results: OpenResults, bounds: Bounds) -> Iterator[Check]:

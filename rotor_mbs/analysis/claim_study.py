@@ -1,9 +1,7 @@
 """The paper's claims as shares of many runs, and its numbers under other conditions, from reference/claims.json.
 
-The runs are chaotic: what a claim says may hold for one rounding and fail for the next. So it was tested on runs from
-many starts moved by rounding, for several durations, and holds or fails only where nearly all runs say so. The numbers
-were read off runs for other durations, tolerances and ways of writing the first row of (56).
-`tests/support/make_claims.py` computes the file.
+The runs are chaotic: a claim may hold for one rounding and fail for the next. So it was tested on runs from many starts
+moved by rounding, for several durations. `tests/support/make_claims.py` computes the file.
 """
 
 from __future__ import annotations

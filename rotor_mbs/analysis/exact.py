@@ -1,7 +1,4 @@
-"""What is known of a scene without any model: exact solutions, what an exact run conserves, its symmetries.
-
-Exact runs conserve angular momentum, symmetry, time reversal, and energy up to a random walk of round-off.
-"""
+"""What is known of a scene without any model: exact solutions, its symmetries."""
 
 from __future__ import annotations
 

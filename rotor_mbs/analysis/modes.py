@@ -157,13 +157,11 @@ def whirl_frequencies(frequency: Array, speed: Array, harmonic: Array | int = 1)
 
 
 def floquet(transition: Array, flow: Array, gradient: Array, speed: float) -> tuple[Complex, Complex]:
-    """Multipliers of a (2n, 2n) state transition matrix over a turn, the largest first.
+    """Multipliers of a (2n, 2n) state transition matrix over a turn, the largest first: all of them, and the others
+    than those that are 1 for every such motion. It is stable where none of the latter is larger than 1, up to `GROWTH`.
 
-    flow        (2n,) time derivative of the state: an eigenvector for 1
-    gradient    (2n,) derivative of what the motion keeps: a left eigenvector for 1, or zeros where nothing is kept
-
-    Returns all of them, and those that are not 1 for every such motion (a shift in time and, where energy is kept, in
-    speed): the motion is stable where none of these is larger than 1, up to `GROWTH`.
+    flow: (2n,) time derivative of the state, an eigenvector for 1. gradient: (2n,) derivative of what the motion keeps,
+    a left eigenvector for 1, or zeros.
     """
     if not np.isfinite(transition).all():
         nothing = np.full(len(transition), complex(np.nan, np.nan))

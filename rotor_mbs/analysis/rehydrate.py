@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +17,8 @@ from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 
-@dataclass(frozen=True)
-class Rehydrated:
-    """scene: as its stored text says; run: None where its arrays cannot be used; reference: None where there is none.
-
-    faults   a line for every array that is missing, of another shape, or not finite
-    """
+class Rehydrated(NamedTuple):
+    """run: None where its arrays cannot be used; faults: a line for every array that is missing or wrong."""
 
     scene: Scene
     run: Solution | None
@@ -39,10 +35,7 @@ def scene_of(stored: StoredScene) -> Scene | None:
 
 
 def reference_of(stored: StoredScene) -> Trajectory | None:
-    """The scene's reference; None where there is none, or its arrays cannot be used.
-
-    Raises InputError where the stored scene text is no scene, StoreError where the reference cannot be read.
-    """
+    """The scene's reference; None where there is none, or its arrays cannot be used. Raises InputError, StoreError."""
     scene = parse_scene(str(stored.attributes["scene_toml"]), stored.name)
     if stored.reference is None or _faults(scene, stored.reference, complete=False):
         return None
@@ -50,10 +43,7 @@ def reference_of(stored: StoredScene) -> Trajectory | None:
 
 
 def rehydrate(stored: StoredScene, run: StoredRun, reference: Trajectory | None = None) -> Rehydrated:
-    """`reference`: that of the scene, where it has been read already.
-
-    Raises InputError where the stored scene text is no scene.
-    """
+    """reference: where it has been read already. Raises InputError where the stored scene text is no scene."""
     scene = parse_scene(str(stored.attributes["scene_toml"]), stored.name)
     faults = _faults(scene, run)
     if reference is None:
@@ -64,10 +54,10 @@ def rehydrate(stored: StoredScene, run: StoredRun, reference: Trajectory | None 
     success = bool(facts.get("engine_success", _is_frozen(run)))
     out_of_time = run.status == "timed_out" and not success
     engine = Integration(success, str(facts.get("engine_message", "")), out_of_time=out_of_time)
-    found = Solution(scene, run.method, _trajectory(scene, run), engine, run.settings)
+    solution = Solution(scene, run.method, _trajectory(scene, run), engine, run.settings)
     if (method := look_up(run.method)) is not None:
-        found.is_corrected, found.bounds = method.is_corrected, method.bounds
-    return Rehydrated(scene, found, reference, faults)
+        solution.is_corrected, solution.bounds = method.is_corrected, method.bounds
+    return Rehydrated(scene, solution, reference, faults)
 
 
 def _is_frozen(run: StoredRun) -> bool:
@@ -84,20 +74,19 @@ def _faults(scene: Scene, run: StoredRun, complete: bool = True) -> list[str]:
             continue
         if quantity.required or (quantity.name == "angle_uncertainty" and run.method == REFERENCE):
             expected[quantity.name] = (rows, *row_shape(quantity, scene))
-    return [fault for name, shape in expected.items() if (fault := _fault(run, name, shape))]
-
-
-def _fault(run: StoredRun, name: str, shape: tuple[int, ...]) -> str:
-    if name not in run:
-        return f"{name} is missing"
-    values = run.array(name)
-    if values.dtype.kind != "f" or values.shape[1:] != shape[1:]:
-        return f"{name} has shape {values.shape} of {values.dtype}, not {shape} of numbers"
-    if len(values) != shape[0]:
-        return f"{name} has {len(values)} rows, not {shape[0]}"
-    if not np.isfinite(values).all():
-        return f"{name} is not finite at sample {int(np.argwhere(~np.isfinite(values))[0][0])}"
-    return ""
+    faults = []
+    for name, shape in expected.items():
+        if name not in run:
+            faults.append(f"{name} is missing")
+            continue
+        values = run.array(name)
+        if values.dtype.kind != "f" or values.shape[1:] != shape[1:]:
+            faults.append(f"{name} has shape {values.shape} of {values.dtype}, not {shape} of numbers")
+        elif len(values) != shape[0]:
+            faults.append(f"{name} has {len(values)} rows, not {shape[0]}")
+        elif not np.isfinite(values).all():
+            faults.append(f"{name} is not finite at sample {int(np.argwhere(~np.isfinite(values))[0][0])}")
+    return faults
 
 
 def _trajectory(scene: Scene, run: StoredRun) -> Trajectory:
@@ -105,5 +94,5 @@ def _trajectory(scene: Scene, run: StoredRun) -> Trajectory:
     time = run.array("time")
     blank = np.zeros((len(time), 1 + len(scene.blades)))
     names = {quantity.name for quantity in known_quantities(scene.outputs) if quantity.is_over_time}
-    found = {name: run.array(name) for name in names if name in run}
-    return Trajectory(**{"time": time, "angles": blank, "rates": blank, **found})
+    arrays = {name: run.array(name) for name in names if name in run}
+    return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})

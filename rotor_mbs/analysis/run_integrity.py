@@ -13,9 +13,7 @@ from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.accuracy_bounds import expected_settings
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Array
 
-_COMPARED = ("angles", "rates")
 # Of a column's largest value: below it a column is a straight line, which methods of any kind may give exactly.
 _STRAIGHT = 1e-12
 # Few samples of a short motion may be rounded alike by two methods that are right: fig11 over 0.1 s, 6 samples.
@@ -39,17 +37,13 @@ def copies(scene: StoredScene) -> Iterator[tuple[StoredRun, str, str]]:
 
 def _bent_columns(run: StoredRun) -> dict[tuple[str, int], bytes]:
     columns = {}
-    for name in _COMPARED:
+    for name in ("angles", "rates"):
         values = run.array(name) if name in run else np.empty((0, 0))
         if values.ndim == 2 and values.dtype.kind == "f" and len(values) >= _FEWEST:
-            for i in range(values.shape[1]):
-                if _is_bent(values[:, i]):
-                    columns[name, i] = values[:, i].tobytes()
+            for i, column in enumerate(values.T):
+                if np.abs(np.diff(column, 2)).max() > _STRAIGHT * np.abs(column).max():
+                    columns[name, i] = column.tobytes()
     return columns
-
-
-def _is_bent(column: Array) -> bool:
-    return bool(np.abs(np.diff(column, 2)).max() > _STRAIGHT * np.abs(column).max())
 
 
 def settings_faults(run: StoredRun) -> list[str]:

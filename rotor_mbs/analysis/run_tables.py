@@ -19,10 +19,7 @@ _MOST_ROWS = 40  # of a table with a row for each run
 
 
 def run_row(method: str, status: str, facts: Mapping[str, object], seconds: float | None) -> tuple[str, ...]:
-    """Cells under RUN_HEAD: the largest angle error up to the horizon, the largest energy error of its scale, run time.
-
-    facts: metrics by their stored names; seconds: None where nothing was integrated.
-    """
+    """Cells under RUN_HEAD; facts: metrics by their stored names; seconds: None where nothing was integrated."""
     time = "read" if seconds is None else f"{seconds:.3g}"
     return (method, status, _short(facts.get("angle_error_max")), _short(facts.get("energy_drift_max")), time)
 
@@ -38,15 +35,22 @@ def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[s
     ]
     if len(runs) > _MOST_ROWS:
         return method_table(run for run in runs if run.method != REFERENCE)
-    return TextTable(("scene", *RUN_HEAD), [(run.scene, *_row(run)) for run in runs])
+    rows = []
+    for run in runs:
+        facts = dict(run.attributes)
+        seconds = None if "frozen_with" in facts else facts.get("run_time_s", 0.0)
+        if run.method == REFERENCE:  # it has no error against itself
+            facts.pop("angle_error_max", None)
+        rows.append((run.scene, *run_row(run.method, run.status, facts, seconds)))
+    return TextTable(("scene", *RUN_HEAD), rows)
 
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
     """A row for each method: how many of its runs are ok, and the largest numbers among those."""
     rows = []
-    for one in agreement(runs):
-        worst = {"angle_error_max": one.angle_error, "energy_drift_max": one.energy_drift}
-        rows.append(run_row(one.method, f"{one.runs.count} of {one.runs.of} ok", worst, one.longest_s))
+    for row in agreement(runs):
+        worst = {"angle_error_max": row.angle_error, "energy_drift_max": row.energy_drift}
+        rows.append(run_row(row.method, f"{row.runs.count} of {row.runs.of} ok", worst, row.longest_s))
     return TextTable(("method", "runs", "largest error (rad)", "largest drift", "longest (s)"), rows)
 
 
@@ -84,13 +88,6 @@ def finding_lines(facts: Finding, shares: ClaimShares | None) -> list[str]:
         rises = facts.energy.rises
         lines.append(f"energy made from nothing by the printed equations: in {rises.count} of {rises.of} scenes")
     return lines
-
-
-def _row(run: StoredRun) -> tuple[str, ...]:
-    facts = run.attributes
-    if run.method == REFERENCE:  # it has no error against itself
-        facts = {name: value for name, value in facts.items() if name != "angle_error_max"}
-    return run_row(run.method, run.status, facts, None if "frozen_with" in facts else facts.get("run_time_s", 0.0))
 
 
 def _short(value: object) -> str:

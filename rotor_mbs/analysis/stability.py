@@ -1,7 +1,4 @@
-"""The map of the stability suite: every scene and method as one of a few outcomes, and what to use which method for.
-
-Reads the store alone.
-"""
+"""The map of the stability suite: every scene and method as one of a few outcomes, and what to use which method for."""
 
 from __future__ import annotations
 
@@ -42,11 +39,9 @@ _ENERGY_LOST = 1e-3
 class SuiteRun:
     """A run of the suite: a scene by a method.
 
-    outcome      a key of OUTCOMES, from the run's status and what a ladder of steps found
-    message      the run's own; for "energy_alone", why nothing else judges it
-    angle_error  rad up to the horizon; None without a reference, or where the horizon is before the second sample
-    time_reached s: of the last finite sample, whatever the engine says
-    step         s: the step that 1e-6 rad needs, where a ladder found it
+    outcome: a key of OUTCOMES, from the run's status and what a ladder of steps found. angle_error: rad up to the
+    horizon, None where nothing is compared. time_reached: s, of the last finite sample. step: s, that 1e-6 rad needs,
+    where a ladder found it.
     """
 
     scene: str
@@ -68,7 +63,9 @@ class SuiteRun:
         """What its scene stresses: stiff, or the first part of an extreme scene's name."""
         folder, _, name = self.scene.rpartition("/")
         first = name.split("-")[0]
-        return "stiff" if folder == "stiff" else _FAMILIES.get(first, first)
+        if folder == "stiff":
+            return "stiff"
+        return next((family for family, names in _FAMILIES.items() if first in names), first)
 
     @property
     def is_stiff_or_light(self) -> bool:
@@ -76,104 +73,97 @@ class SuiteRun:
 
 
 _FAMILIES = {  # of scenes whose names do not begin with that of their family
-    part: family
-    for family, parts in {
-        "light": ("feather",),
-        "singular": ("passage",),
-        "fast": ("spin", "tumbling", "rate", "rates", "torque"),
-        "long": ("hour", "pendulum"),
-        "scale": ("toy", "giant", "zero", "gravity"),
-    }.items()
-    for part in parts
+    "light": ("feather",),
+    "singular": ("passage",),
+    "fast": ("spin", "tumbling", "rate", "rates", "torque"),
+    "long": ("hour", "pendulum"),
+    "scale": ("toy", "giant", "zero", "gravity"),
 }
 
 
 def suite_runs(path: Path) -> list[SuiteRun]:
     """Every run of a results file, in its order. Raises StoreError."""
     ladders = {(record.scene, record.name): record for record in read_records(path, "stability")}
-    found = []
     with open_results(path) as results:
-        for scene in results.scenes.values():
-            for name, run in scene.methods.items():
-                found.append(_suite_run(scene, run, ladders.get((scene.name, name))))
-    return found
+        return [
+            _suite_run(scene, run, ladders.get((scene.name, name)))
+            for scene in results.scenes.values()
+            for name, run in scene.methods.items()
+        ]
 
 
 def _suite_run(scene: StoredScene, run: StoredRun, ladder: Record | None) -> SuiteRun:
-    facts = run.attributes
-    error = facts.get("angle_error_max")
-    reference = scene.reference
-    step = ladder.attributes.get("step_for_target_s") if ladder is not None else None
-    steps_ok = ladder is not None and ladder.arrays["status"] == code_of("ok")
-    ladder_reaches = ladder is not None and bool(np.any(steps_ok & (ladder.arrays["angle_error_max"] <= TARGET)))
+    facts, reference = run.attributes, scene.reference
+    message, error = str(facts.get("message", "")), facts.get("angle_error_max")
+    drift, time = facts.get("energy_drift_max"), run.array("time")
     has_reference = reference is not None and reference.status == "ok"
-    outcome = _outcome(run, ladder, has_motion=has_reference)
+    step, steps_hold, reaches_target = None, False, run.status == "ok" and error is not None and error <= TARGET
+    if ladder is not None:
+        step, steps_ok = ladder.attributes.get("step_for_target_s"), ladder.arrays["status"] == code_of("ok")
+        steps_hold = bool(steps_ok.any())
+        reaches_target |= bool(np.any(steps_ok & (ladder.arrays["angle_error_max"] <= TARGET)))
+    if run.status == "ok" and error is not None:
+        outcome = "holds"
+    elif run.status == "ok":
+        outcome = "energy_alone"
+        reason = "the horizon is before the second sample"
+        if reference is None:
+            reason = "there is no reference"
+        elif len(reference.array("time")) < 2:
+            reason = f"no reference ({reference.attributes['message']})"
+        message = f"judged by its energy alone: {reason}"
+    elif steps_hold:
+        outcome = "smaller_step"
+    elif run.status in ("timed_out", "unchecked"):
+        outcome = run.status
+    elif facts.get("false_success", 0):
+        outcome = "false_success"
+    elif run.status == "singular" and not has_reference:
+        outcome = "refuses"
+    elif run.status != "inaccurate":
+        outcome = "says_so"
+    else:
+        outcome = "inaccurate" if (drift or 0.0) <= _ENERGY_LOST else "loses_energy"
     return SuiteRun(
         scene.name,
         run.method,
         run.status,
         outcome,
-        _not_compared(reference) if outcome == "energy_alone" else str(facts.get("message", "")),
+        message,
         bool(facts.get("false_success", 0)),
         has_reference,
         None if error is None else float(error),
-        facts.get("energy_drift_max"),
+        drift,
         float(facts["run_time_s"]),
-        float(run.array("time")[-1]) if len(run.array("time")) else 0.0,
+        float(time[-1]) if len(time) else 0.0,
         None if step is None else float(step),
-        (run.status == "ok" and error is not None and error <= TARGET) or ladder_reaches,
+        reaches_target,
     )
 
 
-def _outcome(run: StoredRun, ladder: Record | None, *, has_motion: bool) -> str:
-    if run.status == "ok":
-        return "holds" if "angle_error_max" in run.attributes else "energy_alone"
-    if ladder is not None and "ok" in ladder.statuses:
-        return "smaller_step"
-    if run.status in ("timed_out", "unchecked"):
-        return run.status
-    if run.attributes.get("false_success", 0):
-        return "false_success"
-    if run.status == "singular" and not has_motion:
-        return "refuses"
-    if run.status != "inaccurate":
-        return "says_so"
-    lost = not run.attributes.get("energy_drift_max", 0.0) <= _ENERGY_LOST
-    return "loses_energy" if lost else "inaccurate"
-
-
-def _not_compared(reference: StoredRun | None) -> str:
-    if reference is None:
-        return "judged by its energy alone: there is no reference"
-    if len(reference.array("time")) < 2:
-        return f"judged by its energy alone: no reference ({reference.attributes['message']})"
-    return "judged by its energy alone: the horizon is before the second sample"
-
-
-def unreached(found: Iterable[SuiteRun]) -> list[str]:
+def unreached(runs: Iterable[SuiteRun]) -> list[str]:
     """Stiff and light scenes with a reference on which no method reaches 1e-6 rad."""
-    asked = [cell for cell in found if cell.is_stiff_or_light and cell.has_reference]
-    reached = {cell.scene for cell in asked if cell.reaches_target}
-    return [scene for scene in dict.fromkeys(cell.scene for cell in asked) if scene not in reached]
+    asked = [run for run in runs if run.is_stiff_or_light and run.has_reference]
+    reached = {run.scene for run in asked if run.reaches_target}
+    return [scene for scene in dict.fromkeys(run.scene for run in asked) if scene not in reached]
 
 
-def reached_by(found: Iterable[SuiteRun], scene: str) -> str | None:
+def reached_by(runs: Iterable[SuiteRun], scene: str) -> str | None:
     """The method that reaches 1e-6 rad on the scene in the least time; None where none does."""
-    able = [cell for cell in found if cell.scene == scene and cell.status == "ok" and cell.reaches_target]
-    return min(able, key=lambda cell: cell.run_time_s).method if able else None
+    able = [run for run in runs if run.scene == scene and run.status == "ok" and run.reaches_target]
+    return min(able, key=lambda run: run.run_time_s).method if able else None
 
 
 def advice_lines(
-    found: Sequence[SuiteRun], label: Callable[[str], str] = str, heading: Callable[[str], str] = str
+    runs: Sequence[SuiteRun], label: Callable[[str], str] = str, heading: Callable[[str], str] = str
 ) -> list[str]:
     """Where each method holds, what to use it for and what not, a line per method.
 
-    By family of scenes: use where nine tenths hold, not where fewer than half do even with a smaller step.
-
-    label, heading   how a method and a family are called
+    By family of scenes: use where nine tenths hold, not where fewer than half do even with a smaller step. label and
+    heading: how a method and a family are called.
     """
     by_method: dict[str, list[SuiteRun]] = {}
-    for run in found:
+    for run in runs:
         by_method.setdefault(run.method, []).append(run)
     return [f"{label(method)}: {'; '.join(_advice(own, heading))}" for method, own in by_method.items()]
 
@@ -188,7 +178,12 @@ def _advice(own: Sequence[SuiteRun], heading: Callable[[str], str]) -> list[str]
             continue
         holds = sum(outcome in _HOLDS for outcome in outcomes) / len(outcomes)
         with_step = sum(outcome in (*_HOLDS, "smaller_step") for outcome in outcomes) / len(outcomes)
-        (use if holds >= 0.9 else in_part if with_step >= 0.5 else avoid).append(family)
+        if holds >= 0.9:
+            use.append(family)
+        elif with_step >= 0.5:
+            in_part.append(family)
+        else:
+            avoid.append(family)
     by_energy = sum(run.outcome == "energy_alone" for run in own)
     alone = f" ({by_energy} by its energy alone)" if by_energy else ""
     parts = [f"holds on {sum(run.outcome in _HOLDS for run in own)} of {len(own)}{alone}"]

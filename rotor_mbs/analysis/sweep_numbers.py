@@ -24,13 +24,10 @@ _TURNED, _SMALL = 10.0, 0.1
 
 @dataclass(frozen=True)
 class Spread:
-    """Separations of runs 2i and 2i + 1 (root of the summed squares of the angles' differences).
+    """Separations (rad) of runs 2i and 2i + 1: root of the summed squares of the angles' differences, over time (s).
 
-    time               (n,) s
-    low, median, high  (n,) rad: tenth, fiftieth and ninetieth percentile over the pairs
-    growth             (n,) rad: geometric mean over the pairs
-    exponent           1/s: slope of log(growth) between `start` and `end` (s), the window of exponential growth
-    uncertainty        1/s: its standard error, from how the rate differs between parts of the window
+    low, median, high: tenth, fiftieth and ninetieth percentile over the pairs; growth: geometric mean. exponent and
+    uncertainty: 1/s, slope of log(growth) between `start` and `end` (s), and its standard error.
     """
 
     time: Array
@@ -47,8 +44,18 @@ class Spread:
 
 def spread_of(sweep: StoredSweep) -> Spread:
     """From the runs that ended well. Raises StoreError without angles, InputError where nothing grows."""
-    time = sweep.column("time")
-    separations = _separations(sweep)
+    time, stored = sweep.column("time"), sweep.column("angles")
+    well = sweep.column("status") == 0
+    parts = []
+    for first in range(0, len(stored), 2 * _PAIRS_AT_ONCE):
+        angles = stored[first : first + 2 * _PAIRS_AT_ONCE]
+        pairs = len(angles) // 2
+        both = well[first : first + 2 * pairs].reshape(pairs, 2).all(axis=1)
+        difference = angles[1 : 2 * pairs : 2].astype(float) - angles[0 : 2 * pairs : 2]
+        parts.append(np.sqrt((difference[both] ** 2).sum(axis=2)))
+    if not sum(map(len, parts)):
+        raise InputError("spread: no pair of runs ended well; allowed: a sweep with two or more such runs")
+    separations = np.concatenate(parts)
     low, median, high = np.percentile(separations, [10.0, 50.0, 90.0], axis=0)
     growth = np.exp(np.log(np.maximum(separations, np.finfo(float).tiny)).mean(axis=0))
     exponent, uncertainty, start, end = lyapunov_exponent(time, growth)
@@ -75,22 +82,6 @@ def lyapunov_exponent(time: Array, growth: Array) -> tuple[float, float, float, 
     lengths = np.diff(time[ends])
     mean = float(np.average(rates, weights=lengths))
     return mean, float(rates.std(ddof=1) / np.sqrt(_BLOCKS)), float(time[first]), float(time[last])
-
-
-def _separations(sweep: StoredSweep) -> Array:
-    """(pairs, n) rad."""
-    well = sweep.column("status") == 0
-    stored = sweep.column("angles")
-    found = []
-    for first in range(0, len(stored), 2 * _PAIRS_AT_ONCE):
-        angles = stored[first : first + 2 * _PAIRS_AT_ONCE]
-        pairs = len(angles) // 2
-        both = well[first : first + 2 * pairs].reshape(pairs, 2).all(axis=1)
-        difference = angles[1 : 2 * pairs : 2].astype(float) - angles[0 : 2 * pairs : 2]
-        found.append(np.sqrt((difference[both] ** 2).sum(axis=2)))
-    if not sum(map(len, found)):
-        raise InputError("spread: no pair of runs ended well; allowed: a sweep with two or more such runs")
-    return np.concatenate(found)
 
 
 @dataclass(frozen=True)

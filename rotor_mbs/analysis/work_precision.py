@@ -1,13 +1,10 @@
-"""What a diagram of error against run time says in numbers: Pareto front, time to an accuracy, orders, growth of cost.
-
-Knows curves as arrays; no text and no picture.
-"""
+"""What a diagram of error against run time says in numbers: Pareto front, time to an accuracy, orders."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +26,7 @@ _ASYMPTOTIC_RAD = 0.05
 _FITTED = 4  # points, the finest ones above the floor
 
 
-@dataclass(frozen=True)
-class Reach:
+class Reach(NamedTuple):
     """When a curve reaches an error: s of run time, and how many times the fastest curve's."""
 
     seconds: float
@@ -74,8 +70,7 @@ def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
 def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
     """s, on the front, straight in the logarithms between two points; None where no point is as accurate.
 
-    Where already the fastest point is more accurate than asked for, its time: the curve does not say how much less
-    would do.
+    Where already the fastest point is more accurate than asked for, its time.
     """
     front = pareto(errors, seconds)
     if not len(front) or errors[front[-1]] > target:
@@ -94,43 +89,38 @@ def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach
 def fitted_order(steps: Array, errors: Array) -> float | None:
     """Slope of log error over log step on the finest points above the round-off floor; None with fewer than two.
 
-    steps     coarse to fine, s
-    errors    rad, > 0
+    steps: s, coarse to fine; errors: rad, > 0.
     """
     usable = errors < _ASYMPTOTIC_RAD
     h, e = steps[usable], errors[usable]
     if len(e) < 2:
         return None
-    if _reaches_floor(h, e):
+    # Whether the errors stop falling: an earlier one is the smallest, or the last slope is clearly below the usual.
+    slopes = np.diff(np.log(e)) / np.diff(np.log(h))
+    if int(np.argmin(e)) < len(e) - 1 or bool(slopes[-1] < 0.75 * np.median(slopes)):
         above = e > _ABOVE_FLOOR * e.min()
         h, e = h[above], e[above]
     h, e = h[-_FITTED:], e[-_FITTED:]
     return float(np.polyfit(np.log(h), np.log(e), 1)[0]) if len(e) >= 2 else None
 
 
-def _reaches_floor(steps: Array, errors: Array) -> bool:
-    """Whether the errors stop falling: an earlier one is the smallest, or the last slope is clearly below the usual."""
-    slopes = np.diff(np.log(errors)) / np.diff(np.log(steps))
-    return int(np.argmin(errors)) < len(errors) - 1 or bool(slopes[-1] < 0.75 * np.median(slopes))
-
-
 def own_points(scene: StoredScene) -> list[Record]:
     """The scene's runs of corrected models that reached the end, each as a curve of one point."""
-    found = []
+    curves = []
     for name, run in corrected_runs(scene).items():
-        error, seconds = (run.attributes.get(one, math.nan) for one in ("angle_error_max", "run_time_s"))
-        if run.status in ("ok", "inaccurate") and seconds > 0.0:
-            numbers = dict.fromkeys(("run_time_s", "run_time_min_s", "run_time_q1_s", "run_time_q3_s"), seconds)
-            numbers |= {one: run.attributes.get(one, math.nan) for one in ("setup_time_s", "output_time_s")}
-            arrays = {one: np.array([value]) for one, value in {"angle_error_max": error, **numbers}.items()}
+        columns = ("angle_error_max", "run_time_s", "setup_time_s", "output_time_s")
+        arrays = {column: np.array([run.attributes.get(column, math.nan)]) for column in columns}
+        if run.status in ("ok", "inaccurate") and arrays["run_time_s"][0] > 0.0:
+            for quartile in ("min", "q1", "q3"):
+                arrays[f"run_time_{quartile}_s"] = arrays["run_time_s"]
             arrays["status"] = np.array([code_of("ok")])
-            found.append(Record("bench", scene.name, name, arrays=arrays))
-    return found
+            curves.append(Record("bench", scene.name, name, arrays=arrays))
+    return curves
 
 
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:
     """The curves of each scene, in order."""
-    found: dict[str, list[Record]] = {}
+    curves_by_scene: dict[str, list[Record]] = {}
     for curve in curves:
-        found.setdefault(curve.scene, []).append(curve)
-    return found
+        curves_by_scene.setdefault(curve.scene, []).append(curve)
+    return curves_by_scene

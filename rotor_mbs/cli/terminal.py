@@ -125,7 +125,7 @@ class ProgressLine(_RenewedLine):
             self._begin_part()
         self._last = time.monotonic()
         seconds = f" {outcome.seconds:.3f} s" if outcome.seconds > 0.0 else ""
-        if outcome.is_read:
+        if outcome.is_shipped:
             seconds = " (read, not computed)"
         reason = f": {outcome.message}" if outcome.message else ""
         text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"

@@ -1,11 +1,5 @@
 """The channels that data may have: time, and angle and rate of every coordinate; which column is which, in which unit,
-sign and zero: from a mapping file, or guessed from the names.
-
-    time = { column = "Time", unit = "ms" }
-    rotor = { column = "Azimuth", unit = "deg", sign = -1, offset = 90.0, wrapped = true }
-    pitch_1 = "BldPitch1"                   # in the unit that the file states, else rad, rad/s or s
-    pitch_1_rate = "theta_dot_1"
-    group = "paper/fig08/lagrange/taylor"   # of an HDF5 file, where it has several
+sign and zero: from a mapping file (see docs/compare.md), or guessed from the names.
 
 A channel is sign * (column + offset), the offset in the column's own unit. What a mapping leaves out is not compared;
 the time alone is guessed then. All are guessed where it names a group alone.
@@ -58,11 +52,9 @@ _UNIT_ENDING = re.compile(r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|s|ms|us
 
 @dataclass(frozen=True)
 class Channel:
-    """A coordinate's angle or rate, or the time.
+    """A coordinate's angle or rate, or the time: "rotor", "pitch 1", "rotor rate", "pitch 1 rate", "time".
 
-    name     "rotor", "pitch 1", "rotor rate", "pitch 1 rate", "time"
-    kind     "angle", "rate" or "time"
-    column   of the matrix of angles, then rates, (n, 2 (1 + blades)); -1 for the time
+    kind: "angle", "rate" or "time". column: of the matrix of angles, then rates; -1 for the time.
     """
 
     name: str
@@ -118,11 +110,7 @@ def guess(name: str, vector: int, known: Sequence[Channel]) -> Channel | None:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of a column whose name ends in a unit.
-
-    >>> split_unit("pitch_1_rate_deg_s"), split_unit("rotor")
-    (('pitch_1_rate', 'deg/s'), ('rotor', ''))
-    """
+    """Name and unit of a column whose name ends in a unit: "pitch_1_rate_deg_s" is "pitch_1_rate" in "deg/s"."""
     match = _UNIT_ENDING.search(name)
     if match is None:
         return name, ""
@@ -216,12 +204,31 @@ def read_mapping(
 def sources(table: DataTable, scene: Scene, entries: Mapping[str, Entry]) -> list[Source]:
     """Where each channel comes from, the time first. Raises InputError where there is no time or nothing else."""
     known = channels(scene)
-    guessed = _guesses(table, known, {TIME} if entries else {channel.name for channel in known})
+    vectors = Counter(name.rpartition("[")[0] for name in table.columns if name.endswith("]"))
+    guessed: dict[str, str] = {}
+    for name in table.columns:
+        channel = guess(name, vectors[name.rpartition("[")[0]], known)
+        if channel is None or (entries and channel.name != TIME):
+            continue
+        if channel.name in guessed:
+            raise InputError(
+                f"{table.source}: both {guessed[channel.name]!r} and {name!r} could be {channel.name}; allowed: "
+                f"`{channel.key}` in a mapping file says which"
+            )
+        guessed[channel.name] = name
     channel_sources = []
     for channel in known:
-        if channel.key in entries or channel.name in guessed:
-            entry = entries.get(channel.key) or Entry(column=guessed[channel.name])
-            channel_sources.append(_source(table, channel, entry))
+        if channel.key not in entries and channel.name not in guessed:
+            continue
+        entry = entries.get(channel.key) or Entry(column=guessed[channel.name])
+        stated = table[entry.column].unit or split_unit(entry.column)[1]
+        unit = entry.unit or stated
+        if unit and unit.lower() not in UNITS[channel.kind]:
+            raise InputError(
+                f"{table.source}: column {entry.column!r} for {channel.name} is in {unit!r}; allowed: "
+                f"{ALLOWED_UNITS[channel.kind]}"
+            )
+        channel_sources.append(Source(channel, entry, unit or channel.unit, assumed=not unit))
     shown = shown_names(list(table.columns))
     if not channel_sources or channel_sources[0].channel.name != TIME:
         raise InputError(f"{table.source}: no column for the time; it has: {shown}; allowed: `time` in a mapping file")
@@ -230,32 +237,3 @@ def sources(table: DataTable, scene: Scene, entries: Mapping[str, Entry]) -> lis
             f"{table.source}: no column for an angle or a rate; it has: {shown}; allowed: a mapping file (columns)"
         )
     return channel_sources
-
-
-def _guesses(table: DataTable, known: Sequence[Channel], wanted: set[str]) -> dict[str, str]:
-    """Column by the name of a channel. Raises InputError where two columns could be one channel."""
-    vectors = Counter(name.rpartition("[")[0] for name in table.columns if name.endswith("]"))
-    names: dict[str, str] = {}
-    for name in table.columns:
-        channel = guess(name, vectors[name.rpartition("[")[0]], known)
-        if channel is None or channel.name not in wanted:
-            continue
-        if channel.name in names:
-            raise InputError(
-                f"{table.source}: both {names[channel.name]!r} and {name!r} could be {channel.name}; allowed: "
-                f"`{channel.key}` in a mapping file says which"
-            )
-        names[channel.name] = name
-    return names
-
-
-def _source(table: DataTable, channel: Channel, entry: Entry) -> Source:
-    """Raises InputError for a column that is not there, and a unit that is none of the channel."""
-    stated = table[entry.column].unit or split_unit(entry.column)[1]
-    unit = entry.unit or stated
-    if unit and unit.lower() not in UNITS[channel.kind]:
-        raise InputError(
-            f"{table.source}: column {entry.column!r} for {channel.name} is in {unit!r}; allowed: "
-            f"{ALLOWED_UNITS[channel.kind]}"
-        )
-    return Source(channel, entry, unit or BASE_UNITS[channel.kind], assumed=not unit)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import csv
 import os
+import re
 import struct
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.table import DataTable, table_of
-from rotor_mbs.foreign.text_files import read_text
+from rotor_mbs.foreign.channels import UNITS
+from rotor_mbs.foreign.table import DataColumn, DataTable, named_unit, table_of
 from rotor_mbs.runs import files
 from rotor_mbs.runs.read import is_sweep, run_arrays
 
@@ -22,6 +26,16 @@ _HDF5, _NETCDF3, _ZIP = b"\x89HDF\r\n\x1a\n", b"CDF", b"PK\x03\x04"
 _MATLAB_5 = b"MATLAB 5.0 MAT-file"
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # spreadsheets' "Unicode text"
 
+# Text: comma-separated values, columns divided by blanks, Exudyn's sensor files, OpenFAST's `.out`.
+_COMMENT = ("#", "%", "//", "!")
+_DIVIDERS = (";", "\t", ",", None)  # None: blanks
+_NAME_AND_UNIT = re.compile(r"\S+(?: \d+)?(?: \w+)?\s*[\[(][^\])]*[\])]")
+_EXUDYN = re.compile(r"OutputVariableType = (\w+)")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
+
+Lines = Sequence[tuple[int, str]]  # number of the line in the file, its text
+
 
 def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -> DataTable:
     """The columns of numbers in a file; `group`, `scene`: see `runs.files.read_arrays`.
@@ -29,8 +43,19 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
     Raises InputError or StoreError, in one line, for what cannot be read.
     """
     path = Path(path)
-    head = _head(path)
     source = str(path)
+    if not path.is_file():
+        raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; allowed: {FORMATS}")
+    size = path.stat().st_size
+    if size == 0:
+        raise InputError(f"{path}: empty; allowed: {FORMATS}")
+    if size > LARGEST:
+        raise InputError(f"{path}: {size / 2**30:.1f} GB; allowed: up to {LARGEST / 2**30:g} GB: export fewer rows")
+    try:
+        with path.open("rb") as file:
+            head = file.read(1024)
+    except OSError as exc:
+        raise InputError(f"{path}: cannot be read: {exc.strerror}") from exc
     try:
         if head.startswith(_HDF5) or head[512:].startswith(_HDF5):  # MATLAB puts a block of its own in front
             if files.is_of_this_program(path) and not is_sweep(path):
@@ -42,37 +67,24 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
         if head.startswith(_MATLAB_5):
             return _matlab(path)
         if head.startswith(_NETCDF3):
-            return _netcdf3(path)
+            from scipy.io import netcdf_file  # late: 0.1 s
+
+            with netcdf_file(path, "r", mmap=False) as file:
+                arrays = {name: np.array(variable[:]) for name, variable in file.variables.items()}
+                units = {name: item.units.decode() for name, item in file.variables.items() if hasattr(item, "units")}
+            return table_of(source, arrays, units)
         if path.suffix.lower() == ".outb":
             return _openfast(path)
         if b"\x00" in head and not head.startswith(_UTF_16):
             raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
-        return read_text(source, _decoded(path.read_bytes()))
+        content = path.read_bytes()
+        try:
+            text = content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+        return _read_text(source, text)
     except (OSError, ValueError, zipfile.BadZipFile, struct.error, MemoryError, KeyError) as exc:
         raise InputError(f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}") from exc
-
-
-def _head(path: Path) -> bytes:
-    """The first bytes. Raises InputError for what is no file, is empty, or is too large."""
-    if not path.is_file():
-        raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; allowed: {FORMATS}")
-    size = path.stat().st_size
-    if size == 0:
-        raise InputError(f"{path}: empty; allowed: {FORMATS}")
-    if size > LARGEST:
-        raise InputError(f"{path}: {size / 2**30:.1f} GB; allowed: up to {LARGEST / 2**30:g} GB: export fewer rows")
-    try:
-        with path.open("rb") as file:
-            return file.read(1024)
-    except OSError as exc:
-        raise InputError(f"{path}: cannot be read: {exc.strerror}") from exc
-
-
-def _decoded(content: bytes) -> str:
-    try:
-        return content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
 
 
 def _line(exc: BaseException) -> str:
@@ -90,15 +102,6 @@ def _matlab(path: Path) -> DataTable:
     return table_of(str(path), {name: values for name, values in variables.items() if not name.startswith("__")})
 
 
-def _netcdf3(path: Path) -> DataTable:
-    from scipy.io import netcdf_file  # late: as above
-
-    with netcdf_file(path, "r", mmap=False) as file:
-        arrays = {name: np.array(variable[:]) for name, variable in file.variables.items()}
-        units = {name: item.units.decode() for name, item in file.variables.items() if hasattr(item, "units")}
-    return table_of(str(path), arrays, units)
-
-
 def _openfast(path: Path) -> DataTable:
     """OpenFAST's binary output, by its own project's reader."""
     try:
@@ -110,3 +113,104 @@ def _openfast(path: Path) -> DataTable:
     names, units = facts["attribute_names"], facts["attribute_units"]
     arrays = {name: values[:, i] for i, name in enumerate(names)}
     return table_of(str(path), arrays, dict(zip(names, units, strict=True)))
+
+
+def _read_text(source: str, text: str) -> DataTable:
+    """The columns of a text file. Raises InputError with the line where something else than a number stands."""
+    # Lines of nothing but dividers are what spreadsheets write for empty rows.
+    lines = [(i, line.strip(" ")) for i, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
+    first, divider = _first_row(source, lines)
+    head = [line for _, line in lines[:first]]
+    rows = [(i, _FORTRAN.sub("E", row)) for i, row in lines[first:] if not row.startswith(_COMMENT)]
+    if divider != "," and not any("." in row for _, row in rows):  # else a comma may stand between thousands
+        rows = [(i, row.replace(",", ".")) for i, row in rows]
+    values = _numbers(source, rows, divider)
+    comments = [line.lstrip("#%/! ") for line in head if line.startswith(_COMMENT)]
+    variable = _EXUDYN.search("\n".join(comments))
+    if variable is not None and "sensor output file" in comments[0]:
+        return table_of(source, {"time": values[:, 0], variable[1]: values[:, 1:]})
+    plain = [line for line in head if not line.startswith(_COMMENT)] or comments
+    columns = {}
+    for (name, unit), column in zip(_names(source, plain, values.shape[1], divider), values.T, strict=True):
+        if name or not np.isnan(column).all():  # a divider at the end of every line makes a column of nothing
+            while name in columns:
+                name = f"_{name}"
+            columns[name] = DataColumn(column.copy(), unit)
+    return DataTable(source, columns)
+
+
+def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
+    """Place of the first row of numbers, and what divides its fields."""
+    nearest = 0, ""
+    for place, (number, line) in enumerate(lines):
+        for divider in () if line.startswith(_COMMENT) else _DIVIDERS:
+            fields = _fields(_FORTRAN.sub("E", line), divider)
+            others = [field for field in fields if field and not _is_number(field, decimal_comma=divider != ",")]
+            if len(fields) > 1 and any(fields) and not others:
+                return place, divider
+            if others and len(fields) - len(others) > nearest[0]:
+                nearest = len(fields) - len(others), f"; line {number} has {others[0][:40]!a}"
+    if any(_is_number(line, decimal_comma=True) for _, line in lines):
+        raise InputError(f"{source}: one column of numbers; allowed: a column of times, and others beside it")
+    raise InputError(
+        f"{source}: no row of numbers in it{nearest[1]}; allowed: columns of numbers under a line of names"
+    )
+
+
+def _fields(line: str, divider: str | None) -> list[str]:
+    if divider is None:
+        return line.split()
+    return [field.strip() for field in next(csv.reader([line], delimiter=divider))]
+
+
+def _is_number(field: str, *, decimal_comma: bool) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return decimal_comma and _DECIMAL_COMMA.fullmatch(field) is not None
+    return True
+
+
+def _numbers(source: str, rows: Lines, divider: str | None) -> NDArray[np.float64]:
+    """(n, columns), NaN where a field is empty."""
+    width = len(_fields(rows[0][1], divider))
+    values = np.empty((len(rows), width))
+    for i, (number, line) in enumerate(rows):
+        fields = _fields(line, divider)
+        if len(fields) != width:
+            raise InputError(f"{source}:{number}: {len(fields)} fields, where the rows above have {width}")
+        try:
+            values[i] = [float(field or "nan") for field in fields]
+        except ValueError:
+            bad = next(j for j, field in enumerate(fields) if field and not _is_number(field, decimal_comma=False))
+            raise InputError(
+                f"{source}:{number}: {fields[bad][:40]!a} in column {bad + 1}; allowed: a number"
+            ) from None
+    return values
+
+
+def _names(source: str, head: Sequence[str], width: int, divider: str | None) -> list[tuple[str, str]]:
+    """Name and unit of each column from the last line of the head, or from the last two, where one has the units."""
+    if not head:
+        raise InputError(f"{source}: no line of names above the numbers; allowed: one such as: time [s],rotor [rad]")
+    last = _words(head[-1], divider, width)
+    units = [word.strip("[]() ") for word in last]
+    above = _words(head[-2], divider, width) if len(head) > 1 else []
+    if len(above) == len(last) and not UNITS["time"].keys().isdisjoint(unit.lower() for unit in units):
+        names = list(zip(above, units, strict=True))
+    else:
+        names = [named_unit(word) for word in last]
+    if len(names) == width - 1 and divider is not None:
+        names.append(("", ""))
+    if len(names) != width:
+        raise InputError(f"{source}: {len(names)} names in the header, {width} columns of numbers; allowed: as many")
+    return names
+
+
+def _words(line: str, divider: str | None, width: int) -> list[str]:
+    """The names in a line of the head, which may be divided otherwise than the numbers are."""
+    words = _fields(line, divider)
+    if len(words) in (width, width - 1) and divider is not None:
+        return words
+    ways = (re.split(r"\s{2,}|\t", line), _NAME_AND_UNIT.findall(line), line.split(), _fields(line, ","))
+    return next((other for other in ways if len(other) == width), words)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ _SHOWN = 12  # names that a message lists
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$|\s+/\s*(\S+)\s*$")
 
 
-@dataclass(frozen=True)
-class DataColumn:
+class DataColumn(NamedTuple):
     """A column: (n,) numbers, and the unit that the file states, "" where it states none."""
 
     values: NDArray[np.float64]
@@ -71,11 +70,7 @@ def _plain(values: Any) -> NDArray[Any]:
 
 
 def named_unit(name: str) -> tuple[str, str]:
-    """("rotor", "deg") of "rotor [deg]", "rotor (deg)" or "rotor / deg"; ("rotor", "") of "rotor".
-
-    >>> named_unit("pitch 1 [rad]"), named_unit("rates[2]")
-    (('pitch 1', 'rad'), ('rates[2]', ''))
-    """
+    """("rotor", "deg") of "rotor [deg]", "rotor (deg)" or "rotor / deg"; ("rotor", "") of "rotor"."""
     match = _UNIT.search(name)
     unit = (match[1] or match[2] or "").strip() if match else ""
     if match is None or unit.isdigit() or not name[: match.start()].strip():

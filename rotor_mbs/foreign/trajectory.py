@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import Channel, Source, read_mapping, sources
+from rotor_mbs.foreign.channels import Channel, read_mapping, sources
 from rotor_mbs.foreign.files import read_table
-from rotor_mbs.foreign.table import DataTable, table_of
+from rotor_mbs.foreign.table import table_of
 from rotor_mbs.scenario.scene import Scene
 
 Array = NDArray[np.float64]
@@ -25,14 +25,8 @@ _FEWEST = 3  # rows: fewer have no motion to be compared
 class ForeignData:
     """Samples of another program.
 
-    Attributes
-    ----------
-    source : name of the file.
-    time : (n,) s, increasing from 0 or later.
-    values : (n, channels) rad or rad/s.
-    channels : what the columns are.
-    read : a line for each channel: column, unit, and what was assumed.
-    unused : names of the columns that are no channel.
+    time, values : (n,) s, increasing from 0 or later; (n, channels) rad or rad/s, what `channels` says.
+    read, unused : a line for each channel: column, unit, and what was assumed; names of the other columns.
     wrapped : for each channel, whether whole turns are missing from it.
     digits : how many significant digits the numbers have, at most; 17 where they have all.
     """
@@ -60,41 +54,33 @@ def load_data(
     """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
     entries, group = read_mapping(columns, scene)
     table = table_of("data", data) if isinstance(data, Mapping) else read_table(data, group, scene.name)
-    return _data(table, sources(table, scene, entries))
-
-
-def _data(table: DataTable, channel_sources: Sequence[Source]) -> ForeignData:
+    channel_sources = sources(table, scene, entries)
     lengths = {source.entry.column: len(table[source.entry.column].values) for source in channel_sources}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
         raise InputError(f"{table.source}: columns of different lengths: {shown}; allowed: a row for every time")
-    arrays = [_values(table, source) for source in channel_sources]
-    time = arrays[0]
-    _refuse_wrong_times(table.source, time)
-    used = {source.entry.column for source in channel_sources}
+    arrays: list[Array] = []
+    for source in channel_sources:
+        values = table[source.entry.column].values
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"{table.source}: column {source.entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of "
+                f"{len(values)}; allowed: finite numbers"
+            )
+        si_values: Array = source.entry.sign * (values + source.entry.offset) * source.factor
+        arrays.append(np.unwrap(si_values) if source.entry.wrapped else si_values)
+    _refuse_wrong_times(table.source, arrays[0])
     return ForeignData(
         table.source,
-        time,
+        arrays[0],
         np.stack(arrays[1:], axis=1),
         tuple(source.channel for source in channel_sources[1:]),
         tuple(str(source) for source in channel_sources),
-        tuple(name for name in table.columns if name not in used),
+        tuple(name for name in table.columns if name not in lengths),
         tuple(source.entry.wrapped for source in channel_sources[1:]),
         max(_digits(table[source.entry.column].values) for source in channel_sources[1:]),
     )
-
-
-def _values(table: DataTable, source: Source) -> Array:
-    """In s, rad or rad/s. Raises InputError where a number is not finite."""
-    values = table[source.entry.column].values
-    bad = np.flatnonzero(~np.isfinite(values))
-    if len(bad):
-        raise InputError(
-            f"{table.source}: column {source.entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of {len(values)}; "
-            "allowed: finite numbers"
-        )
-    si_values: Array = source.entry.sign * (values + source.entry.offset) * source.factor
-    return np.unwrap(si_values) if source.entry.wrapped else si_values
 
 
 def _digits(values: Array) -> int:

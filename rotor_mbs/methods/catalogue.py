@@ -1,7 +1,5 @@
-"""All methods by the names used everywhere: built-in ones, and those of installed packages (entry points).
-
-A model's code is imported when one of its methods is first used; its engine, when a solver is built.
-"""
+"""All methods by name: built-in ones, and those of installed packages (entry points). A model's code is imported when
+one of its methods is first used; its engine, when a solver is built."""
 
 from __future__ import annotations
 

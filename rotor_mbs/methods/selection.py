@@ -1,7 +1,4 @@
-"""Which method to take for a scene where none is named, and why, in one line.
-
-The rule is drawn from the stability suite (`rotor-mbs stability`): what holds on which family of scenes.
-"""
+"""Which method to take for a scene where none is named, and why; the rule is drawn from the stability suite."""
 
 from __future__ import annotations
 

@@ -1,9 +1,5 @@
-"""A time limit that a run ends by itself, with what it reached.
-
-An engine that looks for signals (Exudyn at every step, anything in Python) is interrupted by an exception; one that
-would lose its samples that way asks `is_over` between steps instead, inside `polled`. What does neither is ended from
-outside by the runner and leaves nothing. Needs a main thread and SIGALRM (not Windows); elsewhere only asking works.
-"""
+"""A time limit that a run ends by itself, with what it reached: by an exception, or inside `polled` by asking `is_over`
+between steps, where samples would be lost. The signal needs a main thread and SIGALRM (not Windows)."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
+from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.trajectory import load_data
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
@@ -60,12 +61,14 @@ def compare(
     >>> import rotor_mbs as rm
     >>> scene = rm.scene("paper/fig03")
     >>> run = rm.run(scene, "lagrange/dop853")
-    >>> comparison = rm.compare_data({"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}, scene)
+    >>> comparison = rm.compare({"t": run.time, "rotor_deg": np.degrees(run.angles[:, 0])}, scene)
     >>> comparison.status, comparison.verdict.read[1]
     ('ok', "rotor = 'rotor_deg' [deg]")
-    >>> rm.compare_data({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
+    >>> rm.compare({"t": run.time, "rotor": np.degrees(run.angles[:, 0])}, scene).likely
     ('rotor: degrees taken as rad',)
     """
+    if isinstance(scene, list | tuple):
+        raise InputError("compare: data and a scene; allowed: rotor_mbs.run(scene, methods) for methods of one scene")
     scene = scene_of(scene)
     study = compare_with_reference(load_data(data, scene, columns), scene, tolerance)
     verdict = study.verdict
@@ -74,7 +77,7 @@ def compare(
 
 @dataclass(frozen=True)
 class DataComparison:
-    """A comparison: see `rotor_mbs.compare_data`. Prints as a table.
+    """A comparison: see `rotor_mbs.compare`. Prints as a table.
 
     Attributes
     ----------

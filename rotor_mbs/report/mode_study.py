@@ -219,6 +219,25 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
             if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
                 caption = "Damping ratios and growth rates"
                 pictures.append(picture(plots.damping(), f"{name}-damping", caption))
+    turning: list[Picture] = []
+    multiplier_tables = []
+    table = modes.floquet
+    if table is not None:
+        if len(table.speeds) > 1 and np.isfinite(table.largest).any():
+            caption = (
+                "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
+            )
+            turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption))
+        if modes.chart is not None:
+            caption = "Stability chart: growth over a turn under gravity; a line bounds what is stable"
+            turning.append(picture(plots.chart(), f"{name}-chart", caption))
+        rows: list[Row] = []
+        for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
+            cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
+            numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
+            rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
+        head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
+        multiplier_tables = [PageTable(f"{modes.scene}: multipliers", head, rows, (0, 1, 2, 3, 4))]
     return {
         "id": name,
         "name": modes.scene,
@@ -231,7 +250,7 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
         "rest": Section(tables=[] if rest is None else _tables(rest, 0, f"{modes.scene}, at rest")),
         "campbell": Section(pictures, legend),
         "fastest": fastest,
-        "turning": _turning(modes, name),
+        "turning": Section(turning, (), multiplier_tables),
     }
 
 
@@ -262,23 +281,3 @@ def _shown(value: float, digits: int) -> str:
     if not math.isfinite(value):
         return NOTHING
     return number(0.0 if abs(value) < 1e-12 else value, digits)
-
-
-def _turning(modes: SceneModes, name: str) -> Section:
-    table = modes.floquet
-    if table is None:
-        return Section()
-    drawn: list[Picture] = []
-    if len(table.speeds) > 1 and np.isfinite(table.largest).any():
-        caption = "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
-        drawn.append(picture(ModePlots(modes).multipliers(), f"{name}-multipliers", caption))
-    if modes.chart is not None:
-        caption = "Stability chart: growth over a turn under gravity; a line bounds what is stable"
-        drawn.append(picture(ModePlots(modes).chart(), f"{name}-chart", caption))
-    rows: list[Row] = []
-    for i, (speed, largest) in enumerate(zip(table.speeds.tolist(), table.largest.tolist(), strict=True)):
-        cell = TableCell(_shown(largest, 7), "bad" if table.stable[i] == 0 else "", note=table.messages[i])
-        numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
-        rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
-    head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
-    return Section(drawn, (), [PageTable(f"{modes.scene}: multipliers", head, rows, (0, 1, 2, 3, 4))])

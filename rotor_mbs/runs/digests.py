@@ -20,7 +20,7 @@ from rotor_mbs.runs import files
 from rotor_mbs.runs.files import DIGESTS, plain
 
 ATTRIBUTES = "attributes"
-_UNFILLED = "attributes of "
+_COMPUTED = "attributes of "
 
 # What the library writes and changes by itself.
 _NOT_COVERED = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
@@ -54,11 +54,11 @@ def attributes_digest(attributes: Mapping[str, Any]) -> str:
 
 
 def seal(group: Any, later: Collection[str] = ()) -> None:
-    """Store the digests of a group; of the datasets `later`, which are filled by others, those of their attributes."""
+    """Store the digests of a group; of the datasets `later`, which are computed later, those of their attributes."""
     sums = {ATTRIBUTES: attributes_digest(group.attrs)}
     for name, item in group.items():
         if name in later:
-            sums[unfilled(name)] = attributes_digest(item.attrs)
+            sums[label_of(name)] = attributes_digest(item.attrs)
         elif not files.is_group(item) and not files.is_dimension_only(item):
             sums[name] = _digest_of(item)
     group.attrs[DIGESTS] = json.dumps(sums)
@@ -82,7 +82,7 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
     """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
 
     "digests" where it has none. Links, and arrays that cannot be read, count too. with_columns: the attributes of
-    datasets that are filled later, too, which takes most of the time.
+    datasets that are computed, too, which takes most of the time.
     """
     try:
         known = stored_digests(group.attrs)
@@ -92,9 +92,9 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
         return [DIGESTS]
     sums = {ATTRIBUTES: attributes_digest(group.attrs)}
     for name in group:
-        is_unfilled = unfilled(name) in known
-        label = unfilled(name) if is_unfilled else name
-        if is_unfilled and not with_columns:
+        is_computed = label_of(name) in known
+        label = label_of(name) if is_computed else name
+        if is_computed and not with_columns and not files.is_link(group, name):
             sums[label] = known[label]
             continue
         sums[label] = ""
@@ -103,7 +103,7 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
             if files.is_group(item) or files.is_dimension_only(item):
                 del sums[label]
             else:
-                sums[label] = attributes_digest(item.attrs) if is_unfilled else _digest_of(item)
+                sums[label] = attributes_digest(item.attrs) if is_computed else _digest_of(item)
     return [name for name in {**known, **sums} if known.get(name) != sums.get(name)]
 
 
@@ -115,11 +115,11 @@ def stored_digests(attributes: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-def unfilled(name: str) -> str:
+def label_of(name: str) -> str:
     """What the digest of a dataset's attributes alone is called."""
-    return f"{_UNFILLED}{name}"
+    return f"{_COMPUTED}{name}"
 
 
-def unfilled_in(digests: Mapping[str, str]) -> list[str]:
+def computed_in(digests: Mapping[str, str]) -> list[str]:
     """The datasets whose attributes alone are covered."""
-    return [name.removeprefix(_UNFILLED) for name in digests if name.startswith(_UNFILLED)]
+    return [name.removeprefix(_COMPUTED) for name in digests if name.startswith(_COMPUTED)]

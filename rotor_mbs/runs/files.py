@@ -120,7 +120,10 @@ def open_file(path: Path) -> Iterator[Any]:
         if written_by != FORMAT:
             raise StoreError(f"{path}: its attribute format is {written_by!r}; allowed: a file that rotor-mbs wrote")
         if version != FORMAT_VERSION:
-            raise StoreError(f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}")
+            raise StoreError(
+                f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: the same command "
+                "with another output file, which computes the runs anew"
+            )
         yield file
 
 
@@ -259,12 +262,21 @@ def dimensions_of(dataset: Any) -> list[str]:
     return [CHARACTERS if name.startswith(_WITHOUT_VALUES) else name for name in names]
 
 
-def groups_in(file: Any) -> Iterator[Any]:
-    """An open file and every group below it. Raises StoreError at a link."""
-    yield file
-    for _, item in members(file):
+def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
+    """A group and every one below it. Raises StoreError at a link, and at a second name of a group."""
+    seen = set() if seen is None else seen
+    if group in seen:
+        raise StoreError(f"{group.file.filename}: {group.name} is another name of a group; allowed: one name of each")
+    seen.add(group)
+    yield group
+    for _, item in members(group):
         if is_group(item):
-            yield from groups_in(item)
+            yield from groups_in(item, seen)
+
+
+def is_link(group: Any, name: str) -> bool:
+    """Whether a member of a group stands elsewhere, in this file or another one."""
+    return not isinstance(group.get(name, getlink=True), h5py.HardLink)
 
 
 def is_group(item: Any) -> bool:

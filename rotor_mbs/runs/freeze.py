@@ -15,7 +15,7 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.digests import array_digest
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import OpenResults, open_results
-from rotor_mbs.runs.results import Asked, fit, repeat, runs_table, scene_table
+from rotor_mbs.runs.results import Asked, extend_file, repeat, runs_table, scene_table
 from rotor_mbs.runs.table import blank_rows
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import code_of
@@ -41,7 +41,7 @@ def write_references(
     """
     target.unlink(missing_ok=True)
     tables = [scene_table([asked], arrays=arrays.keys() & set(KEPT)) for asked, _, arrays in references]
-    file = fit(target, [runs_table([asked for asked, _, _ in references]), *tables])
+    file = extend_file(target, [runs_table([asked for asked, _, _ in references]), *tables])
     for asked, facts, arrays in references:
         place = file.place(asked.run)
         row = blank_rows(1, place.row)

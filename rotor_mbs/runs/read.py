@@ -206,7 +206,7 @@ def _scenes(stored: TableFile, file: IO[bytes], verify: bool, only: Collection[s
     if RUNS not in stored.groups:
         return
     runs = stored.table(RUNS)
-    file.seek(runs.filled["status"].offset)
+    file.seek(runs.computed["status"].offset)
     statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
     by_scene: dict[str, list[StoredRun]] = {str(scene): [] for scene in runs.known["scene"]}
     for i, run in enumerate(runs.runs.tolist()):

@@ -98,7 +98,7 @@ class Asked:
     versions: Mapping[str, str] | None = None
 
     @property
-    def is_read(self) -> bool:
+    def is_shipped(self) -> bool:
         """Whether it is read from a shipped file and not computed."""
         return self.versions is not None and "frozen_with" in self.versions
 
@@ -171,10 +171,10 @@ def arrays_of(run: Asked) -> dict[str, Column]:
 def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) -> Table:
     """The table of the arrays of one scene's runs. arrays: names of those that are stored, by default all."""
     scene = runs[0].scene
-    filled = {
+    computed = {
         name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
     }
-    used = {"time"}.union(*(column.dimensions for column in filled.values()))
+    used = {"time"}.union(*(column.dimensions for column in computed.values()))
     values = scale_values(scene)
     scales = {
         name: (Column((name,), scale.units, scale.long_name), values[name])
@@ -193,7 +193,7 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
     }
     labels = {"coordinate": scene.coordinate_labels} if "coordinate" in used else {}
     repeated = {name: _COMPUTED[name] for name in REPEATED}
-    return Table(scene.name, [run.method for run in runs], {}, repeated | filled, scales, labels, attributes)
+    return Table(scene.name, [run.method for run in runs], {}, repeated | computed, scales, labels, attributes)
 
 
 def results_tables(asked: Sequence[Asked]) -> list[Table]:
@@ -248,7 +248,7 @@ class TableFile:
         others = arrays.place(arrays.runs.tolist().index(label))
         offsets = {REPEATED.get(name, name): offset for name, offset in others.offsets.items()}
         kinds = [(REPEATED.get(name, name), others.row[name]) for name in others.row.names or ()]
-        for name, column in arrays.filled.items():
+        for name, column in arrays.computed.items():
             if label == REFERENCE and not column.is_of_runs:
                 offsets[name] = column.offset
                 kinds.append((name, np.dtype((column.kind, column.shape))))
@@ -259,7 +259,9 @@ class TableFile:
         """What the design says of a row."""
         return {name: values[row] for name, values in self.table(group).known.items()}
 
-    def missing(self, asked: Sequence[Asked], time_limit_s: float) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
+    def take_back_missing(
+        self, asked: Sequence[Asked], time_limit_s: float
+    ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
         """The runs that are to be computed, and those that are stored with their status and message.
 
         To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
@@ -275,7 +277,7 @@ class TableFile:
             place = self.place(run.run)
             row = place.read()
             status = STATUSES[row["status"][0]] if place.is_stored else ""
-            is_over = status == "timed_out" and not run.is_read and not row["time_limit_s"][0] >= time_limit_s
+            is_over = status == "timed_out" and not run.is_shipped and not row["time_limit_s"][0] >= time_limit_s
             if status and not is_over and f"{run.scene.name}/{REFERENCE}" not in missing:
                 kept.append((run, status, text_of(row["message"][0])))
             else:
@@ -284,7 +286,7 @@ class TableFile:
         return list(missing.values()), kept
 
 
-def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = ()) -> TableFile:
+def extend_file(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = ()) -> TableFile:
     """Make the file hold the rows of `wanted` tables, beside those that it has.
 
     Where it has all of them as they are asked for, nothing is written. Else a file is laid out beside it, the rows that
@@ -318,7 +320,7 @@ def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]
     for group in dict.fromkeys((*stored, *new)):
         before, made = stored.get(group), new.get(group)
         base = made or stored[group]
-        if "crc32" not in base.filled:
+        if "crc32" not in base.computed:
             continue
         rows = {run: row for run, row in _known_rows(before).items() if (group, run) not in dropped}
         asked = _known_rows(made)
@@ -327,7 +329,7 @@ def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]
         if rows:
             runs = sorted(rows, key=_order) if group == RUNS else list(rows)
             known = {name: (column, [rows[run][name] for run in runs]) for name, (column, _) in base.known.items()}
-            merged[group] = replace(base, runs=runs, known=known, filled=_joined(before, made))
+            merged[group] = replace(base, runs=runs, known=known, computed=_joined(before, made))
     methods: dict[str, list[str]] = {}  # by scene
     if RUNS in merged:
         for run, scene in zip(merged[RUNS].runs, merged[RUNS].known["scene"][1], strict=True):
@@ -336,12 +338,12 @@ def fit(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]
         before, made = stored.get(scene), new.get(scene)
         if before is not None and made is not None and before.attributes["scene_hash"] != made.attributes["scene_hash"]:
             before = None
-        merged[scene] = replace(made or stored[scene], runs=own, filled=_joined(before, made))
+        merged[scene] = replace(made or stored[scene], runs=own, computed=_joined(before, made))
     is_same = merged.keys() == stored.keys() and all(
-        list(made.runs) == list(stored[group].runs) and made.filled.keys() == stored[group].filled.keys()
+        list(made.runs) == list(stored[group].runs) and made.computed.keys() == stored[group].computed.keys()
         for group, made in merged.items()
     )
-    if is_same and len(kept) == sum(len(made.runs) for made in stored.values() if "crc32" in made.filled):
+    if is_same and len(kept) == sum(len(made.runs) for made in stored.values() if "crc32" in made.computed):
         return old
     places = [(group, run, old.place(run, group)) for group, run in kept]
     rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
@@ -380,7 +382,7 @@ def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
 
 def _joined(before: Table | None, made: Table | None) -> dict[str, Column]:
     """The computed columns of both, the checksum last."""
-    columns = {**(before.filled if before else {}), **(made.filled if made else {})}
+    columns = {**(before.computed if before else {}), **(made.computed if made else {})}
     checksum = columns.pop("crc32", None)
     return columns if checksum is None else {**columns, "crc32": checksum}
 
@@ -402,7 +404,7 @@ def _write_tables(path: Path, tables: Sequence[Table], rows: Sequence[tuple[str,
         file = TableFile(temporary)
         given = {(group, run): values for group, run, values in rows}
         for made in tables:
-            for run in made.runs if "crc32" in made.filled else ():
+            for run in made.runs if "crc32" in made.computed else ():
                 place = file.place(str(run), made.group)
                 values = given.get((made.group, str(run)))
                 if values is None:
@@ -419,7 +421,7 @@ def _description(tables: Sequence[Table]) -> dict[str, object]:
     scenes = set(runs.known["scene"][1]) if runs is not None else set()
     count = len(runs.runs) if runs is not None else 0
     summary = f"{count} runs of {len(scenes)} scenes: trajectories, energies, status and errors of each"
-    others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.filled)
+    others = sorted(made.group for made in tables if made.group != RUNS and "crc32" in made.computed)
     if others:
         summary += f"; tables {', '.join(others)}"
     return {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}

@@ -26,7 +26,7 @@ class Task:
     label, method : in a line of progress.
     place : where the rows are.
     reference : where the row is that must be stored before; None where there is none.
-    limit_s : after which its process is ended, where it has not ended itself.
+    kill_after_s : after which its process is ended, where it has not ended itself.
     work : roughly how much there is to compute.
     """
 
@@ -34,7 +34,7 @@ class Task:
     method: str
     place: Place
     reference: Place | None = None
-    limit_s: float = float("inf")
+    kill_after_s: float = float("inf")
     work: float = 1.0
 
     @property
@@ -87,7 +87,7 @@ def compute(pool: TaskPool, perform: Callable[[T], Rows], tasks: Iterable[T]) ->
         What a task raised of these.
     """
     work = partial(perform_and_store, perform) if pool.shares_disk else perform
-    for end in run_in(pool, work, tasks, lambda task: task.limit_s, lambda task: task.split()):
+    for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
         task = end.task
         if isinstance(end.error, InputError | MethodRefusal | StoreError):
             raise end.error

@@ -103,8 +103,8 @@ def sweep_table(
     }
     scales[CHARACTERS] = Column((CHARACTERS,), "1", ""), np.empty(MESSAGE_LENGTH, np.int8)
     labels = {"coordinate": sweep.base.coordinate_labels} if "coordinate" in used else {}
-    filled = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
-    return Table("", runs, known, filled, scales, labels, attributes or {}, flags)
+    computed = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
+    return Table("", runs, known, computed, scales, labels, attributes or {}, flags)
 
 
 @contextmanager
@@ -117,11 +117,11 @@ def open_sweep(
     ----------
     attributes : of the file; `sweep_identity` is a hash of all that the design says.
     time_limit_s : runs that a shorter limit ended are missing.
-    fresh : whether all runs are.
+    fresh : whether all runs are to be computed; what is stored of one stays until it is.
 
     Returns
     -------
-    Where its runs are, and (runs,) their statuses, MISSING where none is stored.
+    Where its runs are, and (runs,) their statuses, MISSING where they are to be computed.
 
     Raises
     ------
@@ -132,7 +132,8 @@ def open_sweep(
     """
     with writing(output):
         path = output.resolve() if output.is_symlink() else output  # a link stays one
-        if not path.exists():
+        is_new = not path.exists()
+        if is_new:
             lay_out(path, [table], attributes)
         with files.open_file(path) as file, files.reading(path):
             if files.plain(file.attrs.get(IDENTITY)) != attributes[IDENTITY]:
@@ -142,16 +143,16 @@ def open_sweep(
             stored = stored_table(file)
         place, marked = stored.place(number=int(stored.runs[0]) if len(stored.runs) else 0), stored.statuses()
         statuses = place.stored(marked)
-        if fresh:
-            statuses[:] = MISSING
-        limit = stored.filled["time_limit_s"]
+        limit = stored.computed["time_limit_s"]
         limits = np.memmap(path, limit.kind, "r", limit.offset, limit.shape) if len(marked) else np.empty(0)
         statuses[(statuses == code_of("timed_out")) & (limits < time_limit_s)] = MISSING
         place.mark_missing(np.flatnonzero((marked != MISSING) & (statuses == MISSING)).tolist())  # readers see it, too
+        if fresh:
+            statuses[:] = MISSING
         try:
             yield place, statuses
         finally:
-            if (statuses == MISSING).all():
+            if is_new and (statuses == MISSING).all():
                 path.unlink(missing_ok=True)  # a sweep that stored nothing leaves nothing
 
 
@@ -214,8 +215,8 @@ class StoredSweep:
         table = self._table
         if name == "run":
             return table.runs
-        if name in table.filled:
-            stored = table.filled[name]
+        if name in table.computed:
+            stored = table.computed[name]
             if not all(stored.shape):
                 return np.empty(stored.shape, stored.kind)
             with files.reading(self._path, name):

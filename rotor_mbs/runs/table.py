@@ -57,7 +57,7 @@ class Table:
     group : where it stands in the file; "" for the root.
     runs : (rows,) the scale `run`: texts that tell the rows apart, or their numbers.
     known : by name, column and values of what the design says of each row.
-    filled : columns that are computed. One without the dimension `run` belongs to the reference.
+    computed : columns that are computed. One without the dimension `run` belongs to the reference.
     scales : by name, column and values of the other dimensions.
     labels : texts for the entries of a scale, by its name.
     attributes : of the group.
@@ -67,7 +67,7 @@ class Table:
     group: str
     runs: Sequence[str] | NDArray[np.int64]
     known: Mapping[str, tuple[Column, Any]]
-    filled: Mapping[str, Column]
+    computed: Mapping[str, Column]
     scales: Mapping[str, tuple[Column, NDArray[Any]]] = field(default_factory=dict)
     labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
     attributes: Mapping[str, object] = field(default_factory=dict)
@@ -79,9 +79,9 @@ class Table:
         lengths = {name: len(values) for name, (_, values) in self.scales.items()}
         shapes = {
             name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
-            for name, column in self.filled.items()
+            for name, column in self.computed.items()
         }
-        return np.dtype([(name, column.kind, shapes[name]) for name, column in self.filled.items()])
+        return np.dtype([(name, column.kind, shapes[name]) for name, column in self.computed.items()])
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Place:
     row: np.dtype[np.void]
 
     def write(self, first: int, rows: Rows) -> None:
-        """Store the rows from number `first` on, their statuses last.
+        """Store the rows from number `first` on, their statuses last; meanwhile they are missing.
 
         Raises
         ------
@@ -115,6 +115,9 @@ class Place:
         with saving(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: is another file by now")
+            for name, status in statuses.items():
+                file.seek(self.offsets[name] + first - self.first)
+                file.write(np.full(len(status), MISSING, np.int8).data)
             for name, values in columns.items():
                 file.seek(self.offsets[name] + (first - self.first) * self.row[name].itemsize)
                 file.write(np.ascontiguousarray(values).data)
@@ -271,16 +274,16 @@ def _put_table(file: Any, table: Table) -> None:
             codes = np.arange(len(table.flags[name]), dtype=np.int8)
             files.put_attributes(dataset, {"flag_values": codes, "flag_meanings": " ".join(table.flags[name])})
     row = table.row_type
-    for name, column in table.filled.items():
+    for name, column in table.computed.items():
         kind = row[name].base
         shape = (len(table.runs), *row[name].shape) if "run" in column.dimensions else row[name].shape
         dataset = files.put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
         if name == "status":
             files.put_attributes(dataset, STATUS_FLAGS)
-    of_reference = [name for name, column in table.filled.items() if "run" not in column.dimensions]
+    of_reference = [name for name, column in table.computed.items() if "run" not in column.dimensions]
     if of_reference:
         files.put_attributes(group, {_OF_REFERENCE: of_reference})
-    digests.seal(group, later=table.filled.keys())
+    digests.seal(group, later=table.computed.keys())
 
 
 # Reading
@@ -305,7 +308,7 @@ class StoredTable:
     runs : (rows,) texts or numbers of the rows.
     known : by name, the values of scales and of what the design says of each row.
     labels : texts for the entries of a scale.
-    filled : the computed columns by name, in the order of the checksum.
+    computed : the computed columns by name, in the order of the checksum.
     attributes : of the group.
     """
 
@@ -315,16 +318,16 @@ class StoredTable:
     runs: NDArray[Any]
     known: Mapping[str, NDArray[Any]]
     labels: Mapping[str, Sequence[str]]
-    filled: Mapping[str, StoredColumn]
+    computed: Mapping[str, StoredColumn]
     attributes: Mapping[str, Any]
 
     def statuses(self) -> NDArray[np.int8]:
         """(rows,) as they stand in the file now."""
-        return np.fromfile(self.path, np.int8, len(self.runs), offset=self.filled["status"].offset)
+        return np.fromfile(self.path, np.int8, len(self.runs), offset=self.computed["status"].offset)
 
     def place(self, row: int = 0, number: int | None = None) -> Place:
         """Where the rows from `row` on are; `number` is what the checksum of the first begins with."""
-        columns = {name: stored for name, stored in self.filled.items() if stored.is_of_runs}
+        columns = {name: stored for name, stored in self.computed.items() if stored.is_of_runs}
         kinds = np.dtype([(name, stored.kind, stored.shape[1:]) for name, stored in columns.items()])
         offsets = {name: stored.offset + row * kinds[name].itemsize for name, stored in columns.items()}
         return Place(self.path, self.inode, row if number is None else number, offsets, kinds)
@@ -334,32 +337,43 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
     _refuse_changes(item, group)
-    filled_names = digests.unfilled_in(digests.stored_digests(item.attrs))
+    computed_names = digests.computed_in(digests.stored_digests(item.attrs))
     attributes = files.attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
     known: dict[str, NDArray[Any]] = {}
     labels: dict[str, Sequence[str]] = {}
-    filled: dict[str, StoredColumn] = {}
+    computed: dict[str, StoredColumn] = {}
     for name, dataset in item.items():
         if files.is_group(dataset):
             continue
-        if name in filled_names:
+        if name in computed_names:
             if dataset.shape is None or dataset.dtype.kind not in "fiuS":
                 raise StoreError(f"{path}: {dataset.name} is no array of numbers or characters")
             offset = dataset.id.get_offset()
             if offset is None and dataset.size:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
-            filled[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
+            computed[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
         elif name != files.CHARACTERS:
             known[name] = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
             if "labels" in dataset.attrs:
                 labels[name] = files.plain(dataset.attrs["labels"])
     runs = known.pop("run")
-    return StoredTable(path, path.stat().st_ino, group, runs, known, labels, filled, attributes)
+    return StoredTable(path, path.stat().st_ino, group, runs, known, labels, computed, attributes)
 
 
-def _refuse_changes(item: Any, group: str) -> None:
-    changed = digests.damages_of(item, with_columns=False)
+def refuse_changed_layout(path: Path) -> None:
+    """Raises StoreError where what is said of a table, its units too, is not what was laid out.
+
+    Reading a table compares all of this but the attributes of computed columns, which take most of the time.
+    """
+    groups = table_groups(path)
+    with files.open_file(path) as file, files.reading(path):
+        for group in groups:
+            _refuse_changes(file[group] if group else file, group, with_columns=True)
+
+
+def _refuse_changes(item: Any, group: str, *, with_columns: bool = False) -> None:
+    changed = digests.damages_of(item, with_columns=with_columns)
     if changed:
         place = f"{item.file.filename}: {group or 'file'}"
         raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")
@@ -375,9 +389,9 @@ def as_table(file: Any, group: str) -> Table:
     known: dict[str, tuple[Column, NDArray[Any]]] = {}
     for name, values in stored.known.items():
         (scales if columns[name].dimensions == (name,) else known)[name] = columns[name], values
-    filled = {name: columns[name] for name in stored.filled}
+    computed = {name: columns[name] for name in stored.computed}
     attributes = {name: value for name, value in stored.attributes.items() if group}
-    return Table(group, stored.runs.tolist(), known, filled, scales, stored.labels, attributes)
+    return Table(group, stored.runs.tolist(), known, computed, scales, stored.labels, attributes)
 
 
 def columns_of(group: Any) -> dict[str, Column]:

@@ -1,8 +1,5 @@
-"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers. All that every model gets.
-
-A key of the scene file is one field of Scene or Blade, which says what its value may be, its unit, and which part of a
-scene it is. Reading with all errors, the hash, the keys of sweeps, units and the written file follow from the fields.
-"""
+"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers; all that every model gets. A key of
+the scene file is one field, from which reading, hash, keys of sweeps, units and the written file follow."""
 
 from __future__ import annotations
 
@@ -183,13 +180,8 @@ _SETTINGS = keys.dict_of(keys.NUMBER_OR_TEXT, "a table of methods' settings, suc
 
 @dataclass(frozen=True, slots=True)
 class Blade:
-    """One rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis.
-
-    mass            kg, > 0
-    centre_of_mass  (3,) m
-    inertia         (6,) kg m², tensor elements xx yy zz xy xz yz about the centre of mass (xy = -∫xy dm)
-    tip             (3,) m, the point whose path is drawn
-    """
+    """One rigid blade, in its own frame: origin on the shaft axis, z along the pitch axis. `inertia` has the elements
+    xx yy zz xy xz yz of its tensor about the centre of mass (xy = -∫xy dm); `tip` is the point whose path is drawn."""
 
     mass: float = file_key("mass", keys.POSITIVE, "kg")
     centre_of_mass: tuple[float, float, float] = file_key("centre_of_mass", _POINT, "m", ": z along the pitch axis")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,16 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scenarios_folder, sweeps_folder
 from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, where, wrong
-from rotor_mbs.scenario.scene import OUTPUT_NAMES, Scene, scene_tables, unit_of
+from rotor_mbs.scenario.scene import (
+    OUTPUT_NAMES,
+    Scene,
+    copied,
+    put_value,
+    scene_fields,
+    scene_from_tables,
+    scene_tables,
+    unit_of,
+)
 from rotor_mbs.scenario.sweep_design import DRAWN, Axis, Design
 from rotor_mbs.scenario.toml_file import (
     KeyPath,
@@ -26,7 +37,6 @@ from rotor_mbs.scenario.toml_file import (
     shown_path,
     toml_lines,
 )
-from rotor_mbs.scenario.variants import Variants
 
 MAX_COUNT = 10**15  # values of a range; too many runs are reported where they are counted
 MAX_ROWS = 10_000_000
@@ -151,6 +161,60 @@ class SweepTable:
             raise TableError(problems)
 
 
+# Field by table and name of the key.
+_START = {tuple(field.metadata["key"].split(".")): field.name for field in scene_fields("start")}
+
+# Rotors that are kept validated: more than a chunk of runs, or an axis of a usual map, has.
+MAX_ROTORS = 512
+
+
+class Variants:
+    """The scenes of a sweep: `tables` of the base, with a number put in at each of the `varied` keys. A scene is read
+    for each rotor, of which most sweeps have few, then initial states are put in."""
+
+    def __init__(self, name: str, tables: dict[str, Any], varied: Sequence[str]) -> None:
+        self.keys = tuple(varied)
+        self._name = name
+        self._tables = tables
+        self._paths = [parse_key(key) for key in varied]
+        self._rotors: dict[tuple[float, ...], Scene] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Once a scene was made, a rotor common to all runs is pickled, too: the receiver need not read it."""
+        return self.__dict__ | {"_rotors": self._rotors if all(map(_is_of_start, self._paths)) else {}}
+
+    def scene(self, values: Sequence[float]) -> Scene:
+        pairs = list(zip(self._paths, values, strict=True))
+        rotor_numbers = tuple(value for path, value in pairs if not _is_of_start(path))
+        if rotor_numbers not in self._rotors:
+            if len(self._rotors) >= MAX_ROTORS:
+                self._rotors.clear()
+            self._rotors[rotor_numbers] = self._read(values)
+        rotor = self._rotors[rotor_numbers]
+        start = {name: list(getattr(rotor, name)) for name in _START.values()}
+        for path, value in pairs:
+            if _is_of_start(path):  # the rotor was read with these keys: each ends in a valid index
+                start[_START[path[:2]]][int(path[2])] = value
+        changes: dict[str, Any] = {name: tuple(numbers) for name, numbers in start.items()}
+        scene = dataclasses.replace(rotor, **changes)
+        rates = zip(scene.initial_rates[1:], scene.blades, strict=True)
+        if any(rate and not blade.has_pitch_inertia for rate, blade in rates) or not all(
+            abs(number) <= keys.MAX_NUMBER for number in (*scene.initial_angles, *scene.initial_rates)
+        ):
+            return self._read(values)  # which raises the error that says so
+        return scene
+
+    def _read(self, values: Sequence[float]) -> Scene:
+        tables = copied(self._tables)
+        for path, value in zip(self._paths, values, strict=True):
+            put_value(tables, path, value)
+        return scene_from_tables(tables, self._name)
+
+
+def _is_of_start(path: KeyPath) -> bool:
+    return path[:2] in _START
+
+
 @dataclass(frozen=True)
 class Sweep:
     """A base scene and how it is varied."""
@@ -253,12 +317,6 @@ def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | No
     if design.count > MAX_ROWS:
         raise at("axis", [f"{design.count:,} runs; allowed: at most {MAX_ROWS:,}"])
     sweep = Sweep(table, base, design, text, path)
-    _check_rows(sweep)
-    return sweep
-
-
-def _check_rows(sweep: Sweep) -> None:
-    """Validates the scenes of the ends of every axis, or of every row where that is needed; raises InputError."""
     problems: dict[str, None] = {}
     for i, variants, row in _rows_to_check(sweep):
         try:
@@ -272,6 +330,7 @@ def _check_rows(sweep: Sweep) -> None:
                 break
     if problems:
         raise InputError(list(problems))
+    return sweep
 
 
 def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, ...]]]:

@@ -1,8 +1,6 @@
-"""Balances of momentum, from a run's own samples: independent of its equations of motion and of its energies.
-
-About the shaft: L(t) - L(0) = ∫ (torque + moment of the weights - damping) dt, from angles and rates alone. In space:
-p(t) - p(0) = ∫ (force of the shaft's bearing + weights) dt, where the run has that force.
-"""
+"""Balances of momentum, from a run's own samples, independent of its equations of motion and energies: about the shaft
+L(t) - L(0) = ∫ (torque + moment of the weights - damping) dt; in space p(t) - p(0) = ∫ (force of the bearing + weights)
+dt."""
 
 from __future__ import annotations
 
@@ -36,9 +34,7 @@ class Balance(NamedTuple):
 
 def angular_balance(scene: Scene, run: Trajectory) -> Balance | None:
     """About the shaft, relative to the largest momentum, the torque's impulse, and what the weights give in a fall.
-
-    Returns None where the samples do not resolve the motion, or are too few to show what they leave open.
-    """
+    None where the samples do not resolve the motion, or are too few to show what they leave open."""
     if len(run.time) < max(_POINTS_WITH_SLOPES) or not _is_resolved(scene, run):
         return None
     angles, rates, step = run.angles, run.rates, run.time[1]

@@ -194,11 +194,8 @@ def energy_slack(scene: Scene, run: Trajectory) -> float:
 
 
 def energy_conditioning(scene: Scene, run: Trajectory) -> float:
-    """By how much the energy magnifies round-off of the state, beyond the ordinary; at least 1.
-
-    Near a pitch of π/2 the rates grow like 1/√share while the energy stays: the terms that sum up to it are 1/√share
-    times larger than it. A pitch that moves less than a right angle between samples is examined between them, too.
-    """
+    """By how much the energy magnifies round-off of the state, at least 1: near a pitch of π/2 its terms are 1/√share
+    larger than it. A pitch that moves less than a right angle between samples is examined between them, too."""
     steps = np.abs(np.diff(run.angles[:, 1:], axis=0)).max(initial=0.0)
     shares = rotor_inertia_shares(scene, run.angles)
     if steps < 0.5 * np.pi:
@@ -247,10 +244,8 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
 
 @functools.lru_cache(maxsize=512)
 def _shaft_inertia_forms(blade: Blade) -> tuple[Sequence[float], Sequence[float]]:
-    """Coefficients of s², c², s c (s, c of the pitch) in S and in the inertia about the shaft (pitches fixed), kg m².
-
-    In exact arithmetic until the end: for a point mass the first vanishes, whose rounding is not inertia.
-    """
+    """Coefficients of s², c², s c (of the pitch) in S and in the inertia about the shaft, kg m²; in exact arithmetic
+    until the end: for a point mass the first vanishes, whose rounding is not inertia."""
     m = Fraction(blade.mass)
     x, y, z = map(Fraction, blade.centre_of_mass)
     xx, yy, zz, xy, xz, yz = map(Fraction, blade.inertia)

@@ -1,8 +1,5 @@
 """The output quantities of a run, each declared once: dimensions, units, who computes it, how it is judged and drawn.
-
-What stores, reads, compares or draws samples loops over these declarations. Further quantities come from packages that
-have an entry point in the group `rotor_mbs.quantities`.
-"""
+Further ones come from packages that have an entry point in the group `rotor_mbs.quantities`."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from rotor_mbs.runs import last_core
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.records import points_table, row_of_point
-from rotor_mbs.runs.results import TableFile, fit
+from rotor_mbs.runs.results import TableFile, extend_file
 from rotor_mbs.runs.table import Place, Rows, Table
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -156,7 +156,7 @@ def run_bench(
             able, refused = able_methods(scene, dict.fromkeys(ladder.method for ladder in chosen))
             curves += [Curve(scene, ladder, options) for ladder in chosen if ladder.method in able]
             left_out += refused
-        file = fit(output, [bench_table(curves)], replaced_points(output, curves))
+        file = extend_file(output, [bench_table(curves)], replaced_points(output, curves))
         missing = [curve for curve in curves if curve.scene.name in changed or not is_measured(file, curve)]
         made: list[Outcome] = []
         for scene in scenes:

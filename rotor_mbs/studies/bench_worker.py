@@ -23,7 +23,7 @@ from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
-from rotor_mbs.studies.stored_references import reference_at
+from rotor_mbs.studies.stored_references import read_reference
 
 # Errors are compared on at most so many sample intervals: more would make every step shorter than a coarse rung's, and
 # a bench would time the reading of samples.
@@ -152,7 +152,7 @@ def ask(request: tuple[str, Point]) -> Any:
 
 def prepared_scene(scene: Scene, results: Path) -> tuple[Scene, Trajectory]:
     """The scene as it is benched, without loads, and its reference. Raises InputError where the file has none."""
-    reference = reference_at(TableFile(results).place(f"{scene.name}/{REFERENCE}"), scene)
+    reference = read_reference(TableFile(results).place(f"{scene.name}/{REFERENCE}"), scene)
     return prepared(scene, reference)
 
 

@@ -16,7 +16,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, default_methods, find_method,
 from rotor_mbs.runs.freeze import changed_arrays
 from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import MISSING
+from rotor_mbs.runs.table import MISSING, refuse_changed_layout
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
@@ -32,7 +32,7 @@ _ROUNDING = 2.0**-50
 
 
 def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
-    """Return the scenes, and the methods by scene name, that are computed where no file is given.
+    """The scenes, and the methods by scene name, that are computed where no file is given.
 
     Every scene of the paper by the fast models, the chain on some; the scenes made for checking by every method.
     """
@@ -49,12 +49,7 @@ def default_set() -> tuple[list[Scene], dict[str, Sequence[str]]]:
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
     """Check what is stored, and whether every scene has a run of each required method.
 
-    Raises
-    ------
-    InputError
-        Where there is nothing to judge: no run of a method, as in a bench file or a file of references.
-    StoreError
-        Where the file cannot be read.
+    Raises InputError where there is no run of a method, as in a bench file or a file of references; StoreError.
     """
     checks = judge_file(path, bounds)
     if all(check.passed and check.where.method == REFERENCE for check in checks):
@@ -83,6 +78,7 @@ def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) ->
 
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError, InputError."""
+    refuse_changed_layout(path)
     if is_sweep(path):
         return _judge_sweep(StoredSweep(path, allow_damaged_runs=True), bounds)
     try:
@@ -142,34 +138,17 @@ def judge_frozen(bounds: Bounds, paths: Sequence[Path] = ()) -> list[Check]:
 def regressions(new: Sequence[Check], old: Sequence[Check], factor: float) -> list[Check]:
     """Compare margins: a check "against" for every earlier one, how many times its margin has shrunk.
 
-    Parameters
-    ----------
-    new, old : checks of two files, made with the same bounds.
-    factor : allowed ratio of the earlier margin to the present one, at least 1.
-
-    Returns
-    -------
-    A check for every one of `old`, and one for a run that is gone. The value is NaN, which fails, where `new` lacks the
-    check or the run, and infinite where a check that passed fails. What failed before and fails now is no regression.
-
-    Examples
-    --------
-    >>> from dataclasses import replace
-    >>> where = Where("paper/fig08", "exudyn_tree/rk67", "balance")
-    >>> before = Check("energy", where, 1e-12, 1e-9, "", "of scale")
-    >>> [change] = regressions([replace(before, value=6.4e-11)], [before], factor=10.0)
-    >>> round(change.value), change.passed
-    (64, False)
+    The allowed `factor` is at least 1. A check for every one of `old`, and one for a run that is gone. The value is
+    NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed fails. What failed
+    before and fails now is no regression.
     """
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}
-    gone = {
-        check.where[:2]: replace(check, name="run", where=check.where._replace(channel="all"))
-        for check in old
-        if check.where[:2] not in runs
-    }
+    gone = {check.where[:2]: check for check in old if check.where[:2] not in runs}
+    kept = [check for check in old if check.where[:2] in runs]
+    lost = [replace(check, name="run", where=check.where._replace(channel="all")) for check in gone.values()]
     changes = []
-    for check in [*(check for check in old if check.where[:2] in runs), *gone.values()]:
+    for check in [*kept, *lost]:
         now = present.get((check.name, check.where))
         if now is None:
             value, hint = math.nan, "was judged in the earlier file and is not in this one"

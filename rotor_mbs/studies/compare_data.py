@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import monotonic
 
@@ -104,33 +103,15 @@ def compare_with_reference(data: ForeignData, scene: Scene, tolerance: float = D
     # Wrapped channels with as many turns as the reference has in the first row.
     turns = 2.0 * np.pi * np.round((expected[0] - cut.values[0]) / (2.0 * np.pi))
     cut = replace(cut, values=np.where(cut.wrapped, cut.values + turns, cut.values))
-    verdict = _verdict(scene, data, cut, at_rows, exact, carried, tolerance)
-    worst = max(channel.error_per_growth for channel in verdict.channels)
-    if not verdict.agrees:
-        ends = monotonic() + _SEARCH_S
-        whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
-        search = CauseSearch(scene, whole, exact, tolerance, worst, ends)
-        with np.errstate(over="ignore", invalid="ignore"):  # data may be of any size
-            likely, note = likely_causes(search)
-        start = "" if likely else _other_start(scene, cut, expected[0])
-        notes = (*verdict.notes, *(line for line in (note, start) if line))
-        verdict = replace(verdict, likely=tuple(likely), notes=notes)
-    return DataStudy(scene, cut, expected, carried, verdict)
-
-
-def _verdict(
-    scene: Scene, whole: ForeignData, data: ForeignData, reference: Trajectory, exact: TimedReference, carried: Array,
-    tolerance: float,
-) -> DataVerdict:  # fmt: skip
-    rows, horizon_s, until = len(reference.time), horizon(exact.trajectory), len(reference.time)
-    if horizon_samples(exact.trajectory) < len(exact.trajectory.time):
-        until = int(np.searchsorted(reference.time, horizon_s, side="right"))
-    compared = replace(data, time=data.time[:rows], values=data.values[:rows])
-    errors = _channel_errors(compared, reference, exact.trajectory, carried, max(until, 1))
-    run = _as_run(scene, compared, reference, tolerance)
+    rows, horizon_s, until = len(place), horizon(run), len(place)
+    if horizon_samples(run) < len(run.time):
+        until = int(np.searchsorted(at_rows.time, horizon_s, side="right"))
+    compared = replace(cut, time=cut.time[:rows], values=cut.values[:rows])
+    errors = _channel_errors(compared, at_rows, run, carried, max(until, 1))
+    data_run = _as_run(scene, compared, at_rows, tolerance)
     status, message, metrics = "unchecked", "a single row", {}
     if rows > 1:
-        judgement = judge(run.scene, run, reference)
+        judgement = judge(data_run.scene, data_run, at_rows)
         status, message, metrics = judgement.status, judgement.message, judgement.metrics
     worst = max(errors, key=lambda channel: channel.error_per_growth)
     if not worst.error_per_growth <= tolerance:
@@ -140,10 +121,21 @@ def _verdict(
         )  # fmt: skip
     if status in ("ok", "unchecked"):
         status, message = _uncovered(scene, compared, exact, until) or (status, message)
-    return DataVerdict(
-        scene.name, data.source, status, message, tolerance, errors, rows, float(reference.time[-1]), horizon_s,
-        metrics.get("energy_drift_max"), data.read, data.unused, tuple(_notes(scene, whole, data, run, tolerance)),
+    notes = _notes(scene, data, cut, data_run, tolerance)
+    likely: list[str] = []
+    if status != "ok":
+        ends = monotonic() + _SEARCH_S
+        whole = replace(data, values=data.values + (cut.values[0] - data.values[0]))  # the turns that `cut` has
+        search = CauseSearch(scene, whole, exact, tolerance, max(error.error_per_growth for error in errors), ends)
+        with np.errstate(over="ignore", invalid="ignore"):  # data may be of any size
+            likely, note = likely_causes(search)
+        start = "" if likely else _other_start(scene, cut, expected[0])
+        notes += [line for line in (note, start) if line]
+    verdict = DataVerdict(
+        scene.name, data.source, status, message, tolerance, errors, rows, float(at_rows.time[-1]), horizon_s,
+        metrics.get("energy_drift_max"), data.read, data.unused, tuple(notes), tuple(likely),
     )  # fmt: skip
+    return DataStudy(scene, cut, expected, carried, verdict)
 
 
 def _channel_errors(
@@ -222,7 +214,7 @@ def _other_start(scene: Scene, data: ForeignData, expected: Array) -> str:
     return f"the data start elsewhere, in rad and rad/s: {', '.join(apart)}; another scene, start or unit?"
 
 
-def _notes(scene: Scene, whole: ForeignData, data: ForeignData, run: Solution, tolerance: float) -> Sequence[str]:
+def _notes(scene: Scene, whole: ForeignData, data: ForeignData, run: Solution, tolerance: float) -> list[str]:
     notes = []
     if len(whole.time) > len(data.time):
         notes.append(f"{len(whole.time) - len(data.time)} rows after the scene's {scene.duration:g} s are not compared")

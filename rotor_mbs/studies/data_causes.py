@@ -156,19 +156,6 @@ def states_of(run: Trajectory) -> Array:
     return np.hstack([run.angles, run.rates])
 
 
-def causes_in_the_data(search: CauseSearch) -> list[str]:
-    """What fits, in words; the first kind of mistake that explains every channel.
-
-    Where the rows that were compared agree, another unit of time is tried if many came after the scene's end.
-    """
-    if search.worst <= search.tolerance:
-        return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else []
-    inside = search.rows(search.data.time)
-    time, values = search.data.time[inside], search.data.values[inside]
-    mistakes = mistakes_in_columns(search, time, values, search.expected(time))
-    return mistakes or _other_time(search) or _lag(search, time, values) or _scatter(search, time, values)
-
-
 def mistakes_in_columns(search: CauseSearch, time: Array, values: Array, states: Array | None) -> list[str]:
     """What is wrong with the columns of data that are otherwise a motion, of these states; empty where nothing fits."""
     if states is None or len(time) < FEWEST:
@@ -316,8 +303,13 @@ def likely_causes(search: CauseSearch) -> tuple[list[str], str]:
     motions, parameters = list(_motions(search)), list(_parameters(search.scene))
     found, both, fitted, tried = list[str](), list[str](), list[tuple[float, str]](), 0
     try:
-        found = causes_in_the_data(search)
-        if found or search.worst <= search.tolerance:
+        if search.worst <= search.tolerance:  # the rows that were compared agree, but many came after the scene's end
+            return _other_time(search) if search.data.time[-1] > 2.0 * search.scene.duration else [], ""
+        inside = search.rows(search.data.time)
+        time, values = search.data.time[inside], search.data.values[inside]
+        found = mistakes_in_columns(search, time, values, search.expected(time))
+        found = found or _other_time(search) or _lag(search, time, values) or _scatter(search, time, values)
+        if found:
             return found, ""
         for text, motion in motions:
             beside = _fits(search, motion)

@@ -58,10 +58,9 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
 
 
 def reference_csv(scene: Scene) -> str:
-    """The scene's reference, the shipped one or else a computed one, as comma-separated values.
+    """The scene's reference, the shipped one or else a computed one, as comma-separated values, a column per component.
 
-    The header has "time [s]", "rotor [rad]", "pitch 1 [rad]", ..., a column per component; numbers have all their
-    digits. Raises StoreError where the reference does not begin.
+    Raises StoreError where the reference does not begin.
     """
     is_shipped = shipped_reference(scene_hash(scene)) is not None
     solution = frozen_solution(scene) if is_shipped else solve(REFERENCE, scene, {})

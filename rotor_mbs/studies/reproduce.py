@@ -49,7 +49,7 @@ from rotor_mbs.studies.run import (
     run_scenes,
     work_of,
 )
-from rotor_mbs.studies.stored_references import reference_at
+from rotor_mbs.studies.stored_references import read_reference
 
 # The scene whose error against run time is measured by all methods: the paper's own crest, and a horizon of 6 s.
 BENCHED = "paper/fig11"
@@ -80,7 +80,7 @@ def reproduce(
                 method=curve.ladder.method,
                 place=file.place(curve.first_run, BENCH),
                 reference=file.place(reference),
-                limit_s=1.2 * timeout_s + 10.0,
+                kill_after_s=1.2 * timeout_s + 10.0,
                 work=work_of(benched, curve.ladder.method),
                 curve=curve,
             )
@@ -132,7 +132,7 @@ def perform_curve(task: CurveTask) -> Rows:
     """Run and judge the points of one curve, in a worker process; their rows."""
     curve = task.curve
     assert task.reference is not None  # every curve has one
-    short, reference = prepared(curve.scene, reference_at(task.reference, curve.scene))
+    short, reference = prepared(curve.scene, read_reference(task.reference, curve.scene))
     points = points_of(curve.ladder, short.duration / (short.samples - 1))
     timer = PointTimer(dict.fromkeys(points, (short, reference)))
     measured, longest = Measured(), 0.0

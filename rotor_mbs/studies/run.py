@@ -25,7 +25,7 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import OF_THE_MACHINE, TaskPool, Workers, one_line, pool_of
-from rotor_mbs.runs.results import Asked, TableFile, fit, results_tables, row_of_run
+from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables, row_of_run
 from rotor_mbs.runs.runner import Ended, Task, compute
 from rotor_mbs.runs.table import Rows, Table, text_of
 from rotor_mbs.runs.versions import row_versions
@@ -35,7 +35,7 @@ from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.studies.stored_references import digest, frozen_solution, reference_at, shipped_reference
+from rotor_mbs.studies.stored_references import digest, frozen_solution, read_reference, shipped_reference
 
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
@@ -73,7 +73,7 @@ class Outcome:
     status, message : of the run; of a task of which nothing is stored, why.
     seconds : run time; NaN where nothing was timed.
     is_stored : whether there is a row; else the same call tries again.
-    is_read : whether it was read from a shipped file and not computed.
+    is_shipped : whether it was read from a shipped file and not computed.
     share : how much of the work of the call was done when it ended, from 0 to 1.
     """
 
@@ -83,7 +83,7 @@ class Outcome:
     message: str = ""
     seconds: float = float("nan")
     is_stored: bool = True
-    is_read: bool = False
+    is_shipped: bool = False
     share: float = 0.0
 
 
@@ -160,8 +160,8 @@ def run_scenes(
         asked.append(asked_reference(scene, use_frozen=use_frozen))
         asked += [Asked(scene, name, own_settings(scene, name, settings or {})) for name in methods[scene.name]]
     with writing(output):
-        file = fit(output, [*results_tables(asked), *beside_tables], dropped)
-        missing, kept = file.missing(asked, timeout_s)
+        file = extend_file(output, [*results_tables(asked), *beside_tables], dropped)
+        missing, kept = file.take_back_missing(asked, timeout_s)
         others = list(beside(file, {run.run for run in missing})) if beside is not None else []
         tasks = [_task(file, run, timeout_s) for run in missing]
         made: list[Outcome] = []
@@ -208,9 +208,11 @@ def outcomes(ends: Iterable[Ended], tasks: Sequence[Task]) -> Iterator[Outcome]:
         outcome = Outcome(task.label, task.method, end.failure, end.message, is_stored=False, share=done / work)
         if end.rows is not None and isinstance(task, RunTask):
             status, message = STATUSES[int(end.rows["status"][0])], text_of(end.rows["message"][0])
-            seconds = float("nan") if task.asked.is_read else float(end.rows["run_time_s"][0])
-            is_read = task.asked.is_read
-            outcome = replace(outcome, status=status, message=message, seconds=seconds, is_stored=True, is_read=is_read)
+            seconds = float("nan") if task.asked.is_shipped else float(end.rows["run_time_s"][0])
+            is_shipped = task.asked.is_shipped
+            outcome = replace(
+                outcome, status=status, message=message, seconds=seconds, is_stored=True, is_shipped=is_shipped
+            )
         elif end.rows is not None:
             outcome = replace(outcome, status="ok", message=f"{len(end.rows['status'])} points", is_stored=True)
         yield outcome
@@ -223,7 +225,7 @@ def _task(file: TableFile, run: Asked, timeout_s: float) -> RunTask:
         place=file.place(run.run),
         reference=None if run.method == REFERENCE else file.place(f"{run.scene.name}/{REFERENCE}"),
         # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
-        limit_s=1.2 * timeout_s + 10.0,
+        kill_after_s=1.2 * timeout_s + 10.0,
         work=work_of(run.scene, run.method),
         asked=run,
         time_limit_s=timeout_s,
@@ -303,7 +305,7 @@ def perform_run(task: RunTask) -> Rows:
     """Solve and judge one run, in a worker process; its row."""
     asked = task.asked
     facts: dict[str, object] = {}
-    if asked.is_read:
+    if asked.is_shipped:
         run = frozen_solution(asked.scene)
     else:
         try:
@@ -317,10 +319,10 @@ def perform_run(task: RunTask) -> Rows:
     if asked.method == REFERENCE:
         reference: Trajectory | None = run.trajectory
     else:
-        reference = reference_at(task.reference, asked.scene) if task.reference is not None else None
+        reference = read_reference(task.reference, asked.scene) if task.reference is not None else None
     run, false_success = _judged(run, reference)
     facts["false_success"] = int(false_success)
-    if run.status == "timed_out" and not asked.is_read:
+    if run.status == "timed_out" and not asked.is_shipped:
         facts["time_limit_s"] = task.time_limit_s
     return row_of_run(run, task.place, facts)
 

@@ -25,7 +25,7 @@ from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.pool import pool_of
 from rotor_mbs.runs.records import points_table, row_of_point
-from rotor_mbs.runs.results import TableFile, fit
+from rotor_mbs.runs.results import TableFile, extend_file
 from rotor_mbs.runs.runner import Task, compute
 from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import row_versions
@@ -43,7 +43,7 @@ from rotor_mbs.studies.run import (
     run_scenes,
     work_of,
 )
-from rotor_mbs.studies.stored_references import reference_at
+from rotor_mbs.studies.stored_references import read_reference
 
 SUITE = ("stiff", "extreme")
 
@@ -129,7 +129,7 @@ def complete_studies(
         for table in dict.fromkeys(table for table, _, _ in wanted)
     ]
     with writing(output):
-        file = fit(output, tables, _stale(output, points, methods))
+        file = extend_file(output, tables, _stale(output, points, methods))
         tasks = []
         for table, scene, method in wanted:
             own = [file.place(str(point["run"]), table) for point in points[table, scene.name, method]]
@@ -141,7 +141,7 @@ def complete_studies(
                         method=method,
                         place=own[0],
                         reference=reference,
-                        limit_s=_TASK_LIMIT_S,
+                        kill_after_s=_TASK_LIMIT_S,
                         work=work_of(scene, method),
                         table=table,
                         scene=scene,
@@ -235,7 +235,7 @@ def has_limit(scene: Scene, method: str) -> bool:
 def ladder_rows(task: StudyTask) -> Rows:
     """Errors in rad over steps in s, and the step that the target needs; steps that are not needed are left out."""
     scene, method = task.scene, task.method
-    reference = reference_at(task.reference, scene) if task.reference is not None else None
+    reference = read_reference(task.reference, scene) if task.reference is not None else None
     steps = ladder_steps(scene)
     judgements: list[Judgement] = []
     expected = 0.0

@@ -66,7 +66,7 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def reference_at(place: Place, scene: Scene) -> Trajectory | None:
+def read_reference(place: Place, scene: Scene) -> Trajectory | None:
     """The reference of `scene` at a place of a results file, not to be changed; None where it is missing or empty.
 
     Short ones stay in memory: a process judges runs of one scene by many methods.

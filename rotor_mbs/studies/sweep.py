@@ -84,7 +84,7 @@ class SweepPlan:
                     label=f"runs {first} to {end - 1}",
                     method=method.name,
                     place=place,
-                    limit_s=limit_of(end - first, self.time_limit_s),
+                    kill_after_s=limit_of(end - first, self.time_limit_s),
                     start=first,
                     values=values,
                     variants=variants,

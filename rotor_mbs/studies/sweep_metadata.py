@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import date
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,22 +23,11 @@ from rotor_mbs.scenario.sweep_design import SPLITS
 from rotor_mbs.solution.status import code_of
 
 _PIECE = 1 << 24  # bytes of a variable that are read at once
-_CROISSANT_PROFILE = "http://mlcommons.org/croissant/1.0"
 _CONTEXT = Path(__file__).parent / "templates" / "croissant-context.json"
 
 
 def describe(path: Path | str) -> list[Path]:
-    """Write the two files beside the dataset at `path`.
-
-    Returns
-    -------
-    Their paths.
-
-    Raises
-    ------
-    StoreError
-        Where `path` is no sweep's dataset, or a file cannot be written.
-    """
+    """Write the two files beside the dataset at `path`; their paths. Raises StoreError where it is no sweep's."""
     path = Path(path)
     stored = StoredSweep(path)
     files = {
@@ -52,15 +40,10 @@ def describe(path: Path | str) -> list[Path]:
 
 
 def statistics(stored: StoredSweep) -> dict[str, Any]:
-    """Compute mean, deviation, smallest and largest value of every variable of floating point numbers.
+    """Mean, deviation, smallest and largest value of every variable of floating point numbers, NaN left out.
 
     Over the runs that are ok and, where runs are marked, marked for training, and over their samples in time: one
-    number for each remaining entry (a coordinate, a blade and axis), as nested lists. NaN, of what a run did not reach,
-    is left out.
-
-    Examples
-    --------
-    `{"runs": 800, "variables": {"angles": {"unit": "rad", "mean": [...], "std": [...], ...}}}`
+    number for each remaining entry (a coordinate, a blade and axis), as nested lists.
     """
     chosen = stored.column("status") == code_of("ok")
     if "split" in stored.columns:
@@ -70,21 +53,20 @@ def statistics(stored: StoredSweep) -> dict[str, Any]:
         values = stored.column(name)
         if column.dimensions[0] == "run" and values.dtype.kind == "f":
             axes = tuple(i for i, dimension in enumerate(column.dimensions) if dimension in ("run", "time"))
-            numbers = _moments(partial(_chosen, values, chosen), axes)
+            numbers = _moments(values, chosen, axes)
             variables[name] = {"unit": column.units, "dimensions": list(column.dimensions), **numbers}
     return {"runs": int(chosen.sum()), "split": "train", "variables": variables}
 
 
-def _chosen(values: NDArray[Any], chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
-    """The chosen runs, piece by piece."""
-    runs = max(_PIECE * len(values) // values.nbytes, 1)
-    for first in range(0, len(values), runs):
-        piece = slice(first, first + runs)
-        yield np.asarray(values[piece][chosen[piece]], dtype=np.float64)
+def _moments(stored: NDArray[Any], chosen: NDArray[np.bool_], axes: tuple[int, ...]) -> dict[str, Any]:
+    """Of the chosen runs, over these axes; in two passes over pieces of them, as a file need not fit into memory."""
 
+    def pieces() -> Iterator[NDArray[np.float64]]:
+        runs = max(_PIECE * len(stored) // stored.nbytes, 1)
+        for first in range(0, len(stored), runs):
+            piece = slice(first, first + runs)
+            yield np.asarray(stored[piece][chosen[piece]], dtype=np.float64)
 
-def _moments(pieces: Callable[[], Iterator[NDArray[np.float64]]], axes: tuple[int, ...]) -> dict[str, Any]:
-    """Over these axes, NaN left out; in two passes over the pieces, as a file need not fit into memory."""
     count, total, squares, least, largest = (np.float64(start) for start in (0.0, 0.0, 0.0, np.inf, -np.inf))
     for values in pieces():
         finite = np.isfinite(values)
@@ -125,7 +107,7 @@ def _croissant(path: Path, stored: StoredSweep) -> dict[str, Any]:
     return {
         "@context": json.loads(_CONTEXT.read_text(encoding="utf-8")),
         "@type": "sc:Dataset",
-        "conformsTo": _CROISSANT_PROFILE,
+        "conformsTo": "http://mlcommons.org/croissant/1.0",
         "name": path.stem,
         "description": stored.attributes["summary"],
         "keywords": KEYWORDS.split(", "),

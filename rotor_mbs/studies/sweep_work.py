@@ -19,8 +19,8 @@ from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.sweeps import AMPLIFICATION, METRICS
 from rotor_mbs.runs.table import Rows, blank_rows, characters
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.sweep import Variants
 from rotor_mbs.scenario.toml_file import TableError
-from rotor_mbs.scenario.variants import Variants
 from rotor_mbs.solution.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
@@ -61,7 +61,8 @@ class Chunk(Task):
     def part(self, start: int, end: int) -> Chunk:
         """Some of its runs."""
         values = self.values[start:end]
-        return replace(self, start=self.start + start, values=values, limit_s=limit_of(len(values), self.time_limit_s))
+        kill_after_s = limit_of(len(values), self.time_limit_s)
+        return replace(self, start=self.start + start, values=values, kill_after_s=kill_after_s)
 
     def failed(self, status: str, message: str) -> Rows:
         """The rows of runs whose process was ended, or that raised."""

@@ -183,7 +183,7 @@ def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
     found = Rehydrated(scene, run, None, [])
     judged = values(checks._of_corrected_model(stored(), BOUNDS, found, run.trajectory))
     assert judged["exact", "rotor angle"] == pytest.approx(1e-3, rel=1e-6)
-    blind = replace(found, scene=replace(scene, outputs=("rates", "energy")))
+    blind = found._replace(scene=replace(scene, outputs=("rates", "energy")))
     judged = values(checks._of_corrected_model(stored(), BOUNDS, blind, run.trajectory))
     assert ("exact", "rotor angle") not in judged
 

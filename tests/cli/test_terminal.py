@@ -28,7 +28,7 @@ def outcome(method: str = "lagrange/dop853", share: float = 0.5, **result: objec
 def test_a_log_has_a_plain_line_for_each_case() -> None:
     log = io.StringIO()
     with ProgressLine(log) as progress:
-        progress(1, 2, outcome("reference", is_read=True))
+        progress(1, 2, outcome("reference", is_shipped=True))
         progress(2, 2, outcome(status="diverged", message="not finite", seconds=1.5))
     assert log.getvalue().splitlines() == [
         "[1/2] paper/fig05 reference ok (read, not computed)",

@@ -16,7 +16,7 @@ from support.scenes import paper
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.cluster import open_task_pool
-from rotor_mbs.runs.results import Asked, fit, results_tables
+from rotor_mbs.runs.results import Asked, extend_file, results_tables
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import MISSING, text_of
 from rotor_mbs.scenario.scene_file import parse_scene, scene_toml
@@ -58,7 +58,7 @@ def _run_fault(scene: object, method: str, folder: Path, statuses: Counter[objec
         if able_methods(scene, [method])[0]:
             (folder / "r.h5").unlink(missing_ok=True)
             asked = Asked(scene, method)
-            place = fit(folder / "r.h5", results_tables([asked])).place(asked.run)
+            place = extend_file(folder / "r.h5", results_tables([asked])).place(asked.run)
             row = perform_run(RunTask(label="", method=method, place=place, asked=asked, time_limit_s=_LIMIT_S))
             place.write(place.first, row)
             statuses[STATUSES[int(row["status"][0])]] += 1

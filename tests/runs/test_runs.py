@@ -50,7 +50,7 @@ def made(report: RunReport) -> list[str]:
 
 def stored(path: Path) -> list[str]:
     file = TableFile(path)
-    return [label for label in file.tables["runs"].runs.tolist() if file.place(label).is_stored]
+    return [label for label in file.table("runs").runs.tolist() if file.place(label).is_stored]
 
 
 def flip(path: Path, label: str, column: str) -> None:

@@ -19,7 +19,7 @@ from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column
 from rotor_mbs.runs.lock import writing
 from rotor_mbs.runs.records import points_table, row_of_point
-from rotor_mbs.runs.results import Asked, TableFile, fit, results_tables
+from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables
 from rotor_mbs.runs.table import (
     CHARACTER,
     MISSING,
@@ -41,7 +41,7 @@ ENGINES = ("h5netcdf", "netcdf4")
 
 def _table() -> Table:
     time = Column(("time",), "s", "time"), np.linspace(0.0, 1.0, SAMPLES)
-    filled = {
+    computed = {
         "status": Column(("run",), "1", "status", "i1"),
         "message": Column(("run", CHARACTERS), "1", "message", CHARACTER),
         "steps": Column(("run",), "1", "steps", "<i8"),
@@ -50,7 +50,7 @@ def _table() -> Table:
     }
     known = {"stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float))}
     scales = {"time": time, CHARACTERS: (Column((CHARACTERS,), "1", ""), np.empty(40, np.int8))}
-    return Table("", np.arange(ROWS), known, filled, scales)
+    return Table("", np.arange(ROWS), known, computed, scales)
 
 
 def _stored(path: Path) -> StoredTable:
@@ -236,16 +236,16 @@ def _runs(path: Path) -> list[str]:
 
 def test_what_is_asked_again_changes_nothing(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    _write(fit(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
+    _write(extend_file(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
     before = path.read_bytes()
-    fit(path, results_tables(_asked("lagrange/taylor")))
+    extend_file(path, results_tables(_asked("lagrange/taylor")))
     assert path.read_bytes() == before
 
 
 def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
     path, first = tmp_path / "r.h5", "paper/fig08/lagrange/taylor"
-    _write(fit(path, results_tables(_asked("reference", "lagrange/taylor"))), first, 1.0)
-    file = fit(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
+    _write(extend_file(path, results_tables(_asked("reference", "lagrange/taylor"))), first, 1.0)
+    file = extend_file(path, results_tables(_asked("exudyn_chain/generalized_alpha", "lagrange/taylor")))
     assert _runs(path) == [first]
     assert (file.place(first).read()["angles"] == 1.0).all()
     assert file.table("paper/fig08").runs.tolist() == [
@@ -257,46 +257,46 @@ def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
 def test_other_settings_and_versions_are_missing_and_others_stay(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
     names = ("lagrange/taylor", "exudyn_tree/rk67")
-    file = fit(path, results_tables(_asked(*names)))
+    file = extend_file(path, results_tables(_asked(*names)))
     for name in names:
         _write(file, f"paper/fig08/{name}", 1.0)
     scene = _asked("exudyn_tree/rk67")[0].scene
-    fit(path, results_tables([Asked(scene, "exudyn_tree/rk67", {"step": 1e-3})]))
+    extend_file(path, results_tables([Asked(scene, "exudyn_tree/rk67", {"step": 1e-3})]))
     assert _runs(path) == ["paper/fig08/lagrange/taylor"]
-    fit(path, results_tables([Asked(scene, "lagrange/taylor", versions={"rotor_mbs": "0"})]))
+    extend_file(path, results_tables([Asked(scene, "lagrange/taylor", versions={"rotor_mbs": "0"})]))
     assert _runs(path) == []
 
 
 def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    _write(fit(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
+    _write(extend_file(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
     with pytest.raises(InputError, match="has lagrange/taylor of a scene of that name with other numbers"):
-        fit(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
+        extend_file(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
     assert _runs(path) == ["paper/fig08/lagrange/taylor"]
-    fit(path, results_tables(_asked("lagrange/taylor", gravity=9.81)))
+    extend_file(path, results_tables(_asked("lagrange/taylor", gravity=9.81)))
     assert _runs(path) == []
 
 
 def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     path = tmp_path / "r.h5"
-    fit(path, results_tables(_asked("lagrange/taylor")))
+    extend_file(path, results_tables(_asked("lagrange/taylor")))
     point = {"run": "a", "scene": "paper/fig08", "method_name": "lagrange/taylor", "step": 0.5, "tolerance": np.nan}
-    file = fit(path, [points_table("stability", [point])])
+    file = extend_file(path, [points_table("stability", [point])])
     place = file.place("a", "stability")
     place.write(place.first, row_of_point(place, "ok", "", {"angle_error_max": 0.25}))
-    file = fit(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
+    file = extend_file(path, results_tables(_asked("lagrange/taylor", "exudyn_tree/rk67")))
     assert file.place("a", "stability").is_stored
     assert file.place("a", "stability").read()["angle_error_max"].tolist() == [0.25]
-    assert fit(path, [points_table("stability", [point])]).place("a", "stability").is_stored
-    changed = fit(path, [points_table("stability", [point | {"step": 0.25}])])
+    assert extend_file(path, [points_table("stability", [point])]).place("a", "stability").is_stored
+    changed = extend_file(path, [points_table("stability", [point | {"step": 0.25}])])
     assert not changed.place("a", "stability").is_stored
-    file = fit(path, [], dropped=[("stability", "a")])
+    file = extend_file(path, [], dropped=[("stability", "a")])
     assert "stability" not in file.groups
 
 
 def test_a_sweeps_file_is_no_output_of_runs(path: Path) -> None:
     with pytest.raises(StoreError, match="holds the dataset of a sweep"):
-        fit(path, results_tables(_asked("lagrange/taylor")))
+        extend_file(path, results_tables(_asked("lagrange/taylor")))
 
 
 @pytest.mark.parametrize("engine", ENGINES)

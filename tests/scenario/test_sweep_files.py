@@ -12,10 +12,9 @@ import pytest
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
 from rotor_mbs.scenario.scene import scene_tables, unit_of
-from rotor_mbs.scenario.sweep import Sweep, load_sweep, sweep_of
+from rotor_mbs.scenario.sweep import Sweep, Variants, load_sweep, sweep_of
 from rotor_mbs.scenario.sweep_design import Axis, Design, split_rows
 from rotor_mbs.scenario.toml_file import parse_key
-from rotor_mbs.scenario.variants import Variants
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'
 

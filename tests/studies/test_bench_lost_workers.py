@@ -12,7 +12,7 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.methods.catalogue import ladders
-from rotor_mbs.runs.results import fit
+from rotor_mbs.runs.results import extend_file
 from rotor_mbs.studies import bench
 from rotor_mbs.studies.bench_worker import Point, ask
 
@@ -47,7 +47,7 @@ def test_a_point_whose_process_dies_is_tried_again_and_after_that_not_stored(
     points = [bench.points_of(curve.ladder, 0.05) for curve in curves]
     measured = bench.measure_points({own[0]: (SCENE, None) for own in points}, points, 2, 60.0)
     assert kills.read_text() == ""
-    file = fit(tmp_path / "b.h5", [bench.bench_table(curves)])
+    file = extend_file(tmp_path / "b.h5", [bench.bench_table(curves)])
     for curve, own in zip(curves, points, strict=True):
         lost = measured.lost(own)
         if curve.ladder.variant == " twice":

@@ -29,7 +29,7 @@ from rotor_mbs.report.pages.bench import (
     reach_table,
 )
 from rotor_mbs.runs.records import COLUMNS, Record, points_table, read_records, row_of_point
-from rotor_mbs.runs.results import TableFile, fit
+from rotor_mbs.runs.results import TableFile, extend_file
 from rotor_mbs.solution.status import STATUSES
 
 
@@ -189,7 +189,7 @@ def test_csv_has_every_point_unrounded() -> None:
 def stored(path: Path, *curves: Record) -> Path:
     """The curves in a file, as `bench` stores them."""
     points = [point for curve in curves for point in known_points(curve)]
-    file = fit(path, [points_table("bench", points)])
+    file = extend_file(path, [points_table("bench", points)])
     for curve in curves:
         facts = {name: value for name, value in curve.attributes.items() if name in COLUMNS["bench"]}
         for i, point in enumerate(known_points(curve)):

@@ -27,7 +27,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form, parameters
 from rotor_mbs.report.pages import check as formats
-from rotor_mbs.runs.results import fit
+from rotor_mbs.runs.results import extend_file
 from rotor_mbs.runs.table import Rows, characters
 from rotor_mbs.scenario import catalogue
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, load_bounds
@@ -86,7 +86,7 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
 def test_where_there_is_nothing_to_judge_the_command_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    fit(tmp_path / "empty.h5", [])
+    extend_file(tmp_path / "empty.h5", [])
     for path in (reference_folder() / "stiff.h5", tmp_path / "empty.h5"):
         capsys.readouterr()
         assert main(["check", str(path), "--require", METHOD]) == 2

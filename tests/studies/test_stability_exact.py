@@ -13,7 +13,7 @@ from support.references import TAYLOR, reference, run, scene
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.records import points_table
-from rotor_mbs.runs.results import Asked, fit, results_tables
+from rotor_mbs.runs.results import Asked, extend_file, results_tables
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import horizon_samples, metrics_of
@@ -147,7 +147,7 @@ def test_a_step_for_a_target_is_read_off_a_ladder() -> None:
 def test_a_ladder_of_runs_that_fail_at_once_ends(tmp_path: Path) -> None:
     light, method = scene("extreme/light-1e-8"), "exudyn_chain/generalized_alpha"
     points = study_points(STEPS, light, method)
-    file = fit(tmp_path / "s.h5", [*results_tables([Asked(light, "reference")]), points_table(STEPS, points)])
+    file = extend_file(tmp_path / "s.h5", [*results_tables([Asked(light, "reference")]), points_table(STEPS, points)])
     place = file.place(str(points[0]["run"]), STEPS)
     rows = ladder_rows(StudyTask(label="", method=method, place=place, table=STEPS, scene=light))
     statuses = [STATUSES[code] for code in rows["status"]]

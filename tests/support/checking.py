@@ -13,7 +13,7 @@ from rotor_mbs.analysis.checks import Check
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
-from rotor_mbs.runs.results import Asked, fit, results_tables, row_of_run
+from rotor_mbs.runs.results import Asked, extend_file, results_tables, row_of_run
 from rotor_mbs.scenario.accuracy_bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
@@ -21,7 +21,7 @@ from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.studies import check
 from rotor_mbs.studies.run import run_scenes
-from rotor_mbs.studies.stored_references import reference_at
+from rotor_mbs.studies.stored_references import read_reference
 
 
 def shipped(name: str) -> Scene:
@@ -38,8 +38,8 @@ def results_file(path: Path, scenes: Sequence[str], methods: Sequence[str], time
 def add_run(path: Path, scene: Scene, run: Solution) -> None:
     """A run into a file that has its scene's reference, judged as a batch judges it."""
     asked = Asked(scene, run.method, run.settings)
-    file = fit(path, results_tables([asked]))
-    judgement = judge(scene, run, reference_at(file.place(f"{scene.name}/{REFERENCE}"), scene))
+    file = extend_file(path, results_tables([asked]))
+    judgement = judge(scene, run, read_reference(file.place(f"{scene.name}/{REFERENCE}"), scene))
     run = replace(run, scene=scene, status=judgement.status, message=judgement.message, metrics=judgement.metrics)
     place = file.place(asked.run)
     place.write(place.first, row_of_run(run, place, {"false_success": int(judgement.false_success)}))

@@ -12,7 +12,7 @@ import csv
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -313,8 +313,8 @@ def write_table(path: Path) -> None:
     """A row for each checked entry, as `analysis.published.checked_entries` reads it."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([field.name for field in fields(CheckedEntry)])
-        writer.writerows(astuple(entry) for entry in check_errata())
+        writer.writerow(CheckedEntry._fields)
+        writer.writerows(check_errata())
 
 
 if __name__ == "__main__":

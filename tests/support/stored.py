@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.results import RUNS, Asked, TableFile, fit, results_tables, row_of_run
+from rotor_mbs.runs.results import RUNS, Asked, TableFile, extend_file, results_tables, row_of_run
 from rotor_mbs.runs.table import Rows
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.metrics import metrics_of
@@ -68,7 +68,7 @@ class Made:
 def store(path: Path, runs: Sequence[Made]) -> Path:
     """The runs in one file, each compared with its scene's reference where there is one."""
     references = {made.scene.name: made.run().trajectory for made in runs if made.method == "reference"}
-    file = fit(path, results_tables([Asked(made.scene, made.method, versions=made.versions) for made in runs]))
+    file = extend_file(path, results_tables([Asked(made.scene, made.method, versions=made.versions) for made in runs]))
     for made in runs:
         run = made.run()
         metrics = metrics_of(made.scene, run.trajectory, references.get(made.scene.name)) if made.until else {}
@@ -126,4 +126,4 @@ def change_row(path: Path, run: str, change: Callable[[Rows], None]) -> None:
 
 def drop(path: Path, run: str) -> None:
     """Take a run out of a file."""
-    fit(path, [], dropped=[(RUNS, run)])
+    extend_file(path, [], dropped=[(RUNS, run)])

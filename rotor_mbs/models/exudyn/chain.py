@@ -8,28 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotor_mbs.models.exudyn import geometry
 from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
-from rotor_mbs.models.exudyn.geometry import (
-    ALONG_SHAFT,
-    Body,
-    blade_body,
-    hub_body,
-    mounting,
-    on_body,
-    pitching,
-    quaternion,
-    quaternion_rate,
-    rotation_vector,
-    rotation_y,
-    rotation_z,
-)
 from rotor_mbs.models.exudyn.loads import chain_sensors
 from rotor_mbs.models.exudyn.moments import Loads, Moment, is_driven, moment_on
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import constant_value, is_constant
 from rotor_mbs.solution.trajectory import Array
-
-NODES = ("euler_parameters", "rotation_vector")
 
 
 @dataclass(frozen=True)
@@ -37,7 +22,7 @@ class Placed:
     """A body at the start."""
 
     name: str
-    body: Body
+    body: geometry.Body
     about_shaft: float  # rad, of its orientation
     pitch: float
     axis: Array  # (3,) in the base frame, that it turns about in its bearing
@@ -45,7 +30,7 @@ class Placed:
 
     @property
     def rotation(self) -> Array:
-        return rotation_y(np.cos(self.about_shaft), np.sin(self.about_shaft)) @ rotation_z(self.pitch)
+        return geometry.rotation_y(np.cos(self.about_shaft), np.sin(self.about_shaft)) @ geometry.rotation_z(self.pitch)
 
 
 def placed_bodies(scene: Scene) -> list[Placed]:
@@ -53,18 +38,18 @@ def placed_bodies(scene: Scene) -> list[Placed]:
     rotor, rate = scene.initial_angles[0], scene.initial_rates[0]
     shaft = np.array([0.0, 1.0, 0.0])
     spin = rate * shaft
-    bodies = [Placed("hub", hub_body(scene), rotor, 0.0, shaft, spin)]
-    for i in pitching(scene):
+    bodies = [Placed("hub", geometry.hub_body(scene), rotor, 0.0, shaft, spin)]
+    for i in geometry.pitching(scene):
         pitch, pitch_rate = scene.initial_angles[1 + i], scene.initial_rates[1 + i]
         about_shaft = rotor + scene.phases[i]
         axis = np.array([np.sin(about_shaft), 0.0, np.cos(about_shaft)])
-        body = blade_body(scene.blades[i])
+        body = geometry.blade_body(scene.blades[i])
         bodies.append(Placed(f"blade {i + 1}", body, about_shaft, pitch, axis, spin + pitch_rate * axis))
     return bodies
 
 
-def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
-    """Everything the engine has of this scene, in the order it is built; `node` is one of NODES."""
+def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Part]:
+    """Everything the engine has of this scene, in the order it is built; `node` as in the settings."""
     hub, *blades = placed_bodies(scene)
     built = [Part("object", "ground", "ObjectGround")]
     for placed in (hub, *blades):
@@ -73,10 +58,10 @@ def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
             mass = Part("marker", f"{placed.name} mass", "MarkerBodyMass", {"bodyNumber": Ref("object", placed.name)})
             weight = {"markerNumber": Ref("marker", mass.name), "loadVector": [0.0, 0.0, -scene.gravity]}
             built += [mass, Part("load", f"gravity on {placed.name}", "LoadMassProportional", weight)]
-    ground = _marker("ground", "at shaft", ALONG_SHAFT, np.zeros(3))
-    built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", ALONG_SHAFT))
-    for i, blade in zip(pitching(scene), blades, strict=True):
-        seat = _on_body(hub, f"at bearing {i + 1}", mounting(i, len(scene.blades)))
+    ground = _marker("ground", "at shaft", geometry.ALONG_SHAFT, np.zeros(3))
+    built += _bearing("shaft bearing", ground, _on_body(hub, "at shaft", geometry.ALONG_SHAFT))
+    for i, blade in zip(geometry.pitching(scene), blades, strict=True):
+        seat = _on_body(hub, f"at bearing {i + 1}", geometry.mounting(i, len(scene.blades)))
         built += _bearing(f"pitch bearing {i + 1}", seat, _on_body(blade, "at bearing", np.eye(3)))
         built += _pitch_spring(scene, loads, i, seat.name, f"{blade.name} at bearing")
     if scene.shaft_damping:
@@ -100,7 +85,7 @@ def parts(scene: Scene, loads: Loads, node: str = NODES[0]) -> list[Part]:
             built.append(sensor(f"{name} velocity", "SensorNode", "Velocity", nodeNumber=of_node))
     if scene.wants("tip"):
         for i, tip in enumerate(blade.tip for blade in scene.blades):
-            number, point = on_body(scene, i, tip)
+            number, point = geometry.on_body(scene, i, tip)
             body, position = Ref("object", bodies[number].name), list(point - bodies[number].body.com)
             built.append(sensor(f"tip {i + 1}", "SensorBody", "Position", bodyNumber=body, localPosition=position))
     if scene.wants("loads"):
@@ -113,11 +98,11 @@ def _body(placed: Placed, node: str) -> list[Part]:
     position = placed.rotation @ body.com
     with np.errstate(over="ignore", invalid="ignore"):  # of a rate that has no bound: the run says so
         velocity = np.cross(placed.omega, position)
-    p = quaternion(placed.about_shaft, placed.pitch)
+    p = geometry.quaternion(placed.about_shaft, placed.pitch)
     if node == "euler_parameters":
-        type_, pose, motion = "NodeRigidBodyEP", p, quaternion_rate(p, placed.omega)
+        type_, pose, motion = "NodeRigidBodyEP", p, geometry.quaternion_rate(p, placed.omega)
     else:  # its velocity coordinates are the angular velocity in the body's frame
-        type_, pose, motion = "NodeRigidBodyRotVecLG", rotation_vector(p), placed.rotation.T @ placed.omega
+        type_, pose, motion = "NodeRigidBodyRotVecLG", geometry.rotation_vector(p), placed.rotation.T @ placed.omega
     parameters = {
         "referenceCoordinates": [*position, *pose],
         "initialCoordinates": [0.0] * (3 + len(pose)),

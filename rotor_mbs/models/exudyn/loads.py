@@ -28,10 +28,8 @@ def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
 
 
 def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array, Array]:
-    """(n, 3) force, (n, 3) moment about the root in the frame of blade i; (n, 3, 3) that frame to the base frame.
-
-    F = m (a + g e_z),  M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it.
-    """
+    """(n, 3) force, moment about the root in the frame of blade i; (n, 3, 3) that frame to the base frame. F = m (a + g
+    e_z), M = I α + ω × I ω + r × F, r the centre of mass, I the inertia about it."""
     blade, name = scene.blades[i], f"blade {i + 1} root"
     # From the blade's frame to the engine's body that it is, or, where it cannot pitch, is part of.
     turned = np.eye(3) if i in pitching(scene) else fixed_blade_rotation(scene, i)

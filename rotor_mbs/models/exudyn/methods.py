@@ -69,14 +69,8 @@ _CHAIN_ALPHA_LADDERS = tuple(
     )
     for (node, of_node), (radius, of_radius) in product(_NODES.items(), _RADII.items())
 )
-_NEWMARK_LADDERS = (
-    step_ladder(7, choices={"node": "euler_parameters"}),
-    step_ladder(
-        7,
-        choices={"node": "rotation_vector"},
-        variant="_rotation_vector",
-        label="rotation vector",
-    ),
+_NEWMARK_LADDERS = tuple(
+    step_ladder(7, choices={"node": node}, variant=variant, label=label) for node, (variant, label) in _NODES.items()
 )
 
 METHODS = (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, is_constant, segments
@@ -11,24 +10,16 @@ from rotor_mbs.scenario.time_table import Interval, is_constant, segments
 ROTOR = 0  # the rotor's torque in `Scene.load_tables`
 
 
-class Drive(NamedTuple):
-    """What drives a coordinate (0: rotor): `factor` times the load at a place in `Scene.load_tables`."""
-
-    coordinate: int
-    load: int
-    factor: float
-
-
-def drives(scene: Scene) -> list[Drive]:
-    """Torques, and the moments k r of springs whose rest angle r changes over time; one that is constant is the
-    spring's own."""
-    all_drives = [Drive(0, ROTOR, 1.0)] if scene.has_torque else []
+def drives(scene: Scene) -> list[tuple[int, int, float]]:
+    """What drives a coordinate (0: rotor): a factor times the load at a place in `Scene.load_tables`. Torques, and the
+    moments k r of springs whose rest angle r changes over time; one that is constant is the spring's own."""
+    all_drives = [(0, ROTOR, 1.0)] if scene.has_torque else []
     for column in scene.moving_coordinates[1:]:
         torque, rest = scene.pitch_load(column - 1)
         if torque:
-            all_drives.append(Drive(column, 2 * column - 1, 1.0))
+            all_drives.append((column, 2 * column - 1, 1.0))
         if not is_constant(rest):
-            all_drives.append(Drive(column, 2 * column, scene.bearing(column - 1)[0]))
+            all_drives.append((column, 2 * column, scene.bearing(column - 1)[0]))
     return all_drives
 
 
@@ -64,9 +55,9 @@ class Moment:
 
 
 def moment_on(scene: Scene, loads: Loads, coordinate: int) -> Moment:
-    return Moment(loads, tuple((drive.load, drive.factor) for drive in drives(scene) if drive.coordinate == coordinate))
+    return Moment(loads, tuple((load, factor) for driven, load, factor in drives(scene) if driven == coordinate))
 
 
 def is_driven(scene: Scene, blade: int) -> bool:
     """Whether a spring, a damper or a torque acts on the pitch of a blade."""
-    return any(scene.bearing(blade)) or any(drive.coordinate == 1 + blade for drive in drives(scene))
+    return any(scene.bearing(blade)) or any(driven == 1 + blade for driven, _, _ in drives(scene))

@@ -12,18 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.lagrange import closed_form, hamilton
+from rotor_mbs.models.lagrange import closed_form, hamilton, taylor
 from rotor_mbs.models.lagrange.heyoka_adapter import Parameters, array_of, failure, heyoka
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.samples import constant_work
-from rotor_mbs.models.lagrange.taylor import (
-    build_system,
-    compiled,
-    equation_numbers,
-    is_compact,
-    set_parameters,
-    state_symbols,
-)
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
 
@@ -79,7 +71,7 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
         key = scene.rotor_key
         if key not in rotors:
             parameters = Parameters()
-            equation_numbers(scene, parameters)
+            taylor.equation_numbers(scene, parameters)
             _tip_numbers(scene, parameters)
             structure = (*parameters.structure, work_is_integrated(scene), *scene.moving_coordinates)
             rotors[key] = array_of(parameters.values, quad=False), structure
@@ -93,11 +85,11 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 def _integrator(structure: tuple[int, ...], tolerance: float, example: Scene) -> Any:
 
     def make() -> Any:
-        equations, _ = build_system(example, in_momenta=True)
-        options = {"tol": tolerance, "compact_mode": is_compact(example), "high_accuracy": True}
+        equations, _ = taylor.build_system(example, in_momenta=True)
+        options = {"tol": tolerance, "compact_mode": taylor.is_compact(example), "high_accuracy": True}
         return heyoka().taylor_adaptive_batch(equations, state=np.zeros((len(equations), lanes())), **options)
 
-    return compiled(("batch", tolerance, structure), make)
+    return taylor.compiled(("batch", tolerance, structure), make)
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[list[Any]]:
@@ -111,9 +103,9 @@ def _observables(example: Scene) -> Any:
     """Rates, then the tips and energies that are asked for, as compiled code from angles and momenta: a tenth of
     NumPy's time for the same formulas."""
     engine, parameters = heyoka(), Parameters()
-    form, loads = equation_numbers(example, parameters)
+    form, loads = taylor.equation_numbers(example, parameters)
     points = _tip_numbers(example, parameters)
-    angles, momenta = state_symbols(form)
+    angles, momenta = taylor.state_symbols(form)
     rates = hamilton.rates(angles, momenta, form, engine.sin, engine.cos)
     moving = dict(zip(example.moving_coordinates, angles, strict=True))
     pitches = [moving[i] if i in moving else parameters.own(Fraction(0)) for i in range(1, 1 + len(example.blades))]
@@ -125,7 +117,7 @@ def _observables(example: Scene) -> Any:
         observables += closed_form.energies(angles, rates, form, loads, engine.sin, engine.cos)
     # Where all terms of a row vanish, the closed form gives the number zero: the engine asks for an expression.
     rows = [engine.expression(0.0) + row for row in observables]
-    return engine.cfunc(rows, [*angles, *momenta], compact_mode=is_compact(example))
+    return engine.cfunc(rows, [*angles, *momenta], compact_mode=taylor.is_compact(example))
 
 
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
@@ -152,17 +144,17 @@ class _Group:
         self.places, self.scenes = places, scenes
         self.integrator = _integrator(structure, tolerance, example)
         outputs = example.wants("tip"), example.wants("energy")
-        self.observables = compiled(("observables", *outputs, structure), lambda: _observables(example))
+        self.observables = taylor.compiled(("observables", *outputs, structure), lambda: _observables(example))
 
         def momenta() -> Any:
             engine, parameters = heyoka(), Parameters()
-            form, _ = equation_numbers(example, parameters)
-            symbols, speeds = state_symbols(form)
+            form, _ = taylor.equation_numbers(example, parameters)
+            symbols, speeds = taylor.state_symbols(form)
             rows = hamilton.momenta(symbols, speeds, form, engine.sin, engine.cos)
             rows = [engine.expression(0.0) + row for row in rows]
-            return engine.cfunc(rows, [*symbols, *speeds], compact_mode=is_compact(example))
+            return engine.cfunc(rows, [*symbols, *speeds], compact_mode=taylor.is_compact(example))
 
-        self.momenta = compiled(("momenta", structure), momenta)
+        self.momenta = taylor.compiled(("momenta", structure), momenta)
         self.moving = example.moving_coordinates
         fixed = [i for i in range(len(example.initial_angles)) if i not in self.moving]
         angles = np.array([scene.initial_angles for scene in scenes]).T
@@ -186,7 +178,7 @@ class _Group:
             lanes = slice(i, i + width)
             self.integrator.set_time(np.zeros(width))
             self.integrator.state[:] = start[:, lanes]
-            set_parameters(self.integrator, numbers[:, lanes])
+            taylor.set_parameters(self.integrator, numbers[:, lanes])
             states[:, lanes] = self.integrator.propagate_grid(times[:, lanes])[1].transpose(1, 2, 0)
             for result in self.integrator.propagate_res:
                 message = failure(result[0])

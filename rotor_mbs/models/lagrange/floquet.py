@@ -57,53 +57,48 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
     Newton's method; the torque is an unknown. `guess` is a motion at a speed nearby, else steady rotation without
     gravity. Where there is no such motion, `message` says why. Raises MethodRefusal where heyoka is not installed."""
     try:
-        return _closed_turn(scene, speed, guess)
+        system = _Variational(scene)
+        n = system.coordinates
+        if guess is None:
+            angles = steady_rotation(scene, speed)[scene.moving_coordinates]
+            state, torque = np.concatenate([angles, [speed], np.zeros(n - 1)]), holding_torque(scene, speed)
+        else:
+            state, torque = guess.start * np.repeat([1.0, speed / guess.speed], n), guess.torque
+        units = np.repeat([1.0, speed], n)
+        period = 2.0 * math.pi / speed
+        shift = np.zeros(2 * n)
+        shift[0] = 2.0 * math.pi
+        form = rotor_form(scene)
+        best: Turn | None = None
+        for _ in range(_MAX_CORRECTIONS):
+            end, derivatives, trace = system.propagate(state, torque, period)
+            by_state, by_torque = derivatives[:, :-1], derivatives[:, -1]
+            residual = (end - state - shift) / units
+            mismatch = float(np.abs(residual).max())
+            if best is None or mismatch < best.mismatch:
+                # Gradient of energy less the torques' work, zero where dampers act; and the state's time derivative.
+                variables, loads = Jet.variables(state), loads_at_start(scene, torque)
+                kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
+                gradient = (kinetic + potential).slope
+                gradient[:n] -= [torque, *loads.pitches]
+                gradient = np.zeros(2 * n) if scene.has_damping else gradient
+                angles, rates = state[:n].tolist(), state[n:].tolist()
+                accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
+                flow = np.array([*rates, *accelerations])
+                best = Turn(speed, state, torque, by_state, gradient, flow, trace, mismatch)
+            if mismatch < _CLOSED or mismatch > _LOST:
+                break
+            jacobian = np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
+            sizes = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+            change = np.linalg.lstsq(jacobian / sizes, -residual, rcond=1e-13)[0] / sizes
+            torque, state = torque + change[0], state + np.concatenate([[0.0], change[1:]])
+        if best is None or best.mismatch > _ACCEPTED:
+            left = math.inf if best is None else best.mismatch
+            raise InputError(f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
     except InputError as exc:
         size = 2 * len(scene.moving_coordinates)
         nothing, matrix = np.full(size, np.nan), np.full((size, size), np.nan)
         return Turn(speed, nothing, math.nan, matrix, nothing, nothing, math.nan, math.nan, str(exc))
-
-
-def _closed_turn(scene: Scene, speed: float, guess: Turn | None) -> Turn:
-    """As `periodic_turn`. Raises InputError where there is none."""
-    system = _Variational(scene)
-    n = system.coordinates
-    if guess is None:
-        angles = steady_rotation(scene, speed)[scene.moving_coordinates]
-        state, torque = np.concatenate([angles, [speed], np.zeros(n - 1)]), holding_torque(scene, speed)
-    else:
-        state, torque = guess.start * np.repeat([1.0, speed / guess.speed], n), guess.torque
-    units = np.repeat([1.0, speed], n)
-    period = 2.0 * math.pi / speed
-    shift = np.zeros(2 * n)
-    shift[0] = 2.0 * math.pi
-    form = rotor_form(scene)
-    best: Turn | None = None
-    for _ in range(_MAX_CORRECTIONS):
-        end, derivatives, trace = system.propagate(state, torque, period)
-        by_state, by_torque = derivatives[:, :-1], derivatives[:, -1]
-        residual = (end - state - shift) / units
-        mismatch = float(np.abs(residual).max())
-        if best is None or mismatch < best.mismatch:
-            # Gradient of energy less the torques' work, zero where dampers act; and the state's time derivative.
-            variables, loads = Jet.variables(state), loads_at_start(scene, torque)
-            kinetic, potential = closed_form.energies(variables[:n], variables[n:], form, loads, sine, cosine)
-            gradient = (kinetic + potential).slope
-            gradient[:n] -= [torque, *loads.pitches]
-            gradient = np.zeros(2 * n) if scene.has_damping else gradient
-            angles, rates = state[:n].tolist(), state[n:].tolist()
-            accelerations = closed_form.accelerations(angles, rates, form, loads, math.sin, math.cos)
-            flow = np.array([*rates, *accelerations])
-            best = Turn(speed, state, torque, by_state, gradient, flow, trace, mismatch)
-        if mismatch < _CLOSED or mismatch > _LOST:
-            break
-        jacobian = np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
-        sizes = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-        change = np.linalg.lstsq(jacobian / sizes, -residual, rcond=1e-13)[0] / sizes
-        torque, state = torque + change[0], state + np.concatenate([[0.0], change[1:]])
-    if best is None or best.mismatch > _ACCEPTED:
-        left = math.inf if best is None else best.mismatch
-        raise InputError(f"no periodic motion found: a turn ends {left:.3g} rad away from its start")
     return best
 
 

@@ -162,12 +162,9 @@ def numbers(*values: float) -> str:
 
 
 def mjcf_file(scene: Scene) -> str:
-    """The MJCF text of a scene, for plain MuJoCo: with its initial state, its loads and something to look at.
-
-    Its time step is a whole part of the sample interval. The keyframe "start" has the initial state and the loads at
-    t = 0. A numeric "segment i" has the time in s from which loads follow it, then each actuator's torque in N m (or
-    rest angle in rad), then each one's slope per s.
-    """
+    """The MJCF text of a scene for plain MuJoCo, with a step that is a whole part of the sample interval, initial state
+    and loads at t = 0 in the keyframe "start", a numeric "segment i" (time, torques or rest angles, slopes), and
+    capsules to look at."""
     spacing = scene.duration / (scene.samples - 1)
     steps, _ = steps_and_rows(spacing, _FILE_STEP, rows_between=False)
     root, has_loads = model(scene, "rk4", spacing / steps), bool(loads_of(scene))

@@ -1,12 +1,6 @@
-"""The paper's own way from its matrices to the equations of motion, (24)-(38), for any number of blades.
-
-Each of the errata E1, E2, E3 can be left in or corrected.
-
-E1 and E2 stand in matrices and reach every equation after them. E3 stands in (53)-(55) alone, the general model of
-the rotor: (30), for one blade, is printed with the square of the pitch rate. As printed, then, one blade has the square
-and two or more blades have the first power. The coefficient of that term is zero once E2 is corrected, so that E3 alone
-changes nothing.
-"""
+"""The paper's own way from its matrices to the equations of motion, (24)-(38), for any number of blades, with each of
+the errata left in or corrected. E3 stands in (53)-(55) alone: (30), for one blade, is printed with the square of the
+pitch rate. The coefficient of that term is zero once E2 is corrected."""
 
 from __future__ import annotations
 

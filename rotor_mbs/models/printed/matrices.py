@@ -1,9 +1,6 @@
-"""The paper's transformation matrix (3) and its derivative matrices as printed, with errata E1, E2 switchable.
-
-Each function is one numbered equation: sines and cosines of q2, q3 and the lengths c, d in, four rows of four out.
-The arguments may be numbers, arrays or symbols. The constants d1, d2 of (2), (3) are zero here:
-they shift positions only.
-"""
+"""The paper's transformation matrix (3) and its derivative matrices as printed, with errata E1, E2 switchable: sines
+and cosines of q2, q3 (numbers, arrays or symbols) and the lengths c, d in. The constants d1, d2 of (2), (3) are
+zero."""
 
 from __future__ import annotations
 
@@ -16,12 +13,8 @@ LAST_ROW_OF_DERIVATIVE = (0, 0, 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Errata:
-    """Which of the three faults are in: True as printed, False corrected.
-
-    e1   (8) row 2 column 4 is c c3 (and (17) its derivative), where y does not depend on q2
-    e2   (19) row 1 column 4 has s2 in place of c2
-    e3   the last terms of (53)-(55) have the pitch rate in place of its square
-    """
+    """Which faults are in: e1, (8) row 2 column 4 is c c3 (and (17) its derivative), where y does not depend on q2; e2,
+    (19) row 1 column 4 has s2 in place of c2; e3, the last terms of (53)-(55) have the pitch rate, not its square."""
 
     e1: bool = True
     e2: bool = True

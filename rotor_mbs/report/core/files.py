@@ -98,7 +98,10 @@ def _environment() -> jinja2.Environment:
         keep_trailing_newline=True,
     )
     style, picture = ((_TEMPLATES / f"{name}.css").read_text(encoding="utf-8") for name in ("style", "picture"))
-    scripts = {path.stem: _script(path) for path in sorted(_TEMPLATES.glob("*.js"))}
+    scripts = {}
+    for path in sorted(_TEMPLATES.glob("*.js")):  # without indentation and without lines that are comments
+        lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
+        scripts[path.stem] = Markup("\n".join(line for line in lines if line and not line.startswith("//")))
     # For the content security policy of a page, which allows its script alone.
     digests = {name: hashlib.sha256(text.encode()).digest() for name, text in scripts.items()}
     hashes = {name: base64.b64encode(digest).decode("ascii") for name, digest in digests.items()}
@@ -127,9 +130,3 @@ def _breakable(text: str) -> Markup:
     if " " in text:
         return escape(numbers.typeset(text))
     return Markup(re.sub("([/_])", r"\1<wbr>", str(escape(text))))
-
-
-def _script(path: Path) -> Markup:
-    """The script without indentation and without lines that are comments."""
-    lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
-    return Markup("\n".join(line for line in lines if line and not line.startswith("//")))

@@ -57,12 +57,18 @@ def bench_pages(main: str, site: Site, results: OpenResults) -> dict[str, str]:
         if "is_short" not in curves[0].attributes:  # workers there keep what runs before have compiled
             caption = "With set-up (everything compiled anew) and reading out of samples"
             pictures.append(picture(diagram(curves, with_setup=True), "bench-1", caption))
+        orders = []
+        for curve in curves:
+            if "order_expected" in curve.attributes:
+                order = number(curve.attributes.get("order"), 3)
+                orders.append([method_cell(curve.name), order, f"{curve.attributes['order_expected']:g}"])
+        caption = "Fitted on the finest points above the round-off floor."
         page = {
             "scene": name,
             "facts": curves[0].attributes,
             "diagram": Section(pictures, cost_legend(curves)),
             "reach": Section(tables=[reach_table(curves)]),
-            "order": Section(tables=[_order_table(curves)]),
+            "order": Section(tables=[PageTable(caption, ["method", "order", "expected"], orders, numeric=(1, 2))]),
             "failures": Section(tables=[failure_table(curves, results.scenes.get(name))]),
             "points": Section(tables=[_point_table(curves)]),
             "csv": csv_file,
@@ -211,17 +217,6 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
         rows.append(row)
     head = ["method", *_TARGETS]
     return PageTable("Run time to an angle error, and its ratio to the fastest", head, rows, range(1, len(head)))
-
-
-def _order_table(curves: Sequence[Record]) -> PageTable:
-    """A row per fixed-step curve."""
-    rows = [
-        [method_cell(curve.name), number(curve.attributes.get("order"), 3), f"{curve.attributes['order_expected']:g}"]
-        for curve in curves
-        if "order_expected" in curve.attributes
-    ]
-    head = ["method", "order", "expected"]
-    return PageTable("Fitted on the finest points above the round-off floor.", head, rows, numeric=(1, 2))
 
 
 def _point_table(curves: Sequence[Record]) -> PageTable:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from markupsafe import Markup
 
@@ -13,7 +13,7 @@ from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.scene_tables import metric, status_text
-from rotor_mbs.runs.read import OpenResults, StoredScene
+from rotor_mbs.runs.read import OpenResults
 
 _TOKEN = re.compile(
     r"(?:(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)|q̇(?P<rate_index>\d)|(?P<name>[A-Za-zα-ω]))(?P<square>[²³]?)"
@@ -38,27 +38,15 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
         ],
         numeric=(4,),
     )
-    agreeing_rows = [(e.equation, e.entry, e.printed, number(e.difference)) for e in agreeing]
-    return {
-        "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in context.errata],
-        "differing": Section(tables=[differing_table]),
-        "effects": Section(tables=[_effects_table(opened.scenes, context.files)]),
-        "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows, numeric=(3,)),
-        "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
-    }
-
-
-def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
-    """What each erratum alone does: the largest angle change up to the horizon and over the whole run, energy gain."""
-    head = ["Scene"]
+    # What each erratum alone does.
+    effects_head = ["Scene"]
     for erratum in errata_methods():
-        head += [
-            f"{erratum}: {what}" for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain")
-        ]
-    rows: list[Row] = []
-    for name, scene in scenes.items():
+        for what in ("angle change to the horizon (rad)", "whole run (rad)", "energy gain"):
+            effects_head.append(f"{erratum}: {what}")
+    effects: list[Row] = []
+    for name, scene in opened.scenes.items():
         runs = [scene.methods.get(method) for method in errata_methods().values()]
-        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title)]
+        row: list[TableCell | str] = [TableCell(name, href=context.files[name], note=scene.title)]
         for run in runs:
             if run is None:
                 row += ["", "", ""]
@@ -67,8 +55,16 @@ def _effects_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) 
             row.append(TableCell(number(metric(run, "angle_error_max")), note=status))
             row += [number(metric(run, "angle_error_whole")), prefixed(metric(run, "energy_gain_J"), "J")]
         if any(run is not None for run in runs):
-            rows.append(row)
-    return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
+            effects.append(row)
+    effects_table = PageTable("", effects_head, effects, numeric=range(1, len(effects_head)))
+    agreeing_rows = [(e.equation, e.entry, e.printed, number(e.difference)) for e in agreeing]
+    return {
+        "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in context.errata],
+        "differing": Section(tables=[differing_table]),
+        "effects": Section(tables=[effects_table.without_empty_columns()]),
+        "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows, numeric=(3,)),
+        "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
+    }
 
 
 def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[tuple[str, list[list[Cell]]]]:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claim_study import HOLDS, ClaimShares
-from rotor_mbs.analysis.claims import ENERGY_RISE, Finding, Tally, finding
+from rotor_mbs.analysis.claim_study import HOLDS
+from rotor_mbs.analysis.claims import ENERGY_RISE, Tally, finding
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
@@ -56,6 +56,29 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
         for e in context.errata
     ]
+    # How much of the paper both equations reproduce, and the energy that they gain.
+    paper: list[Row] = []
+    if facts.numbers is not None:
+        paper.append(["Published numbers reproduced", _of(facts.numbers), _of(facts.numbers_corrected)])
+    if facts.numbers is not None and shares is not None:
+        counts = [f"{shares.count(method)[HOLDS]} of {len(shares.claims)}" for method in shares.methods]
+        paper.append(["Published claims that hold", *counts])
+    if facts.energy is not None:
+        rises = f"Scenes in which energy rises by more than {ENERGY_RISE:g} of its scale without work"
+        paper.append([rises, _of(facts.energy.rises), ""])
+        paper.append(["Largest spurious energy gain of a complete run", prefixed(facts.energy.gain, "J"), ""])
+    scene_head = ("Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain")
+    scene_rows: list[Row] = []
+    for name, scene in scenes.items():
+        cells: list[TableCell | str] = [TableCell(name, href=context.files[name], note=scene.title)]
+        cells += [str(scene.attributes.get("figures", "")), with_unit(horizon(scene), "s", 3)]
+        printed = scene.methods.get(run_selection.PRINTED)
+        if printed is None:
+            cells += ["", "", ""]
+        else:
+            cells += [status_cell(printed), number(metric(printed, "angle_error_whole"))]
+            cells.append(prefixed(metric(printed, "energy_gain_J"), "J"))
+        scene_rows.append(cells)
     agreement_head = (
         "Method", "Runs ok", "Largest angle error up to each scene's horizon (rad)", "Largest energy drift (relative)",
         "Longest run",
@@ -65,9 +88,9 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         errors = [number(row.angle_error), number(row.energy_drift), prefixed(row.longest_s, "s")]
         agreement_rows.append([method_cell(row.method), _of(row.runs), *errors])
     agreement = PageTable("", agreement_head, agreement_rows, (1, 2, 3, 4)).without_empty_columns()
-    errata_head = ("Erratum", "Equation", "Printed", "Correct", "Reason")
+    head = ("Erratum", "Equation", "Printed", "Correct", "Reason")
     return {
-        "paper": _paper_table(facts, shares),
+        "paper": PageTable("", ("Result", "As printed", "Corrected model"), paper, numeric=(1, 2)),
         "scene": shown,
         "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
         "still": still,
@@ -76,7 +99,7 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
         "methods": Section(tables=[agreement]),
         "heat": heat_map(scenes, context.files),
-        "scenes": Section(tables=[_scene_table(scenes, context.files)]),
+        "scenes": Section(tables=[PageTable("", scene_head, scene_rows, (2, 4, 5)).without_empty_columns()]),
         "numbers": Section(
             tables=[
                 claim_tables.number_table(claims),
@@ -89,29 +112,11 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             notes=[] if shares is None else [claim_tables.study_note(shares)],
         ),
         "errata": Section(
-            tables=[
-                PageTable("The errors in the printed equations; all else follows from them", errata_head, errata_rows)
-            ]
+            tables=[PageTable("The errors in the printed equations; all else follows from them", head, errata_rows)]
         ),
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
-
-
-def _paper_table(facts: Finding, shares: ClaimShares | None) -> PageTable:
-    """How much of the paper the printed and the corrected equations reproduce, and the energy that both gain."""
-    rows: list[Row] = []
-    if facts.numbers is not None:
-        rows.append(["Published numbers reproduced", _of(facts.numbers), _of(facts.numbers_corrected)])
-    if facts.numbers is not None and shares is not None:
-        counts = [f"{shares.count(method)[HOLDS]} of {len(shares.claims)}" for method in shares.methods]
-        rows.append(["Published claims that hold", *counts])
-    if facts.energy is not None:
-        gain = facts.energy.gain
-        rises = f"Scenes in which energy rises by more than {ENERGY_RISE:g} of its scale without work"
-        rows.append([rises, _of(facts.energy.rises), ""])
-        rows.append(["Largest spurious energy gain of a complete run", prefixed(gain, "J"), ""])
-    return PageTable("", ("Result", "As printed", "Corrected model"), rows, numeric=(1, 2))
 
 
 def _of(tally: Tally | None) -> str:
@@ -186,20 +191,3 @@ def heat_map(scenes: Scenes, files: Mapping[str, str]) -> dict[str, object] | No
     if not is_compared:
         return None
     return {"methods": [(label_of(name), name) for name in methods], "rows": rows, "key": sorted(key.items())}
-
-
-def _scene_table(scenes: Mapping[str, StoredScene], files: Mapping[str, str]) -> PageTable:
-    """A row per scene: its horizon, and what the printed model does."""
-    head = ("Scene", "Figure", "Horizon", "As printed, ode45", "departs by (rad, whole run)", "energy gain")
-    rows: list[Row] = []
-    for name, scene in scenes.items():
-        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title)]
-        row += [str(scene.attributes.get("figures", "")), with_unit(horizon(scene), "s", 3)]
-        run = scene.methods.get(run_selection.PRINTED)
-        if run is None:
-            row += ["", "", ""]
-        else:
-            row += [status_cell(run), number(metric(run, "angle_error_whole"))]
-            row.append(prefixed(metric(run, "energy_gain_J"), "J"))
-        rows.append(row)
-    return PageTable("", head, rows, numeric=(2, 4, 5)).without_empty_columns()

@@ -49,6 +49,19 @@ def stability_pages(opened: OpenResults, main: str, site: Site) -> dict[str, str
     pages = {main: render("stability", _map(runs, records, files, opened.scenes), site, main)}
     for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
         scene = opened.scenes[name]
+        ladders = {}
+        for record in records:
+            is_ladder = record.kind == "stability" and record.scene == name
+            if is_ladder and np.isfinite(record.arrays["angle_error_max"]).any():
+                ladders[record.method] = record.arrays
+        steps = Section()
+        if ladders:
+            curves = [
+                (arrays["step"], arrays["angle_error_max"], look_of(method)) for method, arrays in ladders.items()
+            ]
+            caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
+            shown = picture(plots.error_over_step(curves, TARGET), "steps", caption)
+            steps = Section([shown], quantities.run_legend(ladders))
         page = {
             "name": name,
             "title": scene.title,
@@ -59,7 +72,7 @@ def stability_pages(opened: OpenResults, main: str, site: Site) -> dict[str, str
             "outcomes": _outcomes(scene, [run for run in runs if run.scene == name]),
             "motion": _motion(run_selection.reference_or_corrected_run(scene)),
             "errors": _errors(scene),
-            "steps": _error_over_step([r for r in records if r.kind == "stability" and r.scene == name]),
+            "steps": steps,
             "previous": files.get(previous, ""),
             "next": files.get(following, ""),
         }
@@ -189,13 +202,3 @@ def _errors(scene: StoredScene) -> Section:
     energy, drawn = quantities.energy_picture(runs)
     legend = quantities.run_legend(name for name in runs if name in {*methods, *drawn})
     return Section([shown for shown in (*pictures, energy) if shown is not None], legend)
-
-
-def _error_over_step(ladders: Sequence[Record]) -> Section:
-    drawn = {r.method: r.arrays for r in ladders if np.isfinite(r.arrays["angle_error_max"]).any()}
-    if not drawn:
-        return Section()
-    curves = [(arrays["step"], arrays["angle_error_max"], look_of(name)) for name, arrays in drawn.items()]
-    caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
-    shown = picture(plots.error_over_step(curves, TARGET), "steps", caption)
-    return Section([shown], quantities.run_legend(drawn))
