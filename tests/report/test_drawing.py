@@ -8,8 +8,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 from matplotlib.lines import Line2D
-from rotor_mbs.report.plots.paths import paths, projected
-from rotor_mbs.report.plots.time_histories import Series
 from support.stored import rotor
 
 from rotor_mbs.analysis.campbell import FloquetTable, SceneModes
