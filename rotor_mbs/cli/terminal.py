@@ -197,7 +197,7 @@ def print_summary(report: RunReport, output: Path) -> int:
     is_lost = print_not_computed(report.made)
     counts = {
         "failed": len(report.failures),
-        "printed broke off": len(report.broken_off),
+        "of the printed equations not ok": len(report.printed_not_ok),
         "not computed": len(report.not_computed),
     }
     parts = [f"{len(report.made) - sum(counts.values())} ok", *(f"{n} {what}" for what, n in counts.items() if n)]

@@ -10,7 +10,7 @@ from typing import Self, TypeVar
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.runs.pool import TaskPool, run_in
+from rotor_mbs.runs.pool import Finished, TaskPool, run_in
 from rotor_mbs.runs.table import Place, Rows
 
 # Columns that a worker returns of rows that it has written.
@@ -54,27 +54,11 @@ class Task:
 T = TypeVar("T", bound=Task)
 
 
-@dataclass(frozen=True)
-class Ended:
-    """What became of a task.
-
-    Attributes
-    ----------
-    task : with its rows' place.
-    rows : status, message, run_time_s of its rows as they are stored; None where nothing is.
-    failure, message : why nothing is stored.
-    """
-
-    task: Task
-    rows: Rows | None
-    failure: str = ""
-    message: str = ""
-
-
-def compute(pool: TaskPool, perform: Callable[[T], Rows], tasks: Iterable[T]) -> Iterator[Ended]:
+def compute(pool: TaskPool, perform: Callable[[T], Rows], tasks: Iterable[T]) -> Iterator[Finished[T, Rows]]:
     """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the file.
 
-    However the loop ends, the rows of what has ended are in the file.
+    However the loop ends, the rows of what has ended are in the file. The `value` of a finished task is status, message
+    and run_time_s of its rows as they are stored; None where nothing is, and its failure and message say why.
 
     Parameters
     ----------
@@ -94,13 +78,13 @@ def compute(pool: TaskPool, perform: Callable[[T], Rows], tasks: Iterable[T]) ->
         if end.value is not None:
             if not pool.shares_disk:
                 task.place.write(task.first, end.value)
-            yield Ended(task, end.value)
+            yield end
             continue
         status = "solver_failed" if end.failure == "error" else end.failure
         rows = None if end.failure == "worker_died" else task.failed(status, end.message)
         if rows is not None:
             task.place.write(task.first, rows)
-        yield Ended(task, rows, end.failure, end.message)
+        yield Finished(task, rows, end.failure, end.message)
 
 
 def perform_and_store(perform: Callable[[T], Rows], task: T) -> Rows:

@@ -24,9 +24,9 @@ from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.pool import OF_THE_MACHINE, TaskPool, Workers, one_line, pool_of
+from rotor_mbs.runs.pool import OF_THE_MACHINE, Finished, TaskPool, Workers, one_line, pool_of
 from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables, row_of_run
-from rotor_mbs.runs.runner import Ended, Task, compute
+from rotor_mbs.runs.runner import Task, compute
 from rotor_mbs.runs.table import Rows, Table, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -111,8 +111,8 @@ class RunReport:
         return [run for run in self.made if run.is_stored and run.status != "ok" and is_corrected(run.method)]
 
     @property
-    def broken_off(self) -> list[Outcome]:
-        """Runs of the printed equations that did not reach the end."""
+    def printed_not_ok(self) -> list[Outcome]:
+        """Runs of the printed equations that are not ok."""
         return [run for run in self.made if run.is_stored and run.status != "ok" and not is_corrected(run.method)]
 
     @property
@@ -183,7 +183,7 @@ def run_scenes(
 
 def compute_in_order(
     pool: TaskPool, perform: Callable[[Any], Rows], tasks: Sequence[Task], others: Sequence[Task] = ()
-) -> Iterator[Ended]:
+) -> Iterator[Finished[Task, Rows]]:
     """References first; then, if their references are there, the other runs, the slowest first."""
     yield from compute(pool, perform, [task for task in tasks if task.reference is None])
     waiting = [task for task in (*tasks, *others) if task.reference is not None]
@@ -196,25 +196,25 @@ def compute_in_order(
     yield from compute(pool, perform, [*turns, *ready[quarter : count - quarter]])
     for task in waiting:
         if task not in ready:
-            yield Ended(task, None, "no_reference", "its reference was not computed")
+            yield Finished(task, None, "no_reference", "its reference was not computed")
 
 
-def outcomes(ends: Iterable[Ended], tasks: Sequence[Task]) -> Iterator[Outcome]:
+def outcomes(ends: Iterable[Finished[Any, Rows]], tasks: Sequence[Task]) -> Iterator[Outcome]:
     """What is reported of tasks that have ended."""
     work, done = sum(task.work for task in tasks), 0.0
     for end in ends:
         task = end.task
         done += task.work
         outcome = Outcome(task.label, task.method, end.failure, end.message, is_stored=False, share=done / work)
-        if end.rows is not None and isinstance(task, RunTask):
-            status, message = STATUSES[int(end.rows["status"][0])], text_of(end.rows["message"][0])
-            seconds = float("nan") if task.asked.is_shipped else float(end.rows["run_time_s"][0])
+        if end.value is not None and isinstance(task, RunTask):
+            status, message = STATUSES[int(end.value["status"][0])], text_of(end.value["message"][0])
+            seconds = float("nan") if task.asked.is_shipped else float(end.value["run_time_s"][0])
             is_shipped = task.asked.is_shipped
             outcome = replace(
                 outcome, status=status, message=message, seconds=seconds, is_stored=True, is_shipped=is_shipped
             )
-        elif end.rows is not None:
-            outcome = replace(outcome, status="ok", message=f"{len(end.rows['status'])} points", is_stored=True)
+        elif end.value is not None:
+            outcome = replace(outcome, status="ok", message=f"{len(end.value['status'])} points", is_stored=True)
         yield outcome
 
 

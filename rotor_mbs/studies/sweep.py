@@ -217,11 +217,11 @@ def run_sweep(
         for end in compute(pool, work, plan.chunks(place, _gaps(plan, statuses), pool.workers)):
             chunk = end.task
             assert isinstance(chunk, Chunk)
-            if end.rows is None:  # nothing is known of these runs: they stay missing
+            if end.value is None:  # nothing is known of these runs: they stay missing
                 lost += [f"run {run}: {end.message}" for run in range(chunk.first, chunk.first + len(chunk.values))]
                 on_progress(done, plan.runs, Counter({end.failure: len(chunk.values)}))
                 continue
-            stored = end.rows["status"]
+            stored = end.value["status"]
             statuses[chunk.first - plan.first : chunk.first - plan.first + len(stored)] = stored
             done += len(stored)
             on_progress(done, plan.runs, _counted(stored))
