@@ -48,16 +48,7 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
     vectors, singular_values, _ = np.linalg.svd(linear.C)
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
     N: Array = np.asarray(vectors[:, rank:])
-    # Difference quotients of C λ along each column of N.
-    start, here = system.coordinates, system.linearized(_STEPS[0]).C @ multipliers
-    quotients = []
-    for step in _STEPS:
-        columns = []
-        for direction in N.T:
-            system.coordinates = start + step * direction
-            columns.append((system.linearized(_STEPS[0]).C @ multipliers - here) / step)
-        quotients.append(np.array(columns).T)
-    geometric = limit_at_zero(quotients, 2.0)
+    geometric = limit_at_zero([_geometric_stiffness(system, multipliers, N, step) for step in _STEPS], 2.0)
     # Rates of the joint angles from those of the bodies' coordinates, positions and Euler parameters p; the angular
     # velocity is 2 (e0 ė - ė0 e + e × ė).
     bodies = chain.placed_bodies(state)
@@ -79,3 +70,15 @@ def linearize_chain(scene: Scene, angles: Sequence[float] | Array, speed: float,
 
 def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
     return Linearized(*(limit_at_zero(matrices, 2.0) for matrices in zip(*map(linearized, _STEPS), strict=True)))
+
+
+def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
+    """(n, free): difference quotients of C λ along each column of N."""
+    start = system.coordinates
+    here = system.linearized(_STEPS[0]).C @ multipliers
+    columns = []
+    for direction in N.T:
+        system.coordinates = start + step * direction
+        columns.append((system.linearized(_STEPS[0]).C @ multipliers - here) / step)
+    system.coordinates = start
+    return np.array(columns).T
