@@ -25,6 +25,8 @@ from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.trajectory import Array
 
 REST, ROTATION = "rest", "rotation"
+CLOSED_FORM = "lagrange"  # the source that others are compared with
+FLOQUET, CHART = f"{CLOSED_FORM}/floquet", f"{CLOSED_FORM}/chart"  # names of records
 # Sources agree where their frequencies differ by no more than this share.
 AGREEMENT = 1e-8
 # Frequencies below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
@@ -274,9 +276,9 @@ def to_records(modes: SceneModes, attributes: Mapping[str, Any]) -> list[Record]
     records = [_linear_record(modes.scene, source, common) for source in linear]
     if modes.floquet is not None:
         facts = {**common, "messages": list(modes.floquet.messages)}
-        records.append(_record(modes.scene, "lagrange/floquet", facts, _floquet_datasets(modes.floquet)))
+        records.append(_record(modes.scene, FLOQUET, facts, _floquet_datasets(modes.floquet)))
     if modes.chart is not None:
-        records.append(_record(modes.scene, "lagrange/chart", common, _chart_datasets(modes.chart)))
+        records.append(_record(modes.scene, CHART, common, _chart_datasets(modes.chart)))
     return records
 
 
@@ -332,13 +334,13 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
 def _from_records(scene: str, records: Mapping[str, Record]) -> SceneModes:
     facts = next(iter(records.values())).attributes
     states: dict[str, dict[str, LinearModes]] = {REST: {}, ROTATION: {}}
-    for name in sorted(records, key=lambda name: not name.startswith("lagrange/")):
+    for name in sorted(records, key=lambda name: name.partition("/")[0] != CLOSED_FORM):
         source, _, kind = name.partition("/")
         if kind in states:
             states[kind][source] = _linear(records[name], source, kind)
     floquet = chart = None
-    if "lagrange/floquet" in records:
-        arrays = records["lagrange/floquet"].arrays
+    if FLOQUET in records:
+        arrays = records[FLOQUET].arrays
         floquet = FloquetTable(
             speeds=arrays["speed"],
             multipliers=np.asarray(arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]),
@@ -347,10 +349,10 @@ def _from_records(scene: str, records: Mapping[str, Record]) -> SceneModes:
             product_error=arrays["product_error"],
             torque=arrays["torque"],
             mismatch=arrays["mismatch"],
-            messages=tuple(map(str, records["lagrange/floquet"].attributes["messages"])),
+            messages=tuple(map(str, records[FLOQUET].attributes["messages"])),
         )
-    if "lagrange/chart" in records:
-        arrays = records["lagrange/chart"].arrays
+    if CHART in records:
+        arrays = records[CHART].arrays
         chart = StabilityChart(arrays["speed"], arrays["bearing_stiffness"], arrays["largest_multiplier"])
     title, blades, gravity = str(facts["title"]), int(facts["blades"]), float(facts["gravity"])
     notes = tuple(str(facts["notes"]).splitlines())

@@ -26,7 +26,7 @@ from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.metrics import angle_error
-from rotor_mbs.studies.bench_timing import conduct, statistics
+from rotor_mbs.studies.bench import conduct, statistics
 from rotor_mbs.studies.bench_worker import Point, PointTimer, thinned, thinned_reference
 
 

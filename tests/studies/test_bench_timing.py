@@ -15,7 +15,7 @@ from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies import bench_worker
-from rotor_mbs.studies.bench_timing import Timings, allot, conduct, statistics
+from rotor_mbs.studies.bench import Timings, allot, conduct, statistics
 from rotor_mbs.studies.bench_worker import Point, PointTimer
 
 SCENE = paper("fig08", duration=1.0, samples=11)

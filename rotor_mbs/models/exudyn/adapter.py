@@ -13,7 +13,7 @@ import numpy as np
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.time_limit import MESSAGE, OutOfTimeError
-from rotor_mbs.models.exudyn.blueprint import LISTS, Part, Ref
+from rotor_mbs.models.exudyn.geometry import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.scenario.time_table import Interval, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration

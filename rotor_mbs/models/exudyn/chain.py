@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotor_mbs.models.exudyn import geometry
-from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
+from rotor_mbs.models.exudyn.geometry import Part, Ref, sensor
 from rotor_mbs.models.exudyn.loads import chain_sensors
 from rotor_mbs.models.exudyn.moments import Loads, Moment, is_driven, moment_on
 from rotor_mbs.scenario.scene import Scene

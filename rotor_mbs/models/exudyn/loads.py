@@ -7,8 +7,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
-from rotor_mbs.models.exudyn.geometry import ALONG_SHAFT, Body, fixed_blade_rotation, mounting, on_body, pitching
+from rotor_mbs.models.exudyn.geometry import (
+    ALONG_SHAFT,
+    Body,
+    Part,
+    Ref,
+    fixed_blade_rotation,
+    mounting,
+    on_body,
+    pitching,
+    sensor,
+)
 from rotor_mbs.models.exudyn.moments import ROTOR, is_driven
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, values_before

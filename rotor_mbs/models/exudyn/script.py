@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.models.exudyn import tree
-from rotor_mbs.models.exudyn.blueprint import LISTS, Ref
-from rotor_mbs.models.exudyn.geometry import pitching
+from rotor_mbs.models.exudyn.geometry import LISTS, Ref, pitching
 from rotor_mbs.models.exudyn.moments import Loads, Moment
 from rotor_mbs.scenario.scene import Scene
 

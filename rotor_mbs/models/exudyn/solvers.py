@@ -15,8 +15,8 @@ import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Solver
-from rotor_mbs.models.exudyn import blueprint, chain, sensor_samples, tree
-from rotor_mbs.models.exudyn.blueprint import Part
+from rotor_mbs.models.exudyn import chain, geometry, sensor_samples, tree
+from rotor_mbs.models.exudyn.geometry import Part
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme, SchemeSettings
 from rotor_mbs.scenario.scene import Scene
@@ -44,11 +44,11 @@ _DISTANCES = {quantity.name for quantity in BUILT_IN if quantity.judgement and n
 
 
 def tree_items(scene: Scene) -> list[BuiltItem]:
-    return blueprint.items(tree.parts(scene, Loads(scene)))
+    return geometry.items(tree.parts(scene, Loads(scene)))
 
 
 def chain_items(scene: Scene) -> list[BuiltItem]:
-    return blueprint.items(chain.parts(scene, Loads(scene)))
+    return geometry.items(chain.parts(scene, Loads(scene)))
 
 
 class MultibodySolver:

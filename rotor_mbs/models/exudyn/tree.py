@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotor_mbs.models.exudyn.blueprint import Part, Ref, sensor
-from rotor_mbs.models.exudyn.geometry import Body, blade_body, hub_body, mounting, on_body, pitching
+from rotor_mbs.models.exudyn.geometry import Body, Part, Ref, blade_body, hub_body, mounting, on_body, pitching, sensor
 from rotor_mbs.models.exudyn.loads import tree_sensors
 from rotor_mbs.models.exudyn.moments import Loads, moment_on
 from rotor_mbs.scenario.scene import Scene

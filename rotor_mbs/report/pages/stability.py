@@ -116,7 +116,7 @@ def _map(
     limits, conserved = [], []
     for record in records:
         facts = record.attributes
-        if record.kind == "stability_limits" and math.isfinite(facts["largest_stable_step_s"]):
+        if record.kind == "stability_limits" and math.isfinite(facts.get("largest_stable_step_s", math.nan)):
             step, theory, mode = facts["largest_stable_step_s"], facts["theory_s"], facts["fastest_mode_per_s"]
             numbers = [f"{step:.4g}", f"{theory:.4g}", f"{step / theory:.3f}", f"{step * mode:.3f}"]
             numbers.append(f"{facts['mode_damping_ratio']:.3g}")
