@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.files import DataTable, shown_names
+from rotor_mbs.foreign.table import DataTable, shown_names
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, file_key, wrong
 from rotor_mbs.scenario.scene import Scene

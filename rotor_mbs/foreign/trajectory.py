@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import Channel, read_mapping, sources
-from rotor_mbs.foreign.files import read_table, table_of
+from rotor_mbs.foreign.files import read_table
+from rotor_mbs.foreign.table import table_of
 from rotor_mbs.scenario.scene import Scene
 
 Array = NDArray[np.float64]

@@ -133,7 +133,9 @@ def is_known(name: str) -> bool:
     """Inputs, outputs with their pages and digests, and what stays until the next call of the same command."""
     outputs = "|".join(map(re.escape, OUTPUTS.values()))
     stems = "|".join(re.escape(Path(output).stem) for output in OUTPUTS.values())
-    known = rf"[abs]\.toml|whole\.h5|log|({outputs})|({stems})(-report|\.sha256)|\..*\.[0-9]+\.tmp|\..*\.lock"
+    known = (
+        rf"[abs]\.toml|whole\.h5|log|({outputs})(\.full\.h5)?|({stems})(-report|\.sha256)|\..*\.([0-9]+\.tmp|lock)"
+    )
     return bool(re.fullmatch(known, name))
 
 
@@ -179,6 +181,7 @@ def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, .
     for seed in range(signals):
         order = computing if seed % 2 else names
         name = order[seed // 2 % len(order)]
+        print(seed, name, flush=True)  # shown where it fails
         if end_once(disturbed, name, random.Random(seed)) and name in OUTPUTS:
             assert_same(name, disturbed, undisturbed)
             output = disturbed / OUTPUTS[name]
@@ -189,4 +192,4 @@ def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, .
     for name in names:
         finish(disturbed, COMMANDS[name])
         assert_same(name, disturbed, undisturbed)
-    assert not [path.name for path in disturbed.iterdir() if path.name.endswith((".tmp", ".lock"))]
+    assert not [path.name for path in disturbed.iterdir() if path.name.endswith((".tmp", ".lock", ".full.h5"))]

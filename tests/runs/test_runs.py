@@ -105,6 +105,22 @@ def test_names_and_units_keep_the_contract(results: Path) -> None:
             "engine_success engine_message versions crc32"
         )
         assert set(columns.split()) <= set(runs)
+        of_scene = runs["scene"].asstr()[()] == "paper/fig11"
+        for name in ("status", "samples"):  # in the table of the scene, too, so that one group is enough
+            np.testing.assert_array_equal(scene[name][()], runs[name][of_scene])
+
+
+def test_a_row_that_is_taken_back_is_missing_in_both_tables(tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    run(path, perform=perform_run)
+    TableFile(path).place(FIRST).mark_missing([0])
+    with h5py.File(path) as file:
+        table = file[SCENE.name]
+        assert table["run"].asstr()[table["status"][()] == -1].tolist() == [METHODS[0]]
+        assert file["runs/run"].asstr()[file["runs/status"][()] == -1].tolist() == [FIRST]
+    run(path, perform=perform_run)
+    with h5py.File(path) as file:
+        assert (file[f"{SCENE.name}/status"][()] == 0).all()
 
 
 @pytest.mark.skipif(shutil.which("h5dump") is None, reason="h5dump is not installed here")
