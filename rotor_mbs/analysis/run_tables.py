@@ -86,7 +86,7 @@ def finding_lines(facts: Finding, shares: ClaimShares | None) -> list[str]:
         lines.append(f"claims in words: {tally.count} of {tally.of} hold in the printed equations")
     if facts.energy is not None:
         rises = facts.energy.rises
-        lines.append(f"energy made from nothing by the printed equations: in {rises.count} of {rises.of} scenes")
+        lines.append(f"energy gained without work by the printed equations: in {rises.count} of {rises.of} scenes")
     return lines
 
 

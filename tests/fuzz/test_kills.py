@@ -133,9 +133,7 @@ def is_known(name: str) -> bool:
     """Inputs, outputs with their pages and digests, and what stays until the next call of the same command."""
     outputs = "|".join(map(re.escape, OUTPUTS.values()))
     stems = "|".join(re.escape(Path(output).stem) for output in OUTPUTS.values())
-    known = (
-        rf"[abs]\.toml|whole\.h5|log|({outputs})(\.full\.h5)?|({stems})(-report|\.sha256)|\..*\.([0-9]+\.tmp|lock)"
-    )
+    known = rf"[abs]\.toml|whole\.h5|log|({outputs})(\.full\.h5)?|({stems})(-report|\.sha256)|\..*\.([0-9]+\.tmp|lock)"
     return bool(re.fullmatch(known, name))
 
 
