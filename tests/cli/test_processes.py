@@ -27,6 +27,8 @@ values = [9.7, 9.8]
 
 
 def stored_runs(path: Path) -> set[tuple[str, str]]:
+    if not path.exists():
+        return set()
     with open_results(path) as results:
         return {(name, method) for name, scene in results.scenes.items() for method in scene.runs}
 
@@ -64,8 +66,8 @@ def test_an_ended_batch_continues_where_it_stopped(folder: Path, number: int) ->
     scenes = ("run", "paper/fig05", "paper/fig06", "-m", "exudyn_chain/generalized_alpha", "-m", "lagrange/dop853")
     command = [*PROGRAM, *scenes, "-o", "r.h5", "-j", "1"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as batch:
-        parts, deadline = folder / "r.h5.parts", time.monotonic() + 60.0
-        while len(list(parts.glob("*.h5"))) < 3 and time.monotonic() < deadline:
+        deadline = time.monotonic() + 60.0
+        while len(stored_runs(folder / "r.h5")) < 3 and time.monotonic() < deadline:
             time.sleep(0.02)
         if number == signal.SIGKILL:
             os.killpg(batch.pid, number)
@@ -74,9 +76,8 @@ def test_an_ended_batch_continues_where_it_stopped(folder: Path, number: int) ->
         _, errors = batch.communicate(timeout=30)
     assert batch.returncode == (130 if number == signal.SIGINT else -number)
     assert "Traceback" not in errors
-    finished = len(list(parts.glob("*.h5")))
+    finished = len(stored_runs(folder / "r.h5"))
     assert finished >= 3
-    assert not Path("r.h5").exists()
     again = rotor_mbs(*command[len(PROGRAM) :])
     assert again.status == 0, again.err
     assert f"{6 - finished} runs made" in again.out or finished == 6
