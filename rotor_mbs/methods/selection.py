@@ -15,6 +15,8 @@ _MAX_EXPLICIT_DECAY = 1e4
 _MAX_FIXED_STEP_TURN = 3e4
 # Share of the rotor's inertia that a quarter turn of the pitch leaves, below which rates jump there.
 _NEARLY_SINGULAR = 1e-3
+# The share below which SciPy's shortest step is too long to pass there: 3e-13 breaks off, 3e-10 passes.
+_NO_STEP_PASSES = 1e-11
 
 
 def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
@@ -30,6 +32,8 @@ def choose(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], st
         return (closed_form, "lagrange/radau"), reason
     # One point-mass blade that may come to a quarter turn of its pitch, on a hub that is light beside it.
     is_alone = len(scene.blades) == 1 and scene.blades[0].is_point_mass and _leaves_zero_pitch(scene)
+    if is_alone and scene.hub_inertia < _NO_STEP_PASSES * _rotor_inertia(scene):
+        return (closed_form,), "next to singular at a pitch of ±π/2: no other method passes there"
     if is_alone and scene.hub_inertia < _NEARLY_SINGULAR * _rotor_inertia(scene):
         return (closed_form, "lagrange/dop853"), "near the singular pitch of ±π/2: methods that choose their own step"
     if swing > _MAX_EXPLICIT_SWING:
