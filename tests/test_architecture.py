@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import shutil
+import subprocess
+import sys
 import tomllib
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
+
+import pytest
 
 from rotor_mbs.cli.arguments import _parser
 from rotor_mbs.methods.catalogue import methods
+from rotor_mbs.scenario.catalogue import find_scenes
+from rotor_mbs.scenario.scene import scene_hash
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "rotor_mbs"
@@ -60,6 +69,152 @@ def test_every_place_that_is_named_exists() -> None:
 
 # What to touch
 
+Patch = Mapping[str, Mapping[str, str]]  # by file: what is put in front of a text; for "" at the end
+REFUSAL = 'if scene.shaft_brake: raise MethodRefusal("no shaft brake")\n'
+IMPORT = {"from rotor_mbs.scenario.scene import": "from rotor_mbs.errors import MethodRefusal\n"}
+BRAKE = {"- form.shaft_damping * spin": "- form.shaft_brake "}
+# A constant moment against a rotor that turns forwards: computed by the closed form alone.
+SCENE_KEY: Patch = {
+    "scenario/scene.py": {
+        "pitch_torque: ": 'shaft_brake: float = _key("shaft.brake", keys.SIZE, "N m", default=0.0, added=True)\n    ',
+        "self.has_damping or": "self.shaft_brake != 0.0 or ",
+    },
+    "models/lagrange/parameters.py": {
+        "shaft_damping: Number": "shaft_brake: Number\n    ",
+        "convert(Fraction(scene.shaft_damping))": "convert(Fraction(scene.shaft_brake)), ",
+    },
+    "models/lagrange/closed_form.py": BRAKE | {"- form.shaft_damping * (spin": "- form.shaft_brake * spin "},
+    "models/lagrange/hamilton.py": BRAKE,
+    "models/printed/methods.py": {"for sentence, refused in": REFUSAL + 8 * " "},
+    "models/exudyn/moments.py": IMPORT | {"self.segments = ": REFUSAL + 8 * " "},
+    "models/mujoco/mjcf.py": IMPORT | {'root = ET.Element("mujoco"': REFUSAL + 4 * " "},
+    "solution/impulse.py": {"scene.shaft_damping * (angles": "scene.shaft_brake * run.time + "},
+}
+PAGE: Patch = {
+    "report/pages/names.py": {"": "def names_page(opened):\n    return [*opened.scenes]\n"},
+    "report/templates/names.html.j2": {"": '{% extends "base.html.j2" %}{% block main %}{{ page }}{% endblock %}'},
+    "report/core/files.py": {"Site = Seq": 'NAMES = "names.html"\n', "CHECK}": "NAMES, "},
+    "report/build.py": {
+        "from rotor_mbs.report.pages.scene ": "from rotor_mbs.report.pages.names import names_page\n",
+        "    names = {file": '    labels[files.NAMES] = "Names"\n',
+        "    return pages\n\n\ndef _run": '    pages[files.NAMES] = render("names", names_page(opened), site)\n',
+    },
+}
+MASS = "def mass(arguments):\n    print(mass_of(only_scene(arguments.scene)))\n    return 0\n"
+COMMAND: Patch = {
+    "cli/scenes.py": {"": f"\n\nfrom rotor_mbs.studies.masses import mass_of\n{MASS}"},
+    "cli/arguments.py": {
+        "    return parser, ": '    command("mass", "all blades", "scenes:mass").add_argument("scene")\n'
+    },
+    "studies/masses.py": {"": "def mass_of(scene):\n    return sum(blade.mass for blade in scene.blades)\n"},
+}
+RK4 = (ROOT / "tests" / "extension" / "rotor_rk4.py").read_text().partition("    bounds=")[0]
+BOUND = '\n[[bound]]\ncheck = "{}"\nmethod = "outside/*"\nvalue = 1e-6\nreason = "order 4"\n'
+ENGINE: Patch = {
+    "models/outside/__init__.py": {"": ""},
+    "models/outside/methods.py": {"": f"{RK4})\nMETHODS = (METHOD,)\n"},
+    "methods/catalogue.py": {
+        '    "rotor_mbs.models.muj': '    "rotor_mbs.models.outside.methods:METHODS": ("outside",),\n'
+    },
+    "reference/accuracy.toml": {"": "".join(map(BOUND.format, ("agreement", "tip", "energy", "impulse")))},
+    "pyproject.toml": {'"rotor_mbs.models.mujoco"]': '"rotor_mbs.models.outside", '},
+}
+
+
+def places_to_touch(addition: str) -> tuple[list[str], list[str]]:
+    """What the row of the table names, and of these what there always is to touch."""
+    row = re.findall(rf"^\| {addition} \| (.*) \|$", TEXT, re.M)[0].partition("; from outside")[0]
+    every, always = (
+        re.findall(r"`([\w/]+/(?:\w+\.\w+)?|\w+\.toml)`", text) for text in (row, row.split("; where it")[0])
+    )
+    return every, always
+
+
+class Copy:
+    """The package and its data in a folder, with a patch that touches what the table says and nothing else."""
+
+    def __init__(self, folder: Path, addition: str, patch: Patch) -> None:
+        every, always = places_to_touch(addition)
+        assert [file for file in patch if not file.startswith(tuple(every))] == []
+        assert [place for place in always if not any(file.startswith(place) for file in patch)] == []
+        self.folder = folder
+        for name in ("rotor_mbs", "reference", "scenarios"):
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copy(ROOT / "pyproject.toml", folder)
+        for name, additions in patch.items():
+            path = folder / name if (folder / name).exists() else folder / "rotor_mbs" / name
+            path.parent.mkdir(exist_ok=True)
+            text = path.read_text() if path.exists() else ""
+            for place, added in additions.items():
+                assert not place or text.count(place) == 1, (name, place)
+                text = text.replace(place, added + place) if place else text + added
+            path.write_text(text)
+
+    def python(self, *words: str, status: int = 0) -> str:
+        command, environment = [sys.executable, *words], {**os.environ, "PYTHONPATH": str(self.folder)}
+        done = subprocess.run(command, capture_output=True, text=True, cwd=self.folder, env=environment)
+        assert done.returncode == status, done
+        return done.stdout + done.stderr
+
+    def command(self, words: str, status: int = 0) -> str:
+        return self.python("-m", "rotor_mbs", *words.split(), status=status)
+
+
+@pytest.mark.full
+def test_a_scene_key_takes_the_files_of_its_row(tmp_path: Path) -> None:
+    """Then it is read, refused, hashed, swept, written and checked; a brake of 300 N m is a torque of -300 N m."""
+    models = {file.split("/")[1] for file in SCENE_KEY if file.startswith("models/")}
+    assert models == {path.parent.name for path in PACKAGE.glob("models/*/methods.py")}
+    copy = Copy(tmp_path, "a scene key", SCENE_KEY)
+    copy.python("-c", BRAKED_RUNS.replace("HASH", scene_hash(find_scenes(["paper/fig11"])[0])))
+    assert re.match(r"bad.toml:\d+: shaft.brake: 1e\+30 is out of range; allowed", copy.command("show bad.toml", 2))
+    copy.command("run braked.toml -m lagrange/dop853 -o runs.h5 -j 1")
+    copy.command("check runs.h5 -j 1")
+    for method in ("printed/ode45", "exudyn_tree/rk67", "exudyn_chain/newmark_index2", "mujoco/rk4"):
+        assert "no shaft brake" in copy.command(f"run braked.toml -m {method} -o no.h5", 2)
+    copy.command("new new.toml")
+    assert "brake = 0.0" in (tmp_path / "new.toml").read_text()
+
+
+BRAKED_RUNS = """
+import numpy as np, pathlib, rotor_mbs as rm
+from rotor_mbs.scenario.scene import scene_hash
+assert scene_hash(rm.scene("paper/fig11")) == "HASH"
+free = rm.scene("paper/fig11").replace(duration=1.0, samples=101)
+braked, driven = free.replace(**{"shaft.brake": 300}), free.replace(**{"torque.rotor": -300})
+assert scene_hash(free) != scene_hash(braked)
+pathlib.Path("braked.toml").write_text(braked.text)
+pathlib.Path("bad.toml").write_text(braked.text.replace("brake = 300.0", "brake = 1e30"))
+assert rm.load("braked.toml").shaft_brake == 300.0
+angles, same, other = (rm.run(scene, "lagrange/dop853").angles for scene in (braked, driven, free))
+assert abs(angles - same).max() < 1e-12 and abs(angles - other).max() > 1e-6
+swept = rm.sweep(free, {"shaft.brake": [0.0, 300.0]}).column("angles")
+assert abs(swept - np.array([other, angles])).max() < 1e-9
+"""
+
+
+@pytest.mark.full
+def test_a_page_takes_the_files_of_its_row(tmp_path: Path) -> None:
+    copy = Copy(tmp_path, "a page", PAGE)
+    copy.command("run paper/fig03 -m lagrange/dop853 -o runs.h5 -j 1")
+    copy.command("report runs.h5 -o pages")
+    assert "paper/fig03" in (tmp_path / "pages" / "names.html").read_text()
+    assert '<a href="names.html">Names</a>' in (tmp_path / "pages" / "index.html").read_text()
+
+
+def test_a_command_takes_the_files_of_its_row(tmp_path: Path) -> None:
+    copy = Copy(tmp_path, "a command", COMMAND)
+    assert "all blades" in copy.command("--help")
+    assert copy.command("mass paper/fig11") == "45000.0\n"
+
+
+@pytest.mark.full
+def test_an_engine_takes_the_files_of_its_row(tmp_path: Path) -> None:
+    copy = Copy(tmp_path, "an engine", ENGINE)
+    assert "  outside/rk4  " in copy.command("list")
+    copy.command("run paper/fig11 -m outside/rk4 -o runs.h5 -j 1")
+    assert "agreement: paper/fig11 outside/rk4" in copy.command("check runs.h5 -v -j 1")
+
 
 def test_every_row_of_the_table_is_tested_here() -> None:
     rows = re.findall(r"^\| (an? [a-z ]+) \|", TEXT.partition("## What to touch")[2].partition("##")[0], re.M)
@@ -80,8 +235,12 @@ def test_no_code_asks_for_a_method_by_the_beginning_of_its_name() -> None:
 def test_an_engine_is_its_package_and_one_line() -> None:
     for engine, package in (("exudyn", "models/exudyn/"), ("mujoco", "models/mujoco/"), ("heyoka", "models/lagrange/")):
         assert all(name.startswith(package) for name in naming(rf"^\s*(import|from) {engine}\b")), engine
-    lines = [line for line in SOURCES["methods/catalogue.py"].splitlines() if "rotor_mbs.models." in line]
-    assert len(lines) == len([path for path in (PACKAGE / "models").iterdir() if (path / "methods.py").exists()])
+    models = {path.parent.name for path in PACKAGE.glob("models/*/methods.py")}
+    for text in (
+        SOURCES["methods/catalogue.py"],
+        re.findall(r"modules = .*", (ROOT / "pyproject.toml").read_text())[0],
+    ):
+        assert set(re.findall(r'"rotor_mbs\.models\.(\w+)', text)) == models
 
 
 def test_a_quantity_is_its_declaration_and_its_producers() -> None:
@@ -90,14 +249,9 @@ def test_a_quantity_is_its_declaration_and_its_producers() -> None:
 
 
 def test_a_scene_key_is_the_scene_and_the_physics_it_changes() -> None:
-    outside = {name for name in naming(r"\bshaft_damping\b") if not name.startswith(("scenario/", "models/"))}
-    # The selection rule, the balance of momentum, where an exact solution ends, and a picture of what the damper takes.
-    assert outside <= {
-        "methods/selection.py",
-        "solution/impulse.py",
-        "analysis/exact.py",
-        "report/pages/scene.py",
-    }
+    keys = "hub_inertia|bearing_(stiffness|damping|rest)|bearing|shaft_damping|pitch_torque|rotor_torque"
+    every, _ = places_to_touch("a scene key")
+    assert [name for name in naming(rf"\bscene\.({keys})\b") if not name.startswith(("scenario/", *every))] == []
 
 
 def test_a_page_is_a_module_and_its_template() -> None:

@@ -20,6 +20,7 @@ from support.commands import PROGRAM, rotor_mbs
 import rotor_mbs as rm
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.report.build import write_report
+from rotor_mbs.runs.records import read_records
 
 SOURCES = Path(__file__).parent / "extension"
 PACKAGES = {
@@ -102,12 +103,12 @@ def test_show_and_a_wrong_name_know_the_method() -> None:
 
 def test_a_run_is_stored_judged_and_checked() -> None:
     command("run", "one.toml", "-m", "outside/rk4", "-m", "lagrange/dop853", "-o", "one.h5", "-j", "1")
-    with h5py.File("one.h5") as file:
-        run, other = file["one/outside/rk4"], file["one/lagrange/dop853"]
-        assert (run.attrs["status"], json.loads(run.attrs["settings"])) == ("ok", {"step": 2e-3})
-        assert np.abs(run["angles"][()] - other["angles"][()]).max() < 1e-9  # order 4: 1e-11 at this step
-        assert np.abs(run["tip"][()] - other["tip"][()]).max() < 1e-8
-        assert "shaft_momentum" not in other  # nobody asked for it
+    stored = rm.open("one.h5")
+    run, other = stored["one/outside/rk4"], stored["one/lagrange/dop853"]
+    assert (run.status, run.settings) == ("ok", {"step": 2e-3})
+    assert np.abs(run.angles - other.angles).max() < 1e-9  # order 4: 1e-11 at this step
+    assert np.abs(run["tip"] - other["tip"]).max() < 1e-8
+    assert "shaft_momentum" not in other.quantities  # nobody asked for it
     assert "agreement: one outside/rk4" in command("check", "one.h5", "-v")
 
 
@@ -147,18 +148,20 @@ def test_a_sweep_takes_its_runs_side_by_side_and_judges_them_by_its_own_bounds()
 def test_a_quantity_is_stored_judged_and_drawn_for_every_method() -> None:
     methods = ("outside/rk4", "lagrange/dop853", "exudyn_tree/rk67")
     command("run", "two.toml", *(word for method in methods for word in ("-m", method)), "-o", "two.h5", "-j", "1")
+    # At the start the pitches are at rest: the inertia about the shaft times the rotor's rate.
+    inertia = 5000.0
+    for theta in (0.3, -0.2):
+        s, c, (x, y, z) = np.sin(theta), np.cos(theta), (0.3, 0.1, 5.2)
+        inertia += s * s * 4000.0 + c * c * 4100.0 + 800.0 * (z * z + (c * x - s * y) ** 2)
+    stored = rm.open("two.h5")
+    for method in methods:
+        run = stored[f"two/{method}"]
+        assert run["shaft_momentum"].shape == (51,)
+        assert run["shaft_momentum"][0] == pytest.approx(0.4 * inertia, rel=1e-12)
+        assert 0.0 <= run.metrics["shaft_momentum_error_max"] < 1.0
     with h5py.File("two.h5") as file:
-        for method in methods:
-            stored = file[f"two/{method}/shaft_momentum"]
-            assert stored.attrs["units"] == "N m s"
-            assert stored.shape == (51,)
-            assert 0.0 <= file[f"two/{method}"].attrs["shaft_momentum_error_max"] < 1.0
-        # At the start the pitches are at rest: the inertia about the shaft times the rotor's rate.
-        inertia = 5000.0
-        for theta in (0.3, -0.2):
-            s, c, (x, y, z) = np.sin(theta), np.cos(theta), (0.3, 0.1, 5.2)
-            inertia += s * s * 4000.0 + c * c * 4100.0 + 800.0 * (z * z + (c * x - s * y) ** 2)
-        assert stored[0] == pytest.approx(0.4 * inertia, rel=1e-12)
+        column = file["two/shaft_momentum"]
+        assert (column.attrs["units"], column.shape) == ("N m s", (len(stored), 51))
     assert "momentum" in command("check", "two.h5", "-v")
     page = (write_report(Path("two.h5"), Path("pages")).parent / "two.html").read_text()
     assert "from outside, RK4" in page
@@ -168,16 +171,14 @@ def test_a_quantity_is_stored_judged_and_drawn_for_every_method() -> None:
 @pytest.mark.full
 def test_bench_measures_its_ladder_and_its_order() -> None:
     command("bench", "one.toml", "-m", "outside/rk4", "-o", "bench.h5", "--repeats", "2", "--budget", "30")
-    with h5py.File("bench.h5") as file:
-        curve = file["bench/one/outside/rk4"]
-        assert curve.attrs["order_expected"] == 4
-        assert abs(curve.attrs["order"] - 4.0) < 0.3
+    (curve,) = read_records(Path("bench.h5"), "bench")
+    assert (curve.name, curve.attributes["order_expected"]) == ("outside/rk4", 4)
+    assert abs(curve.attributes["order"] - 4.0) < 0.3
     assert "from outside, RK4" in Path("bench-report/index.html").read_text()
 
 
 @pytest.mark.full
 def test_stability_takes_it_with_its_label() -> None:
     command("stability", "one.toml", "-o", "stable.h5", "--report", "stable", "--timeout", "4")
-    with h5py.File("stable.h5") as file:
-        assert file["one/outside/rk4"].attrs["status"] == "ok"
+    assert rm.open("stable.h5")["one/outside/rk4"].status == "ok"
     assert "from outside, RK4" in Path("stable/index.html").read_text()
