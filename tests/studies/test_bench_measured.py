@@ -204,7 +204,7 @@ def test_bad_input_is_one_line(words: tuple[str, ...], says: str, tmp_path: Path
 Runner = Callable[[float], tuple[Callable[[], object], Callable[[], float]]]
 
 
-@pytest.mark.full
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["fig08", "fig09", "fig11"])
 def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
     """Time to 1e-9 rad before the horizon, all in one interleaved run; every method hands out the same 101 samples.
@@ -289,7 +289,7 @@ def test_the_taylor_method_against_dop853_as_others_use_it(name: str) -> None:
     assert ratios["numba"] > (0.7 if name == "fig08" else 1.0)
 
 
-@pytest.mark.full
+@pytest.mark.nightly
 def test_cost_of_the_chain_grows_no_faster_than_a_power_of_1_25_from_12_to_96_blades() -> None:
     """By processor time, the least of three. The dense factorization of before: 2.5."""
     sizes, times = (12, 23, 48, 96), []

@@ -94,15 +94,11 @@ def test_where_there_is_nothing_to_judge_the_command_says_so(
 
 
 @pytest.mark.full
-def test_the_default_set_passes_within_a_minute_of_two_cores(tmp_path: Path) -> None:
-    """All of it, as a user starts it; the time is that of its processes, which a busy machine does not lengthen."""
+def test_the_default_set_passes(tmp_path: Path) -> None:
+    """All of it, as a user starts it."""
     files = ["--json", tmp_path / "check.json", "--junit", tmp_path / "check.xml"]
-    before = os.times()
     done = _run_check(*map(str, files))
-    after = os.times()
     assert done.returncode == 0, done.stdout
-    seconds = after.children_user + after.children_system - before.children_user - before.children_system
-    assert seconds < 2 * 60.0
     rows = json.loads((tmp_path / "check.json").read_text())
     assert all(row["passed"] for row in rows)
 

@@ -30,7 +30,7 @@ from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.taylor import build_system
 from rotor_mbs.scenario.scene import Scene
 
-pytestmark = pytest.mark.full
+pytestmark = pytest.mark.nightly
 
 _RUNS, _MORE_RUNS = 4096, 16384
 _ROUNDS = 5
