@@ -101,6 +101,8 @@ def test_an_interrupt_that_becomes_another_error_without_a_trace(number: int, mo
     """NumPy's own loading: PyCapsule_Import("datetime") forgets why the import failed."""
 
     def interrupted() -> None:
+        if signal.getsignal(number) == signal.SIG_IGN:  # as nohup does with SIGHUP, which then is not the command's
+            pytest.skip("the signal is ignored here")
         with suppress(KeyboardInterrupt):
             signal.raise_signal(number)
         raise ImportError("PyCapsule_Import could not import module")

@@ -61,9 +61,7 @@ MUTANTS = {
         ODE45, "for row in INTERPOLANT])", "for row in INTERPOLANT]) * 1.001", "lagrange/ode45", "agreement .*ode45",
     ),
     "reader swap": (
-        READ, "            values = files.values_of(dataset)\n",
-        "            other = dataset.name.replace('exudyn_tree/rk67', 'lagrange/dop853')\n"
-        "            dataset = dataset.file[other]\n            values = files.values_of(dataset)\n",
+        READ, "stored.place(run)", "stored.place(run.replace('exudyn_tree/rk67', 'lagrange/dop853'))",
         "exudyn_tree/rk67 lagrange/dop853", "copied .*",
     ),
     "reference uncertainty x 1e20": (
