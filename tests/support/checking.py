@@ -123,8 +123,8 @@ def _wrong_seat(share: float) -> Iterator[None]:
         part = right(placed, where, rotation)
         if placed.name == "hub":
             return part
-        frame = part.parameters["localHT"]
-        moved = replace(frame, position=frame.position * (1.0 + share))
+        turned, position = part.parameters["localHT"]
+        moved = turned, position * (1.0 + share)
         return replace(part, parameters={**part.parameters, "localHT": moved})
 
     with mock.patch.object(chain, "_on_body", wrong):
