@@ -121,8 +121,8 @@ def open_file(path: Path) -> Iterator[Any]:
             raise StoreError(f"{path}: its attribute format is {written_by!r}; allowed: a file that rotor-mbs wrote")
         if version != FORMAT_VERSION:
             raise StoreError(
-                f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: the same command "
-                "with another output file, which computes the runs anew"
+                f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a file of this "
+                "version, whose runs are computed anew"
             )
         yield file
 

@@ -48,21 +48,27 @@ class StoredRun:
     _verify: bool = True
 
     @functools.cached_property
-    def _row(self) -> Rows:
-        """The columns of its row. Raises StoreError where they are not what was written."""
-        place = f"{self._place.path}: {self.scene}/{self.method}"
-        with files.reading(place):
-            row = self._place.read(file=self._file)
-        if self._verify and (checksums(self._place.first, row, self._place.row) != row["crc32"]).any():
-            raise StoreError(f"{place} changed after it was written")
-        return {_OWN_NAMES.get(name, name): values[0] for name, values in row.items()}
+    def _stored(self) -> Rows:
+        """The columns of its row as they are in the file."""
+        with files.reading(self._name):
+            return self._place.read(file=self._file)
 
     @functools.cached_property
     def is_damaged(self) -> bool:
         """Whether its row is not what was written."""
-        with files.reading(f"{self._place.path}: {self.scene}/{self.method}"):
-            row = self._place.read(file=self._file)
+        row = self._stored
         return bool((checksums(self._place.first, row, self._place.row) != row["crc32"]).any())
+
+    @functools.cached_property
+    def _row(self) -> Rows:
+        """The columns by the names of their quantities. Raises StoreError where they are not what was written."""
+        if self._verify and self.is_damaged:
+            raise StoreError(f"{self._name} changed after it was written")
+        return {_OWN_NAMES.get(name, name): values[0] for name, values in self._stored.items()}
+
+    @property
+    def _name(self) -> str:
+        return f"{self._place.path}: {self.scene}/{self.method}"
 
     @functools.cached_property
     def attributes(self) -> dict[str, Any]:
@@ -117,7 +123,7 @@ class StoredRun:
     def array(self, name: str) -> NDArray[Any]:
         """(samples, ...) An array, or a scale. Raises StoreError where the run has none of that name."""
         if name not in self:
-            raise StoreError(f"{self._place.path}: {self.scene}/{self.method} has no {name}")
+            raise StoreError(f"{self._name} has no {name}")
         if name in self.scales:
             return self.scales[name][: self.samples] if name == "time" else self.scales[name]
         values: NDArray[Any] = self._row[name][: self.samples]
