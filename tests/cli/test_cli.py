@@ -174,19 +174,6 @@ def test_run_writes_every_run_and_a_second_one_has_nothing_to_do(
     assert {path.name for path in Path().iterdir()} == {"quick.toml", "r.h5"}
 
 
-def test_a_scene_with_other_numbers_does_not_silently_replace_runs(quick: Path, stored: Path) -> None:
-    old = hashes(stored)
-    quick.write_text(QUICK.format(angle=0.6))
-    refused = rotor_mbs("run", quick, "-m", "lagrange/dop853", "-o", stored, "-j", "1")
-    assert refused.status == 2
-    assert "exudyn_tree/rk67" in refused.err
-    assert hashes(stored) == old
-    assert rotor_mbs("run", quick, *BOTH, "-o", stored, "-j", "1").status == 0
-    new = hashes(stored)
-    assert new.keys() == old.keys()
-    assert not set(new.values()) & set(old.values())
-
-
 @pytest.mark.full
 def test_a_run_over_its_time_limit_is_recorded_and_the_rest_goes_on(quick: Path) -> None:
     method = "exudyn_chain/generalized_alpha"
@@ -205,16 +192,6 @@ def test_a_run_without_a_single_finite_sample_is_stored_as_what_it_is() -> None:
         assert run.status == "diverged"
         assert run.attributes["false_success"] == 1
         assert not len(run.array("time"))
-
-
-@pytest.mark.full
-def test_samples_do_not_depend_on_the_number_of_processes(results: Path) -> None:
-    """Those of `results` are from one."""
-    assert rotor_mbs("run", "paper/fig08", "paper/fig11", *BOTH, "-j", "2", "-o", "2.h5").status == 0
-    with open_results(results) as one, open_results(Path("2.h5")) as two:
-        for name, scene in one.scenes.items():
-            for method, run in scene.runs.items():
-                assert (run.array("angles") == two.scenes[name].runs[method].array("angles")).all()
 
 
 # Bad input

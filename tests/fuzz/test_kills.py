@@ -21,6 +21,7 @@ import pytest
 from support.commands import PROGRAM
 from support.fuzzing import write
 from support.scenes import paper
+from support.sweeps import stored_runs
 
 from rotor_mbs.scenario.scene_file import scene_toml
 
@@ -30,7 +31,7 @@ pytestmark = [
 ]
 
 SWEEP = (
-    'title = "s"\nscene = "a.toml"\n[[axis]]\nkey = "initial.angles[1]"\nlinear = {start = 0, end = 0.1, count = 300}\n'
+    'title = "s"\nscene = "a.toml"\n[[axis]]\nkey = "initial.angles[1]"\nlinear = {start = 0, end = 0.1, count = 100}\n'
 )
 METHODS = "-m lagrange/dop853 -m exudyn_tree/rk67"
 # The output stands last; `check` has none.
@@ -86,7 +87,7 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
     Every fourth signal is a kill of one of its workers: the command then ends by itself, with 1 and a line on what is
     not computed where that worker had taken a task.
     """
-    before = temporaries(folder)
+    before, stored = temporaries(folder), stored_runs(folder / OUTPUTS["sweep"])
     mark, number = uuid.UUID(int=chance.getrandbits(128)).hex, chance.choice(SIGNALS)
     hits_worker = chance.random() < 0.25
     with (folder / "log").open("wb") as log:
@@ -118,6 +119,7 @@ def end_once(folder: Path, name: str, chance: random.Random) -> bool:
     while (left := processes_of(mark)) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not left, (name, number, left)
+    assert stored_runs(folder / OUTPUTS["sweep"]) >= stored, "finished runs were lost"
     if number != signal.SIGKILL:
         assert temporaries(folder) <= before, (name, number)  # those of killed processes stay until the next call
     unknown = [path.name for path in folder.iterdir() if not is_known(path.name)]
@@ -166,7 +168,7 @@ def assert_same(name: str, disturbed: Path, undisturbed: Path) -> None:
 
 @pytest.mark.parametrize(
     ("names", "signals"),
-    [(("run",), 2), pytest.param(tuple(COMMANDS), 200, marks=pytest.mark.nightly)],
+    [(("run", "sweep"), 4), pytest.param(tuple(COMMANDS), 200, marks=pytest.mark.nightly)],
     ids=["short", "long"],
 )
 def test_nothing_is_lost_and_nothing_is_left(tmp_path: Path, names: tuple[str, ...], signals: int) -> None:

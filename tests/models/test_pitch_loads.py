@@ -211,26 +211,6 @@ def test_every_load_at_once_follows_the_equations_written_anew(method: str) -> N
     assert np.abs(result.potential_energy - own).max() < gap * scale
 
 
-LOADS = ("blade_root_force", "blade_root_moment", "shaft_force", "shaft_moment", "pitch_actuator_moment")
-
-
-@pytest.mark.parametrize(
-    ("method", "bound"),
-    [
-        pytest.param(REFERENCE, 1e-12, marks=pytest.mark.full),
-        ("exudyn_tree/rk67", 1e-9),
-        pytest.param("exudyn_chain/newmark_index2", 2e-3, marks=pytest.mark.full),
-        ("mujoco/rk4", 1e-8),
-    ],
-)
-def test_loads_at_roots_and_actuators_with_every_load_at_once(method: str, bound: float) -> None:
-    """The actuator's moment is spring, command, damper and torque; bounds are shares of the largest load."""
-    scene = replace(EVERYTHING, outputs=("angles", "rates", "loads"))
-    exact, result = run(scene, "lagrange/dop853").quantities, run(scene, method).quantities
-    for name in LOADS:
-        assert np.abs(result[name] - exact[name]).max() < bound * np.abs(exact[name]).max(), name
-
-
 def test_a_command_on_a_spring_without_stiffness_does_nothing() -> None:
     free = replace(EVERYTHING, bearing_stiffness=())
     assert free.pitch_load(1) == (EVERYTHING.pitch_torque[1], ())

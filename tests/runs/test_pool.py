@@ -59,14 +59,6 @@ def _end(_: object) -> None:
     os._exit(3)
 
 
-def test_two_tasks_at_once_are_in_two_processes(tmp_path: Path) -> None:
-    with WorkerPool(2) as pool:
-        futures = [pool.submit(_meet, str(tmp_path), _LONG_S) for _ in range(2)]
-        found = {future.result() for future in futures}
-    assert len(found) == 2
-    assert os.getpid() not in found
-
-
 @pytest.mark.full
 def test_death_and_time_out_are_told_apart_and_cost_one_task_each(tmp_path: Path) -> None:
     with WorkerPool(2) as pool:
@@ -108,22 +100,6 @@ def test_a_process_killed_while_it_waits_is_replaced() -> None:
         assert pool.submit(_pid, None, _LONG_S).result() != pid
 
 
-def _large(size: int) -> bytes:
-    return bytes(size)
-
-
-@pytest.mark.full
-def test_a_process_killed_while_it_sends_a_result_does_not_stop_the_pool() -> None:
-    with WorkerPool(1) as pool:
-        for _ in range(5):
-            pid = pool.submit(_pid, None, _LONG_S).result()
-            large = pool.submit(_large, 1 << 28, _LONG_S)
-            time.sleep(0.1)
-            os.kill(pid, signal.SIGKILL)
-            assert large.exception() is None or isinstance(large.exception(), TaskLostError)
-        assert pool.submit(_pid, None, _LONG_S).exception() is None
-
-
 class _Unusual(Exception):
     """Is pickled, but not made of what it was pickled to."""
 
@@ -162,11 +138,6 @@ def test_an_error_of_a_task_arrives_and_its_process_goes_on(
         with pytest.raises(error, match=text):
             pool.submit(work, task, _LONG_S).result()
         assert pool.submit(_pid, None, _LONG_S).result() == pid
-
-
-def test_an_infinite_time_limit_is_none() -> None:
-    with WorkerPool(1) as pool:
-        assert pool.submit(_pid, None, float("inf")).result() > 0
 
 
 @pytest.mark.full

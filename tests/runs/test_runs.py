@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import resource
-import shutil
-import signal
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -123,13 +119,6 @@ def test_a_row_that_is_taken_back_is_missing_in_both_tables(tmp_path: Path) -> N
         assert (file[f"{SCENE.name}/status"][()] == 0).all()
 
 
-@pytest.mark.skipif(shutil.which("h5dump") is None, reason="h5dump is not installed here")
-def test_opens_in_h5dump(results: Path) -> None:
-    dump = subprocess.run(["h5dump", "-H", results], capture_output=True, text=True, check=True).stdout
-    assert 'DATASET "angles"' in dump
-    assert "DIMENSION_LIST" in dump
-
-
 # What a call computes
 
 
@@ -158,22 +147,6 @@ def test_runs_whose_reference_was_not_computed_are_not_computed(tmp_path: Path) 
     assert [outcome.status for outcome in report.not_computed] == ["worker_died", *["no_reference"] * 3]
     assert stored(tmp_path / "r.h5") == []
     assert len(made(run(tmp_path / "r.h5"))) == 4
-
-
-def dying(task: RunTask) -> Rows:
-    if task.asked.method == METHODS[1]:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return blank(task)
-
-
-@pytest.mark.full
-def test_a_worker_that_dies_leaves_nothing_and_the_same_call_tries_again(tmp_path: Path) -> None:
-    report = run(tmp_path / "r.h5", perform=dying, workers=2)
-    (lost,) = report.not_computed
-    assert (lost.method, lost.status) == (METHODS[1], "worker_died")
-    assert lost.message.endswith("and again when it was tried alone")
-    assert f"{SCENE.name}/{METHODS[1]}" not in stored(tmp_path / "r.h5")
-    assert made(run(tmp_path / "r.h5")) == [METHODS[1]]
 
 
 def test_an_interrupted_call_goes_on_where_it_stopped(tmp_path: Path) -> None:

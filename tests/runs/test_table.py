@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import signal
 import subprocess
 import sys
@@ -182,38 +180,6 @@ def test_a_file_that_was_cut_off_is_refused_with_one_line(path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.full
-def test_killed_at_any_moment_two_writers_lose_nothing(path: Path) -> None:
-    """Twenty kills while two processes fill the table; then the bytes are those of an undisturbed one."""
-    program = (
-        "import sys, pathlib, test_table as t\n"
-        "path, first = pathlib.Path(sys.argv[1]), int(sys.argv[2])\n"
-        "place = t._stored(path).place()\n"
-        "for start in list(range(first, t.ROWS, 2)) * 1000:\n"
-        "    place.write(start, t._rows(place, start, 1))\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
-    for round_ in range(20):
-        writers = [
-            subprocess.Popen([sys.executable, "-c", program, str(path), str(first)], env=environment)
-            for first in (0, 1)
-        ]
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            writers[0].wait(timeout=0.5 + 0.03 * round_)
-        for writer in writers:
-            writer.send_signal(signal.SIGKILL)
-            writer.wait()
-        stored = [row for row in range(ROWS) if row not in _missing(path)]
-        place = _stored(path).place()
-        for row in stored:
-            assert (place.read(1, row)["angles"] == row).all()
-    _fill(path, range(0, ROWS, 4))
-    other = path.with_name("undisturbed.h5")
-    lay_out(other, [_table()], {"title": "t"})
-    _fill(other, range(0, ROWS, 4))
-    assert path.read_bytes() == other.read_bytes()
-
-
 # Making a file fit what is asked
 
 
@@ -232,14 +198,6 @@ def _write(file: TableFile, run: str, value: float) -> None:
 def _runs(path: Path) -> list[str]:
     file = TableFile(path)
     return [run for run in file.table("runs").runs.tolist() if file.place(run).is_stored]
-
-
-def test_what_is_asked_again_changes_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "r.h5"
-    _write(extend_file(path, results_tables(_asked("lagrange/taylor"))), "paper/fig08/lagrange/taylor", 1.0)
-    before = path.read_bytes()
-    extend_file(path, results_tables(_asked("lagrange/taylor")))
-    assert path.read_bytes() == before
 
 
 def test_more_rows_keep_those_that_are_stored(tmp_path: Path) -> None:
@@ -292,11 +250,6 @@ def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     assert not changed.place("a", "stability").is_stored
     file = extend_file(path, [], dropped=[("stability", "a")])
     assert "stability" not in file.groups
-
-
-def test_a_sweeps_file_is_no_output_of_runs(path: Path) -> None:
-    with pytest.raises(StoreError, match="holds the dataset of a sweep"):
-        extend_file(path, results_tables(_asked("lagrange/taylor")))
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import resource
 import signal
-import subprocess
 import time
 from collections import Counter
 from pathlib import Path
@@ -16,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import rotor_mbs
-from support.sweeps import command, run_local, stored_runs, wait_for_runs, workers_of
+from support.sweeps import run_local
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.pool import SerialPool
@@ -186,17 +184,6 @@ def test_a_run_that_kills_its_worker_is_found_and_the_others_go_on(
     assert (again.made, again.statuses, again.is_ok, again.lost) == (1, {"ok": 32}, True, ())
 
 
-def _own_process(chunk: Chunk) -> Rows:
-    assert os.getpid() == int(os.environ["ROTOR_TEST_PARENT"])
-    return perform(chunk)
-
-
-def test_no_workers_are_this_process_as_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROTOR_TEST_PARENT", str(os.getpid()))
-    result = run_local(load_sweep(_file(tmp_path)), tmp_path / "o.h5", workers=0, work=_own_process)
-    assert result.statuses == {"ok": 8}
-
-
 def _hanging(chunk: Chunk) -> Rows:
     if chunk.first == 2:
         time.sleep(600.0)
@@ -230,104 +217,6 @@ def test_progress_counts_what_was_there_and_what_is_made(tmp_path: Path) -> None
         assert reports[0] == (8 - made, 8, 0)
         assert reports[-1][:2] == (8, 8)
         assert sum(new for _, _, new in reports) == made
-
-
-@pytest.mark.full
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
-def test_killed_and_terminated_a_sweep_continues_and_ends_with_the_same_bytes(tmp_path: Path) -> None:
-    path = _file(tmp_path, draws=30, duration=0.5)
-    whole, output = tmp_path / "whole.h5", tmp_path / "o.h5"
-    subprocess.run(command(path, whole), check=True, capture_output=True)
-    stored = 0
-    for victim in ("worker", "parent", "SIGTERM", "SIGINT"):
-        with subprocess.Popen(command(path, output), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-            wait_for_runs(process, output, stored + 1)
-            assert process.poll() is None, process.communicate()
-            if victim == "worker":
-                os.kill(workers_of(process)[0], signal.SIGKILL)
-                wait_for_runs(process, output, stored_runs(output) + 2)
-                process.kill()
-            elif victim == "parent":
-                process.kill()
-            else:
-                process.send_signal(getattr(signal, victim))
-                assert process.wait(30) == 130
-                assert process.stderr is not None
-                assert b"finished runs are stored, the same command continues" in process.stderr.read()
-        assert stored_runs(output) > stored, "finished runs were lost"
-        stored = stored_runs(output)
-    ended = subprocess.run(command(path, output, "--json"), check=True, capture_output=True)
-    made = json.loads(ended.stdout.splitlines()[-1])["made"]
-    assert made <= 60 - stored
-    assert output.read_bytes() == whole.read_bytes()
-
-
-_FAST = """
-title = "starts"
-scene = "paper/fig11"
-samples = 101
-draws = {draws}
-
-[[axis]]
-key = "initial.angles[1]"
-normal = ["pi/4", 1e-3]
-"""
-
-
-@pytest.mark.full
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the workers in /proc")
-@pytest.mark.parametrize(("kills", "draws"), [(5, 500), pytest.param(100, 2000, marks=pytest.mark.nightly)])
-def test_killed_at_random_moments_the_fast_path_loses_nothing(tmp_path: Path, kills: int, draws: int) -> None:
-    """Kills of the parent, every second one after one of a worker; the file opens in h5py and xarray all the time."""
-    path = tmp_path / "s.toml"
-    path.write_text(_FAST.format(draws=draws))
-    subprocess.run(command(path, tmp_path / "whole.h5"), check=True, capture_output=True)
-    whole = (tmp_path / "whole.h5").read_bytes()
-    rng = np.random.default_rng(3)
-    stored, complete, output = 0, 0, tmp_path / "0.h5"
-    for number in range(kills):
-        with subprocess.Popen(command(path, output), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-            _sleep(process, rng.uniform(0.3, 2.0))
-            workers = workers_of(process) if number % 2 and process.poll() is None else []
-            if workers:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(workers[0], signal.SIGKILL)
-                _sleep(process, rng.uniform(0.0, 1.0))
-            _open_everywhere(output)
-            process.kill()
-        assert stored_runs(output) >= stored, "finished runs were lost"
-        stored = stored_runs(output)
-        if stored == draws:
-            assert output.read_bytes() == whole
-            complete, stored = complete + 1, 0
-            output = tmp_path / f"{complete}.h5"
-    subprocess.run(command(path, output), check=True, capture_output=True)
-    assert output.read_bytes() == whole
-
-
-def _sleep(process: subprocess.Popen[bytes], seconds: float) -> None:
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(seconds)
-
-
-def _open_everywhere(output: Path) -> None:
-    if output.exists():
-        xarray = pytest.importorskip("xarray")
-        for engine in ("h5netcdf", "netcdf4"):
-            with xarray.open_dataset(output, engine=engine) as data:
-                assert data.angles.dims == ("run", "time", "coordinate")
-
-
-@pytest.mark.full
-def test_a_second_sweep_on_one_output_is_refused_with_one_line(tmp_path: Path) -> None:
-    path, output = _file(tmp_path, draws=40, duration=3.0), tmp_path / "o.h5"
-    with subprocess.Popen(command(path, output), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as first:
-        wait_for_runs(first, output, 1)
-        second = subprocess.run(command(path, output), capture_output=True, text=True)
-        first.kill()
-    assert second.returncode == 2
-    assert len(second.stderr.splitlines()) == 1
-    assert "another process is writing it now" in second.stderr
 
 
 def test_a_full_disk_is_one_line_before_the_first_run(tmp_path: Path) -> None:
