@@ -191,9 +191,7 @@ def wrong_scenes(scene: Scene, share: float) -> Iterator[tuple[str, Scene]]:
         for place, make in _numbers(getattr(scene, name)):
             changed = make(share)
             if name in ("pitch_torque", "bearing_rest") and not all(map(_is_in_order, changed)):
-                changed = make(
-                    -share
-                )  # a jump's first row can be moved back alone: times in decreasing order are refused
+                changed = make(-share)  # the first row of a jump: past the second one it would be refused
             yield f"{name}{place}", replace(scene, **{name: changed})
     for i, blade in enumerate(scene.blades):
         for name in ("mass", "centre_of_mass", "inertia", "tip"):
