@@ -273,7 +273,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "check", "accuracy verdicts; exit status 1 where one fails", "check:check",
+        "check", "accuracy verdicts; exit status 1 where one fails", "studies:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
     own.add_argument("file", nargs="?", type=path, metavar="FILE", help="results file (default: a quick set, computed)")

@@ -17,8 +17,8 @@ from concurrent.futures import CancelledError, Future
 from contextlib import ExitStack, suppress
 from typing import Any
 
-from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.pool import R, T, TaskPool, local_pool, one_line
+from rotor_mbs.errors import InputError, StoreError, one_line
+from rotor_mbs.runs.pool import R, T, TaskPool, local_pool
 from rotor_mbs.runs.versions import numerics_digest, versions
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
@@ -45,7 +45,7 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
 
 
 def _load() -> None:
-    pkgutil.resolve_name("rotor_mbs.studies.sweep_work:prepare")()  # by its name: only the workers import it
+    pkgutil.resolve_name("rotor_mbs.studies.sweep:prepare")()  # by its name: only the workers import it
 
 
 def _open_cluster(address: str) -> Cluster:

@@ -22,7 +22,7 @@ from multiprocessing import resource_tracker
 from queue import LifoQueue
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
-from rotor_mbs.errors import ResourceError, RotorError
+from rotor_mbs.errors import OF_THE_MACHINE, ResourceError, RotorError, one_line
 from rotor_mbs.runs import cores
 
 if TYPE_CHECKING:  # loaded with the first process
@@ -36,8 +36,6 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
-# What the machine lacks: an error of these is no result of a task.
-OF_THE_MACHINE = (MemoryError, OSError, ImportError, ResourceError)
 _RETRY_START_S = 1.0  # after the system had no room for a process
 _POLL_S = 1.0  # how often a waiting thread looks whether its pool still works
 
@@ -249,12 +247,6 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
             yield Finished(task, None, failure, one_line(error), error)
         else:
             yield Finished(task, None, failure, str(error))
-
-
-def one_line(error: BaseException) -> str:
-    """The type of an exception and the first line of its text."""
-    text = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {text[0] if text else 'no message'}"
 
 
 @contextmanager

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs import digests, files
+from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column
 from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.table import CHARACTER, MISSING, Place, Rows, Table, blank_rows, characters, text_of
@@ -248,14 +248,14 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
                 dataset = files.put(group, name, np.asarray(record.arrays[name]), column)
                 if f"{name}_labels" in record.attributes:
                     files.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
-        digests.seal_all(file)
+        files.seal_all(file)
 
 
 def _group_records(file: Any, kind: str) -> Iterator[Record]:
     for group in files.groups_in(file[kind]):
         if "record" not in group.attrs:
             continue
-        damages = [part for part in digests.damages_of(group) if part != files.DIGESTS]
+        damages = [part for part in files.damages_of(group) if part != files.DIGESTS]
         path = str(group.name).strip("/")
         if damages:
             raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")

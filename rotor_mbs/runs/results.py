@@ -26,11 +26,13 @@ from rotor_mbs.runs.table import STATUS_REPEATED, Place, Rows, StoredTable, Tabl
 from rotor_mbs.runs.versions import machine, row_versions, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.quantities import SCALES, quantities, scale_values
+from rotor_mbs.solution.quantities import LOADS, SCALES, quantities, scale_values
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, code_of
 
 RUNS = "runs"
+# What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
+FROZEN = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
 _OF_REFERENCE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
 # What a method that is no reference says of itself under such a name: its name in the file.
 OF_METHODS = {"angle_uncertainty": "own_uncertainty"}

@@ -23,12 +23,10 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, Column
-from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.files import CHARACTERS, Column, writing
 from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, columns_of, lay_out, stored_table
 from rotor_mbs.runs.versions import row_versions
-from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
+from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import SCALES, scale_values
 from rotor_mbs.solution.status import code_of

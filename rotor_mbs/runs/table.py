@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError, saving
-from rotor_mbs.runs import digests, files
+from rotor_mbs.runs import files
 from rotor_mbs.runs.files import Column
 from rotor_mbs.solution.status import STATUSES
 
@@ -237,7 +237,7 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
             files.put_attributes(file, attributes)
             for table in tables:
                 _put_table(file, table)
-            digests.seal_all(file)
+            files.seal_all(file)
         _reserve(temporary, temporary.stat().st_size)
         yield temporary
 
@@ -283,7 +283,7 @@ def _put_table(file: Any, table: Table) -> None:
     of_reference = [name for name, column in table.computed.items() if "run" not in column.dimensions]
     if of_reference:
         files.put_attributes(group, {_OF_REFERENCE: of_reference})
-    digests.seal(group, later=table.computed.keys())
+    files.seal(group, later=table.computed.keys())
 
 
 # Reading
@@ -337,7 +337,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
     _refuse_changes(item, group)
-    computed_names = digests.computed_in(digests.stored_digests(item.attrs))
+    computed_names = files.computed_in(files.stored_digests(item.attrs))
     attributes = files.attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
     known: dict[str, NDArray[Any]] = {}
@@ -373,7 +373,7 @@ def refuse_changed_layout(path: Path) -> None:
 
 
 def _refuse_changes(item: Any, group: str, *, with_columns: bool = False) -> None:
-    changed = digests.damages_of(item, with_columns=with_columns)
+    changed = files.damages_of(item, with_columns=with_columns)
     if changed:
         place = f"{item.file.filename}: {group or 'file'}"
         raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")

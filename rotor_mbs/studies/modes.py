@@ -30,7 +30,7 @@ from rotor_mbs.analysis.modes import GROWTH, floquet, isotropic_modes, modes_of,
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
-from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.records import Record, read_records, write_records
 from rotor_mbs.scenario.scene import Scene, scene_hash

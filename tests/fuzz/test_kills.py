@@ -22,7 +22,7 @@ from support.commands import PROGRAM
 from support.fuzzing import write
 from support.scenes import paper
 
-from rotor_mbs.scenario.scene_file import scene_toml
+from rotor_mbs.scenario.scene import scene_toml
 
 pytestmark = [
     pytest.mark.full,
