@@ -192,10 +192,8 @@ def new_group(parent: Any, name: str) -> Any:
 
 
 def put(group: Any, name: str, values: Any, quantity: Column | Quantity) -> Any:
-    """A dataset of numbers or texts with unit and long name; the scales of its dimensions must be there already.
-
-    A scale is its own dimension.
-    """
+    """A dataset of numbers or texts with unit and long name. The scales of its dimensions must be there already; a
+    scale is its own dimension."""
     is_text = len(values) > 0 and isinstance(values[0], str)
     data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
     return _described(group.create_dataset(name, data=data), group, quantity)
@@ -292,10 +290,8 @@ def is_group(item: Any) -> bool:
 def put_empty(
     group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity, fill: int | None = None
 ) -> Any:
-    """A contiguous dataset that has its place in the file now and is written by others.
-
-    fill   its first value; without one it is what the file system makes of a new file, zeros. Scales as in `put`.
-    """
+    """A contiguous dataset that has its place in the file now and is written by others; fill: its first value, by
+    default what the file system makes of a new file, zeros."""
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
     layout.set_obj_track_times(False)  # the same call gives the same bytes
@@ -331,9 +327,8 @@ def is_of_this_program(path: Path) -> bool:
 def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
     """Arrays of numbers of up to two dimensions and their units by name, of any HDF5 file: those of one group.
 
-    group   its path, or the end of it; may be left out where one group alone has arrays, or one alone but the
-            reference below `scene`
-    Raises StoreError with the groups that there are.
+    group: its path, or the end of it; may be left out where one group alone has arrays, or one alone but the reference
+    below `scene`. Raises StoreError with the groups that there are.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -489,15 +484,8 @@ _held: set[tuple[Path, int]] = set()
 
 @contextmanager
 def writing(output: Path) -> Iterator[None]:
-    """No other process writes `output` in the block; it may be entered again by the same thread.
-
-    Raises
-    ------
-    InputError
-        Where another process is writing it.
-    StoreError
-        Where it cannot be written.
-    """
+    """No other process writes `output` in the block; it may be entered again by the same thread. Raises InputError
+    where another process is writing it, StoreError where it cannot be written."""
     place = _resolved(output)
     own = place, threading.get_ident()
     if own in _held:

@@ -114,14 +114,9 @@ _UNITS = {"step": ("s", "fixed step"), "tolerance": ("1", "tolerance"), "order_e
 class Record:
     """A curve of a bench, a ladder of steps, or another group of arrays that belong together.
 
-    Attributes
-    ----------
-    kind : "bench", "stability", "stability_limits", "symmetry", "modes" or "comparison".
-    scene : "paper/fig05".
-    name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
-    attributes : plain values.
-    arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
-    columns : what the arrays are, scales first; of groups of arrays alone.
+    kind: a key of `COLUMNS`, "modes" or "comparison". name: the method, "lagrange/taylor"; of a bench with its fixed
+    choices behind, where they are not the default ones. arrays: (rows,) by name; `status` as codes of
+    `solution.status.STATUSES`. columns: what the arrays are, scales first; of groups of arrays alone.
     """
 
     kind: str
@@ -149,13 +144,7 @@ class Record:
 
 
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
-    """The table of these points.
-
-    Parameters
-    ----------
-    group : a key of `COLUMNS`.
-    points : of each the known columns by name: texts ("run", its label, "scene", "method_name", ...), and numbers.
-    """
+    """The table `group` of these points: of each the known columns by name."""
     known: dict[str, tuple[Column, Any]] = {
         name: (Column(("run",), "1", long_name), [str(point[name]) for point in points])
         for name, long_name in _KNOWN.items()
@@ -179,10 +168,7 @@ def row_of_point(place: Place, status: str, message: str, values: Mapping[str, o
 
 
 def read_records(path: Path, *kinds: str) -> list[Record]:
-    """The records of a file, of these kinds, in the order of the file. Raises StoreError.
-
-    A curve of which a point is missing is left out.
-    """
+    """The records of these kinds, in the order of the file; no curve of which a point is missing. Raises StoreError."""
     with files.open_file(path) as file, files.reading(path):
         there = [kind for kind in kinds if kind in file]
         tables = [kind for kind in there if kind in COLUMNS]

@@ -87,11 +87,8 @@ _TEXTS = {
 class Asked:
     """A run as it is asked for: a row of the design.
 
-    Attributes
-    ----------
-    scene, method, settings : settings in place of the method's defaults.
-    versions : of what computes it, by default those of this installation; of a reference that is read from a shipped
-        file also who computed it (`frozen_with`).
+    versions: of what computes it, by default those of this installation; of a reference that is read from a shipped
+    file also who computed it (`frozen_with`).
     """
 
     scene: Scene
@@ -214,12 +211,7 @@ def results_tables(asked: Sequence[Asked]) -> list[Table]:
 
 
 class TableFile:
-    """A file of tables whose rows are read and written by their places. Tables are read when they are asked for.
-
-    Attributes
-    ----------
-    path : of the file.
-    """
+    """A file of tables whose rows are read and written by their places. Tables are read when they are asked for."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -264,14 +256,11 @@ class TableFile:
     def take_back_missing(
         self, asked: Sequence[Asked], time_limit_s: float
     ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
-        """The runs that are to be computed, and those that are stored with their status and message.
+        """The runs that are to be computed, and those that are stored with their status and message; of `asked` runs,
+        of each scene the reference first.
 
         To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
         these; what is stored of them is taken back.
-
-        Parameters
-        ----------
-        asked : of each scene the reference first.
         """
         missing: dict[str, Asked] = {}
         kept: list[tuple[Asked, str, str]] = []
@@ -289,22 +278,13 @@ class TableFile:
 
 
 def extend_file(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = ()) -> TableFile:
-    """Make the file hold the rows of `wanted` tables, beside those that it has.
+    """Make the file hold the rows of `wanted` tables, beside those that it has, but for the (group, run) of `dropped`.
 
     Where it has all of them as they are asked for, nothing is written. Else a file is laid out beside it, the rows that
     stay are copied, and it takes the place of the old one. A row of which anything in the design differs (settings,
-    versions, the scene's numbers) is missing afterwards.
-
-    Parameters
-    ----------
-    dropped : (group, run) of rows that go.
-
-    Raises
-    ------
-    InputError
-        Where runs of a scene that has other numbers by now would be dropped and not computed again.
-    StoreError
-        Where the file cannot be read or written, or is a sweep's.
+    versions, the scene's numbers) is missing afterwards. Raises InputError where runs of a scene that has other numbers
+    by now would be dropped and not computed again, StoreError where the file cannot be read or written, or is a
+    sweep's.
     """
     if path.is_symlink():  # a link stays one
         path = path.resolve()

@@ -60,10 +60,8 @@ def modes_of_scenes(
 ) -> list[Outcome]:
     """The modes of every scene into the file `output`; those of other scenes that it has are kept.
 
-    speeds        rad/s, of the Campbell diagram and the Floquet multipliers
-    stiffnesses   N m/rad, of every bearing, for the stability chart over speed
-
-    Raises InputError for a negative or repeated speed or stiffness, StoreError, KeyboardInterrupt.
+    speeds: rad/s, of the Campbell diagram and the Floquet multipliers. stiffnesses: N m/rad, of every bearing, for the
+    stability chart over speed. Raises InputError for a negative or repeated speed or stiffness, StoreError.
     """
     speeds, stiffnesses = _increasing(speeds, "speeds"), _increasing(stiffnesses, "stiffnesses")
     made: list[Outcome] = []
@@ -218,10 +216,8 @@ def _linearized(method: Method, point: _Point) -> Linearization:
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
-    """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down.
-
-    Raises MethodRefusal where heyoka is not installed.
-    """
+    """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down. Raises
+    MethodRefusal where heyoka is not installed."""
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     turns: list[Turn] = []

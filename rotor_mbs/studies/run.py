@@ -67,14 +67,8 @@ def work_of(scene: Scene, method: str) -> float:
 class Outcome:
     """A run, or other rows of a study, that this call computed or tried to.
 
-    Attributes
-    ----------
-    label, method : what was computed.
-    status, message : of the run; of a task of which nothing is stored, why.
-    seconds : run time; NaN where nothing was timed.
-    is_stored : whether there is a row; else the same call tries again.
-    is_shipped : whether it was read from a shipped file and not computed.
-    share : how much of the work of the call was done when it ended, from 0 to 1.
+    seconds: run time; NaN where nothing was timed. is_stored: whether there is a row; else the same call tries again.
+    is_shipped: read from a shipped file and not computed. share: of the work of the call that was done when it ended.
     """
 
     label: str
@@ -361,12 +355,7 @@ def asked_methods(scenes: Sequence[Scene], names: Sequence[str]) -> dict[str, li
 
 def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], list[str]]:
     """The methods that each scene names itself, or that the rule selects, none where it refuses; and the reasons.
-
-    Raises
-    ------
-    InputError
-        Where a scene names a method that is unknown or cannot represent it.
-    """
+    Raises InputError where a scene names a method that is unknown or cannot represent it."""
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
     for scene in scenes:

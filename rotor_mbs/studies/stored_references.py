@@ -66,9 +66,7 @@ def digest(path: Path) -> str:
 
 def read_reference(place: Place, scene: Scene) -> Trajectory | None:
     """The reference of `scene` at a place of a results file, not to be changed; None where it is missing or empty.
-
-    Short ones stay in memory: a process judges runs of one scene by many methods.
-    """
+    Short ones stay in memory: a process judges runs of one scene by many methods."""
     row = place.read()
     samples = int(row["samples"][0])
     if int(row["status"][0]) == MISSING or samples <= 0:
@@ -103,13 +101,7 @@ def _rebuilt(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
 
 
 def frozen_solution(scene: Scene) -> Solution:
-    """The shipped reference of a scene, with the settings and times of when it was computed.
-
-    Raises
-    ------
-    StoreError
-        Where none is shipped.
-    """
+    """The shipped reference of a scene, with the settings and times of when it was computed. Raises StoreError."""
     shipped = shipped_reference(scene_hash(scene))
     if shipped is None:
         raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}; `rotor-mbs reference` makes one")

@@ -42,14 +42,8 @@ _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it re
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk(Task):
-    """Runs by one method, the first of them number `start`.
-
-    Attributes
-    ----------
-    values : (runs, keys) the varied numbers.
-    code : of the versions that compute them, stored with each.
-    time_limit_s : of one run.
-    """
+    """Runs by one method, the first of them number `start`; values: (runs, keys) the varied numbers; code: of the
+    versions that compute them, stored with each."""
 
     start: int
     values: NDArray[np.float64]
@@ -73,7 +67,7 @@ class Chunk(Task):
         return replace(self, start=self.start + start, values=values, kill_after_s=kill_after_s)
 
     def failed(self, status: str, message: str) -> Rows:
-        """The rows of runs whose process was ended, or that raised."""
+        """Of runs whose process was ended, or that raised."""
         rows = blank_rows(len(self.values), self.place.row)
         put_end(rows, slice(None), status, message)
         rows["time_reached"][:], rows["code"][:] = 0.0, self.code
@@ -92,13 +86,7 @@ def prepare() -> None:
 
 
 def perform(chunk: Chunk) -> Rows:
-    """(runs, ...) columns of all runs of a chunk.
-
-    Raises
-    ------
-    InputError, MethodRefusal
-        A run's own failure is in its row.
-    """
+    """(runs, ...) columns of all runs of a chunk; a run's own failure is in its row. Raises InputError, MethodRefusal."""
     rows = rows_of(chunk)
     rows["time_limit_s"][rows["status"] == code_of("timed_out")] = chunk.time_limit_s
     rows["code"][:] = chunk.code
@@ -237,11 +225,8 @@ OnProgress = Callable[[int, int, Counter[str]], None]
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """The runs of a sweep, or of one part of several, by its methods.
-
-    settings      by method, those of the sweep that it has
-    first, last   of its runs; run r is row r mod rows of the design, by method r div rows
-    """
+    """The runs first <= r < last of a sweep, by its methods; run r is row r mod rows of the design, by method r div
+    rows. settings: by method, those of the sweep that it has."""
 
     sweep: Sweep
     methods: tuple[str, ...]
@@ -344,10 +329,8 @@ class SweepPlan:
 def plan_sweep(
     sweep: Sweep, methods: Sequence[str] = (), part: tuple[int, int] = (1, 1), time_limit_s: float = 60.0
 ) -> SweepPlan:
-    """The runs of part k of n by `methods`, else by those of the file, each with a time limit in s.
-
-    Raises InputError for a method or a setting that is not there, MethodRefusal where a method cannot do them.
-    """
+    """The runs of part k of n by `methods`, else by those of the file. Raises InputError for a method or a setting that
+    is not there, MethodRefusal where a method cannot do them."""
     file = shown_path(sweep.path), sweep.text
     chosen = check_names(methods) if methods else of_file(*file, "methods", check_names, sweep.table.methods)
     settings = of_file(*file, "settings", settings_for, chosen, sweep.table.settings)
@@ -362,12 +345,9 @@ def plan_sweep(
 class SweepResult:
     """A sweep that is complete, but for runs that were lost.
 
-    runs, made   in the dataset, and by this call
-    statuses     how many runs have each status
-    seconds      of this call
-    is_ok        whether every run is ok whose method claims the correct equations
-    older        how many stored runs other versions computed than those here
-    lost         a line for each run whose process died or could not start, also when it was tried alone: not stored
+    runs, made: in the dataset, and by this call. is_ok: whether every run is ok whose method claims the correct
+    equations. older: how many stored runs other versions computed. lost: a line for each run whose process died or
+    could not start, also when it was tried alone: not stored.
     """
 
     path: Path
@@ -391,19 +371,9 @@ def run_sweep(
 ) -> SweepResult:
     """Computes the runs that `output` misses. However it is interrupted, the same call continues from there.
 
-    Parameters
-    ----------
-    pool : what runs the chunks; it stays open.
-    on_progress : called when runs have been stored, first with those that were there.
-    work : what is done with a chunk of runs in a worker.
-    fresh : whether runs that are stored are computed again.
-
-    Raises
-    ------
-    InputError, MethodRefusal
-        Where the sweep cannot be done, or the output is another file.
-    StoreError
-        Where the output cannot be written: what was stored stays.
+    on_progress: called when runs have been stored, first with those that were there. work: what is done with a chunk of
+    runs in a worker. fresh: whether runs that are stored are computed again. Raises InputError, MethodRefusal where the
+    sweep cannot be done, or the output is another file; StoreError where it cannot be written: what was stored stays.
     """
     start = time.monotonic()
     opened = open_sweep(output, plan.table(), plan.attributes(), plan.time_limit_s, fresh=fresh)
