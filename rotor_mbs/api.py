@@ -31,9 +31,7 @@ from rotor_mbs.runs.results import RUNS
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import MISSING, table_groups
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
-from rotor_mbs.scenario.plausibility import doubts
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.scene_file import load_scene, parse_scene
+from rotor_mbs.scenario.scene import Scene, doubts, load_scene, parse_scene
 from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.status import STATUSES

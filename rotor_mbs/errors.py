@@ -30,12 +30,22 @@ class ResourceError(RotorError):
     """The machine lacks what a run needs (memory, processes, open files); it says nothing about the run."""
 
 
+# What the machine lacks: an error of these is no result of a run.
+OF_THE_MACHINE = (MemoryError, OSError, ImportError, ResourceError)
+
+
 class StoreError(RotorError):
     """A results file that cannot be read or written; names the file and the reason."""
 
 
 class PlausibilityWarning(UserWarning):
     """A number that is allowed, and yet looks like a slip: degrees, millimetres, tonnes."""
+
+
+def one_line(error: BaseException) -> str:
+    """The type of an exception and the first line of its text."""
+    text = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {text[0] if text else 'no message'}"
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import pytest
 import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.cli.arguments import parse
-from rotor_mbs.scenario.scene_file import load_scene
+from rotor_mbs.scenario.scene import load_scene
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

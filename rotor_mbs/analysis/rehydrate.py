@@ -8,10 +8,9 @@ import numpy as np
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import REFERENCE, look_up
-from rotor_mbs.runs.freeze import KEPT
 from rotor_mbs.runs.read import StoredRun, StoredScene
-from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.scene_file import parse_scene
+from rotor_mbs.runs.results import FROZEN
+from rotor_mbs.scenario.scene import Scene, parse_scene
 from rotor_mbs.solution.quantities import known_quantities, quantities, row_shape
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
@@ -70,7 +69,7 @@ def _faults(scene: Scene, run: StoredRun, complete: bool = True) -> list[str]:
     rows = scene.samples if complete or "time" not in run else len(run.array("time"))
     expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
     for quantity in quantities(scene.outputs):
-        if _is_frozen(run) and quantity.name not in (*KEPT, *run.names):
+        if _is_frozen(run) and quantity.name not in (*FROZEN, *run.names):
             continue
         if quantity.required or (quantity.name == "angle_uncertainty" and run.method == REFERENCE):
             expected[quantity.name] = (rows, *row_shape(quantity, scene))

@@ -30,17 +30,9 @@ _received_signals: list[int] = []  # that this call was to end by
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command.
+    """Run a command: the words after `rotor-mbs`, by default those of this process.
 
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        The words after `rotor-mbs`; by default those of this process.
-
-    Returns
-    -------
-    int
-        0 done and all well; 1 done, but a check failed or a run did not succeed; 2 bad input; 130 interrupted.
+    Returns 0 done and all well; 1 done, but a check failed or a run did not succeed; 2 bad input; 130 interrupted.
     """
     words = sys.argv[1:] if argv is None else list(argv)
     with plain_streams():

@@ -167,13 +167,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Parse the words after `rotor-mbs`; ends with status 2 on bad usage.
-
-    Returns
-    -------
-    argparse.Namespace
-        The arguments; `command` is the place of the function to call, "module:function" in `rotor_mbs.cli`.
-    """
+    """The arguments; `command` is the place of the function to call, "module:function" in `rotor_mbs.cli`. Ends with
+    status 2 on bad usage."""
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
         parser.error(f"no command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")
@@ -273,7 +268,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.timeout()
 
     own = command(
-        "check", "accuracy verdicts; exit status 1 where one fails", "check:check",
+        "check", "accuracy verdicts; exit status 1 where one fails", "studies:check",
         "", "rotor-mbs-out/results.h5 --junit check.xml",
     )  # fmt: skip
     own.add_argument("file", nargs="?", type=path, metavar="FILE", help="results file (default: a quick set, computed)")

@@ -15,8 +15,7 @@ from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
 from rotor_mbs.methods.catalogue import check_names
-from rotor_mbs.runs.files import replace_file
-from rotor_mbs.runs.lock import is_being_written
+from rotor_mbs.runs.files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes

@@ -42,7 +42,7 @@ def list_all(arguments: argparse.Namespace) -> int:
 
 def new(arguments: argparse.Namespace) -> int:
     """A commented scene file; never in the place of another file."""
-    from rotor_mbs.scenario.scene_file import new_scene_text
+    from rotor_mbs.scenario.scene import new_scene_text
 
     if arguments.file.suffix != ".toml":
         raise InputError(f"{arguments.file}: is not a TOML file's name; allowed: a name that ends in .toml")

@@ -195,14 +195,16 @@ def span(seconds: float) -> str:
 def print_summary(report: RunReport, output: Path) -> int:
     """The runs in a few lines; the exit status: 1 where a run that should succeed did not, or was not computed."""
     is_lost = print_not_computed(report.made)
+    is_ok = [run.status == "ok" and run.is_stored for run in report.made]
+    failed, lost = len(report.failures), len(report.not_computed)
     counts = {
-        "failed": len(report.failures),
-        "of the printed equations not ok": len(report.printed_not_ok),
-        "not computed": len(report.not_computed),
+        "failed": failed,
+        "of the printed equations not ok": is_ok.count(False) - failed - lost,
+        "not computed": lost,
     }
-    parts = [f"{len(report.made) - sum(counts.values())} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
+    parts = [f"{sum(is_ok)} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
-    print(f"{output}: {made}, {report.kept} already stored")
+    print(f"{output}: {made}, {len(report.kept)} already stored")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
     return 1 if report.failures or is_lost or report.stored_failures else 0
@@ -210,7 +212,7 @@ def print_summary(report: RunReport, output: Path) -> int:
 
 def print_doubts(scenes: Sequence[Scene]) -> None:
     """A line for each number that looks like a slip; none for shipped scenes, which have a folder in their name."""
-    from rotor_mbs.scenario.plausibility import doubts
+    from rotor_mbs.scenario.scene import doubts
 
     for scene in scenes:
         for doubt in () if "/" in scene.name else doubts(scene):

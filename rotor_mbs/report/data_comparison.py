@@ -15,7 +15,7 @@ import numpy as np
 
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, from_dictionary
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.trajectory import load_data
+from rotor_mbs.foreign.channels import load_data
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels

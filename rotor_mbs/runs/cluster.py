@@ -17,8 +17,8 @@ from concurrent.futures import CancelledError, Future
 from contextlib import ExitStack, suppress
 from typing import Any
 
-from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.pool import R, T, TaskPool, local_pool, one_line
+from rotor_mbs.errors import InputError, StoreError, one_line
+from rotor_mbs.runs.pool import R, T, TaskPool, local_pool
 from rotor_mbs.runs.versions import numerics_digest, versions
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
@@ -31,10 +31,8 @@ _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_"
 
 
 def open_task_pool(name: str, workers: int) -> TaskPool:
-    """The engine called `name`, with `workers` processes where it is local; these load their code at once. 0: this one.
-
-    Raises InputError where there is no such engine, or it does not answer.
-    """
+    """The engine called `name`; of a local one the number of processes, 0 for this one. Raises InputError where there
+    is no such engine, or it does not answer."""
     if name == "local":
         for variable, value in _KEEP_MEMORY.items() if workers else ():
             os.environ.setdefault(variable, value)
@@ -45,7 +43,7 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
 
 
 def _load() -> None:
-    pkgutil.resolve_name("rotor_mbs.studies.sweep_work:prepare")()  # by its name: only the workers import it
+    pkgutil.resolve_name("rotor_mbs.studies.sweep:prepare")()  # by its name: only the workers import it
 
 
 def _open_cluster(address: str) -> Cluster:
@@ -137,10 +135,8 @@ def refuse_other_code(expected: Mapping[str, str]) -> None:
 
 
 def run_as_worker(work: Callable[[T], R], task: T, timeout_s: float, expected: Mapping[str, str]) -> R:
-    """Ends this worker process where the task takes too long (dask has no time limits); its nanny starts a new one.
-
-    By a watchdog outside the interpreter: an engine that hangs may hold the interpreter's lock.
-    """
+    """Ends this worker process where the task takes too long, as dask has no time limits; its nanny starts a new one.
+    By a watchdog outside the interpreter: an engine that hangs may hold the interpreter's lock."""
     import faulthandler
 
     refuse_other_code(expected)  # the worker may have joined later

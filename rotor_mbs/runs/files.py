@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
+import re
+import socket
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,11 +17,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import StoreError, saving
+from rotor_mbs.errors import InputError, StoreError, saving
 from rotor_mbs.solution.quantities import Quantity
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
+
 
 FORMAT = "rotor_mbs"
 FORMAT_VERSION = 2
@@ -187,10 +192,8 @@ def new_group(parent: Any, name: str) -> Any:
 
 
 def put(group: Any, name: str, values: Any, quantity: Column | Quantity) -> Any:
-    """A dataset of numbers or texts with unit and long name; the scales of its dimensions must be there already.
-
-    A scale is its own dimension.
-    """
+    """A dataset of numbers or texts with unit and long name. The scales of its dimensions must be there already; a
+    scale is its own dimension."""
     is_text = len(values) > 0 and isinstance(values[0], str)
     data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
     return _described(group.create_dataset(name, data=data), group, quantity)
@@ -287,10 +290,8 @@ def is_group(item: Any) -> bool:
 def put_empty(
     group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity, fill: int | None = None
 ) -> Any:
-    """A contiguous dataset that has its place in the file now and is written by others.
-
-    fill   its first value; without one it is what the file system makes of a new file, zeros. Scales as in `put`.
-    """
+    """A contiguous dataset that has its place in the file now and is written by others; fill: its first value, by
+    default what the file system makes of a new file, zeros."""
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
     layout.set_obj_track_times(False)  # the same call gives the same bytes
@@ -326,9 +327,8 @@ def is_of_this_program(path: Path) -> bool:
 def read_arrays(path: Path, group: str = "", scene: str = "") -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
     """Arrays of numbers of up to two dimensions and their units by name, of any HDF5 file: those of one group.
 
-    group   its path, or the end of it; may be left out where one group alone has arrays, or one alone but the
-            reference below `scene`
-    Raises StoreError with the groups that there are.
+    group: its path, or the end of it; may be left out where one group alone has arrays, or one alone but the reference
+    below `scene`. Raises StoreError with the groups that there are.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -370,3 +370,179 @@ def _array_places(file: Any) -> dict[str, list[str]]:
 
     file.visititems(note)
     return places
+
+
+ATTRIBUTES = "attributes"
+_COMPUTED = "attributes of "
+
+# What the library writes and changes by itself.
+_NOT_COVERED = (DIGESTS, "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates")
+
+
+def array_digest(values: NDArray[Any]) -> str:
+    """Over shape and values as little-endian numbers: the same on every machine and for every HDF5 layout."""
+    return str(_of_array(values).hexdigest())
+
+
+def _of_array(values: NDArray[Any]) -> Any:
+    if values.dtype.kind == "O":  # texts
+        return hashlib.sha256("\0".join(map(str, values.tolist())).encode())
+    values = np.ascontiguousarray(values)
+    digest = hashlib.sha256(f"{values.dtype.kind}{values.dtype.itemsize}{values.shape}".encode())
+    digest.update(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes())
+    return digest
+
+
+def dataset_digest(values: NDArray[Any], attributes: Mapping[str, Any]) -> str:
+    """Over values, units, long name and further attributes."""
+    digest = _of_array(values)
+    digest.update(attributes_digest(attributes).encode())
+    return str(digest.hexdigest())
+
+
+def attributes_digest(attributes: Mapping[str, Any]) -> str:
+    """Over names and values, in any order."""
+    covered = {name: plain(attributes[name]) for name in attributes if name not in _NOT_COVERED}
+    return hashlib.sha256(json.dumps(covered, sort_keys=True).encode()).hexdigest()
+
+
+def seal(group: Any, later: Collection[str] = ()) -> None:
+    """Store the digests of a group; of the datasets `later`, which are computed later, those of their attributes."""
+    sums = {ATTRIBUTES: attributes_digest(group.attrs)}
+    for name, item in group.items():
+        if name in later:
+            sums[label_of(name)] = attributes_digest(item.attrs)
+        elif not is_group(item) and not is_dimension_only(item):
+            sums[name] = _digest_of(item)
+    group.attrs[DIGESTS] = json.dumps(sums)
+
+
+def _digest_of(dataset: Any) -> str:
+    values = texts_of(dataset) if is_text(dataset) else values_of(dataset)
+    return dataset_digest(values, dataset.attrs)
+
+
+def seal_all(group: Any) -> None:
+    """Store the digests of every group that has none yet."""
+    if DIGESTS not in group.attrs:
+        seal(group)
+    for name in group:
+        if is_group(group.get(name)):
+            seal_all(group[name])
+
+
+def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
+    """The parts of a group, "attributes" or names of datasets, that are not what was written, are new or are gone.
+
+    "digests" where it has none. Links, and arrays that cannot be read, count too. with_columns: the attributes of
+    datasets that are computed, too, which takes most of the time.
+    """
+    try:
+        known = stored_digests(group.attrs)
+    except ValueError:
+        known = {}
+    if not known:
+        return [DIGESTS]
+    sums = {ATTRIBUTES: attributes_digest(group.attrs)}
+    for name in group:
+        is_computed = label_of(name) in known
+        label = label_of(name) if is_computed else name
+        if is_computed and not with_columns and not is_link(group, name):
+            sums[label] = known[label]
+            continue
+        sums[label] = ""
+        with suppress(StoreError), reading(""):
+            item = member(group, name)
+            if is_group(item) or is_dimension_only(item):
+                del sums[label]
+            else:
+                sums[label] = attributes_digest(item.attrs) if is_computed else _digest_of(item)
+    return [name for name in {**known, **sums} if known.get(name) != sums.get(name)]
+
+
+def stored_digests(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """By name; {} where there are none. Raises ValueError where they cannot be read."""
+    found = json.loads(str(attributes.get(DIGESTS, "{}")))
+    if not isinstance(found, dict):
+        raise ValueError("no object of digests")
+    return found
+
+
+def label_of(name: str) -> str:
+    """What the digest of a dataset's attributes alone is called."""
+    return f"{_COMPUTED}{name}"
+
+
+def computed_in(digests: Mapping[str, str]) -> list[str]:
+    """The datasets whose attributes alone are covered."""
+    return [name.removeprefix(_COMPUTED) for name in digests if name.startswith(_COMPUTED)]
+
+
+# Outputs that this process is writing, by thread: a study takes the lock, and so does what it calls.
+_held: set[tuple[Path, int]] = set()
+
+
+@contextmanager
+def writing(output: Path) -> Iterator[None]:
+    """No other process writes `output` in the block; it may be entered again by the same thread. Raises InputError
+    where another process is writing it, StoreError where it cannot be written."""
+    place = _resolved(output)
+    own = place, threading.get_ident()
+    if own in _held:
+        yield
+        return
+    from filelock import FileLock, Timeout
+
+    path = _lock_of(place)
+    lock = FileLock(path, timeout=0)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise InputError(f"{path}: is a foreign file; allowed: another output, or remove it")
+        lock.acquire()
+    except Timeout:
+        owner = ""
+        with suppress(OSError, UnicodeDecodeError):
+            owner = path.read_text()
+        writer = f"another process is writing it now{f' ({owner})' if owner else ''}"
+        raise InputError(f"{output}: {writer}; allowed: wait for its end, or another output") from None
+    except OSError as exc:
+        raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
+    _held.add(own)
+    try:
+        _remove_temporaries(place)
+        with suppress(OSError):  # a full disk is reported by what is written to the output
+            path.write_text(f"process {os.getpid()} on {socket.gethostname()}")
+        yield
+    finally:
+        _held.remove(own)
+        with suppress(OSError):
+            path.unlink()
+        lock.release()
+
+
+def is_being_written(output: Path) -> bool:
+    """Whether another process writes it now, or was killed while it did."""
+    return _lock_of(_resolved(output)).exists()
+
+
+def _lock_of(place: Path) -> Path:
+    return place.with_name(f".{place.name}.lock")
+
+
+def _resolved(output: Path) -> Path:
+    """The file itself where the output is a symbolic link: both names are one output."""
+    try:
+        return output.resolve() if output.is_symlink() else Path(os.path.abspath(output))  # noqa: PTH100  (links stay)
+    except (OSError, RuntimeError) as exc:  # links in a circle, a working folder that is gone
+        reason = getattr(exc, "strerror", None) or "leads to no file"
+        raise StoreError(f"{output}: cannot be written: {reason}") from exc
+
+
+def _remove_temporaries(place: Path) -> None:
+    """Half-written files of processes that were killed: nobody else writes this output now."""
+    own = re.compile(rf"\.{re.escape(place.name)}\.([0-9]+\.)?tmp")
+    for path in place.parent.iterdir():
+        if own.fullmatch(path.name):
+            with suppress(OSError):
+                path.unlink()

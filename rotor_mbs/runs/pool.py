@@ -22,7 +22,7 @@ from multiprocessing import resource_tracker
 from queue import LifoQueue
 from typing import TYPE_CHECKING, Any, Generic, Self, TypeAlias, TypeVar
 
-from rotor_mbs.errors import ResourceError, RotorError
+from rotor_mbs.errors import OF_THE_MACHINE, ResourceError, RotorError, one_line
 from rotor_mbs.runs import cores
 
 if TYPE_CHECKING:  # loaded with the first process
@@ -36,8 +36,6 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
-# What the machine lacks: an error of these is no result of a task.
-OF_THE_MACHINE = (MemoryError, OSError, ImportError, ResourceError)
 _RETRY_START_S = 1.0  # after the system had no room for a process
 _POLL_S = 1.0  # how often a waiting thread looks whether its pool still works
 
@@ -52,10 +50,8 @@ class TaskLostError(RotorError):
 
 @dataclass(frozen=True, slots=True)
 class Finished(Generic[T, R]):
-    """The end of a task: `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`.
-
-    error   what the task itself raised, for the failure "error"
-    """
+    """The end of a task: `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`, and
+    the `error` that the task itself raised."""
 
     task: T
     value: R | None = None
@@ -99,19 +95,10 @@ class WorkerPool(TaskPool):
     """Worker processes, each of which keeps its state between tasks.
 
     Each starts afresh (spawn) when there is a task for it, and as many as there are cores at once where there is an
-    initializer. They ignore Ctrl-C and end with this process. One that dies, or is ended at a time limit, is replaced.
+    initializer, which is called first in every process; what it raises becomes the error of that process's tasks. They
+    ignore Ctrl-C and end with this process. One that dies, or is ended at a time limit, is replaced. They are bound to
+    `core`, where the system allows it.
 
-    Parameters
-    ----------
-    workers
-        Number of processes.
-    initializer
-        Called first in every process; must be picklable. What it raises becomes the error of that process's tasks.
-    core
-        The core that the processes are bound to, where the system allows it; None for any.
-
-    Examples
-    --------
     >>> with WorkerPool(1) as pool:
     ...     pool.submit(abs, -3, timeout_s=10.0).result()
     3
@@ -129,10 +116,8 @@ class WorkerPool(TaskPool):
             self._in_thread(process.start)
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
-        """The future of `work(task)`: its result, what it raised, or a TaskLostError. Raises ResourceError.
-
-        work, task and the result must be picklable. The time limit counts from when a process begins with the task.
-        """
+        """The future of `work(task)`: its result, what it raised, or a TaskLostError. Raises ResourceError. What goes
+        in and out must be picklable; the time limit counts from when a process begins with the task."""
         return self._in_thread(self._run, work, task, timeout_s)
 
     def close(self) -> None:
@@ -170,8 +155,6 @@ class WorkerPool(TaskPool):
 class SerialPool(TaskPool):
     """A pool in this process, one task after the other, without time limits: where scripts must not start processes.
 
-    Examples
-    --------
     >>> SerialPool().submit(abs, -3, timeout_s=10.0).result()
     3
     """
@@ -251,18 +234,10 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
             yield Finished(task, None, failure, str(error))
 
 
-def one_line(error: BaseException) -> str:
-    """The type of an exception and the first line of its text."""
-    text = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {text[0] if text else 'no message'}"
-
-
 @contextmanager
 def delayed_interrupts() -> Iterator[None]:
     """Delays Ctrl-C, SIGTERM and SIGHUP to the end of the block, so that other processes are ended all or not at all.
-
-    Without effect in other threads than the main one, where signals do not arrive.
-    """
+    No signals arrive in other threads than the main one."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

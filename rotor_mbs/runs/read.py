@@ -31,11 +31,8 @@ _ATTEMPTS = 3  # to open a file that is being replaced
 class StoredRun:
     """A run (or the reference) in an open file; its row is read, and verified, when something of it is asked for.
 
-    Attributes
-    ----------
-    scene, method : "paper/fig05", "lagrange/taylor" (or "reference").
-    known : what the design says of it: settings, versions, ...
-    scales : time, coordinate, blade, axis, as far as the scene has them.
+    known: what the design says of it: settings, versions, ... scales: time, coordinate, blade, axis, as far as there
+    are.
     """
 
     scene: str
@@ -167,19 +164,8 @@ class OpenResults:
 
 @contextmanager
 def open_results(path: Path, *, verify: bool = True, only: Collection[str] | None = None) -> Iterator[OpenResults]:
-    """An open results file. A run is compared with its checksum when it is read, but for verify=False.
-
-    A file that replaces it meanwhile is not seen.
-
-    Parameters
-    ----------
-    only : names of the scenes that are read, by default all.
-
-    Raises
-    ------
-    StoreError
-        Where `path` is not a results file of this program, or what was laid out has changed.
-    """
+    """An open results file; of a file that replaces it meanwhile nothing is seen. A run is compared with its checksum
+    when it is read, but for verify=False; only: names of scenes, by default all. Raises StoreError."""
     with files.open_file(path) as h5, files.reading(path):
         attributes = files.attributes_of(h5)
     for _ in range(_ATTEMPTS):

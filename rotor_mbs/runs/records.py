@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs import digests, files
+from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column
 from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.table import CHARACTER, MISSING, Place, Rows, Table, blank_rows, characters, text_of
@@ -114,14 +114,9 @@ _UNITS = {"step": ("s", "fixed step"), "tolerance": ("1", "tolerance"), "order_e
 class Record:
     """A curve of a bench, a ladder of steps, or another group of arrays that belong together.
 
-    Attributes
-    ----------
-    kind : "bench", "stability", "stability_limits", "symmetry", "modes" or "comparison".
-    scene : "paper/fig05".
-    name : "lagrange/taylor"; of a bench with its fixed choices behind, where they are not the default ones.
-    attributes : plain values.
-    arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
-    columns : what the arrays are, scales first; of groups of arrays alone.
+    kind: a key of `COLUMNS`, "modes" or "comparison". name: the method, "lagrange/taylor"; of a bench with its fixed
+    choices behind, where they are not the default ones. arrays: (rows,) by name; `status` as codes of
+    `solution.status.STATUSES`. columns: what the arrays are, scales first; of groups of arrays alone.
     """
 
     kind: str
@@ -149,13 +144,7 @@ class Record:
 
 
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
-    """The table of these points.
-
-    Parameters
-    ----------
-    group : a key of `COLUMNS`.
-    points : of each the known columns by name: texts ("run", its label, "scene", "method_name", ...), and numbers.
-    """
+    """The table `group` of these points: of each the known columns by name."""
     known: dict[str, tuple[Column, Any]] = {
         name: (Column(("run",), "1", long_name), [str(point[name]) for point in points])
         for name, long_name in _KNOWN.items()
@@ -179,10 +168,7 @@ def row_of_point(place: Place, status: str, message: str, values: Mapping[str, o
 
 
 def read_records(path: Path, *kinds: str) -> list[Record]:
-    """The records of a file, of these kinds, in the order of the file. Raises StoreError.
-
-    A curve of which a point is missing is left out.
-    """
+    """The records of these kinds, in the order of the file; no curve of which a point is missing. Raises StoreError."""
     with files.open_file(path) as file, files.reading(path):
         there = [kind for kind in kinds if kind in file]
         tables = [kind for kind in there if kind in COLUMNS]
@@ -248,14 +234,14 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
                 dataset = files.put(group, name, np.asarray(record.arrays[name]), column)
                 if f"{name}_labels" in record.attributes:
                     files.put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
-        digests.seal_all(file)
+        files.seal_all(file)
 
 
 def _group_records(file: Any, kind: str) -> Iterator[Record]:
     for group in files.groups_in(file[kind]):
         if "record" not in group.attrs:
             continue
-        damages = [part for part in digests.damages_of(group) if part != files.DIGESTS]
+        damages = [part for part in files.damages_of(group) if part != files.DIGESTS]
         path = str(group.name).strip("/")
         if damages:
             raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")

@@ -26,11 +26,13 @@ from rotor_mbs.runs.table import STATUS_REPEATED, Place, Rows, StoredTable, Tabl
 from rotor_mbs.runs.versions import machine, row_versions, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.quantities import SCALES, quantities, scale_values
+from rotor_mbs.solution.quantities import LOADS, SCALES, quantities, scale_values
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, code_of
 
 RUNS = "runs"
+# What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
+FROZEN = ("angles", "rates", "work", *(load.name for load in LOADS), "angle_uncertainty", "error_growth")
 _OF_REFERENCE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
 # What a method that is no reference says of itself under such a name: its name in the file.
 OF_METHODS = {"angle_uncertainty": "own_uncertainty"}
@@ -85,11 +87,8 @@ _TEXTS = {
 class Asked:
     """A run as it is asked for: a row of the design.
 
-    Attributes
-    ----------
-    scene, method, settings : settings in place of the method's defaults.
-    versions : of what computes it, by default those of this installation; of a reference that is read from a shipped
-        file also who computed it (`frozen_with`).
+    versions: of what computes it, by default those of this installation; of a reference that is read from a shipped
+    file also who computed it (`frozen_with`).
     """
 
     scene: Scene
@@ -212,12 +211,7 @@ def results_tables(asked: Sequence[Asked]) -> list[Table]:
 
 
 class TableFile:
-    """A file of tables whose rows are read and written by their places. Tables are read when they are asked for.
-
-    Attributes
-    ----------
-    path : of the file.
-    """
+    """A file of tables whose rows are read and written by their places. Tables are read when they are asked for."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -262,14 +256,11 @@ class TableFile:
     def take_back_missing(
         self, asked: Sequence[Asked], time_limit_s: float
     ) -> tuple[list[Asked], list[tuple[Asked, str, str]]]:
-        """The runs that are to be computed, and those that are stored with their status and message.
+        """The runs that are to be computed, and those that are stored with their status and message; of `asked` runs,
+        of each scene the reference first.
 
         To be computed are those that the file lacks, that a shorter time limit ended, or whose reference is one of
         these; what is stored of them is taken back.
-
-        Parameters
-        ----------
-        asked : of each scene the reference first.
         """
         missing: dict[str, Asked] = {}
         kept: list[tuple[Asked, str, str]] = []
@@ -287,22 +278,13 @@ class TableFile:
 
 
 def extend_file(path: Path, wanted: Sequence[Table], dropped: Collection[tuple[str, str]] = ()) -> TableFile:
-    """Make the file hold the rows of `wanted` tables, beside those that it has.
+    """Make the file hold the rows of `wanted` tables, beside those that it has, but for the (group, run) of `dropped`.
 
     Where it has all of them as they are asked for, nothing is written. Else a file is laid out beside it, the rows that
     stay are copied, and it takes the place of the old one. A row of which anything in the design differs (settings,
-    versions, the scene's numbers) is missing afterwards.
-
-    Parameters
-    ----------
-    dropped : (group, run) of rows that go.
-
-    Raises
-    ------
-    InputError
-        Where runs of a scene that has other numbers by now would be dropped and not computed again.
-    StoreError
-        Where the file cannot be read or written, or is a sweep's.
+    versions, the scene's numbers) is missing afterwards. Raises InputError where runs of a scene that has other numbers
+    by now would be dropped and not computed again, StoreError where the file cannot be read or written, or is a
+    sweep's.
     """
     if path.is_symlink():  # a link stays one
         path = path.resolve()

@@ -21,13 +21,8 @@ _REPORTED = ("status", "message", "run_time_s")
 class Task:
     """Consecutive rows of a table, computed at once by one process.
 
-    Attributes
-    ----------
-    label, method : in a line of progress.
-    place : where the rows are.
-    reference : where the row is that must be stored before; None where there is none.
-    kill_after_s : after which its process is ended, where it has not ended itself.
-    work : roughly how much there is to compute.
+    label, method: in a line of progress. reference: where the row is that must be stored before. kill_after_s: after
+    which its process is ended, where it has not ended itself. work: roughly how much there is to compute.
     """
 
     label: str
@@ -58,17 +53,8 @@ def compute(pool: TaskPool, perform: Callable[[T], Rows], tasks: Iterable[T]) ->
     """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the file.
 
     However the loop ends, the rows of what has ended are in the file. The `value` of a finished task is status, message
-    and run_time_s of its rows as they are stored; None where nothing is, and its failure and message say why.
-
-    Parameters
-    ----------
-    perform : from a task to its rows, in a worker process.
-    tasks : taken as workers become free.
-
-    Raises
-    ------
-    InputError, MethodRefusal, StoreError
-        What a task raised of these.
+    and run_time_s of its rows as they are stored; None where nothing is, and its failure and message say why. Raises
+    what a task raised of InputError, MethodRefusal and StoreError.
     """
     work = partial(perform_and_store, perform) if pool.shares_disk else perform
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):

@@ -23,12 +23,10 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, Column
-from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.files import CHARACTERS, Column, writing
 from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, columns_of, lay_out, stored_table
 from rotor_mbs.runs.versions import row_versions
-from rotor_mbs.scenario.sweep import Sweep
-from rotor_mbs.scenario.sweep_design import SPLITS, split_rows
+from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
 from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import SCALES, scale_values
 from rotor_mbs.solution.status import code_of
@@ -111,24 +109,12 @@ def sweep_table(
 def open_sweep(
     output: Path, table: Table, attributes: Mapping[str, object], time_limit_s: float = 0.0, *, fresh: bool = False
 ) -> Iterator[tuple[Place, NDArray[np.int8]]]:
-    """The file `output`, laid out where it is not there, which no other process writes in the block.
+    """The file `output`, laid out where it is not there, which no other process writes in the block: where its runs
+    are, and (runs,) their statuses, MISSING where they are to be computed.
 
-    Parameters
-    ----------
-    attributes : of the file; `sweep_identity` is a hash of all that the design says.
-    time_limit_s : runs that a shorter limit ended are missing.
-    fresh : whether all runs are to be computed; what is stored of one stays until it is.
-
-    Returns
-    -------
-    Where its runs are, and (runs,) their statuses, MISSING where they are to be computed.
-
-    Raises
-    ------
-    InputError
-        Where the output holds something else, or another process is writing it.
-    StoreError
-        Where it cannot be read or written, or the disk has no room for all runs.
+    time_limit_s: runs that a shorter limit ended are missing. fresh: all runs are to be computed; what is stored of one
+    stays until it is. Raises InputError where the output holds something else, or another process is writing it,
+    StoreError where it cannot be read or written, or the disk has no room for all runs.
     """
     with writing(output):
         path = output.resolve() if output.is_symlink() else output  # a link stays one
@@ -157,19 +143,11 @@ def open_sweep(
 
 
 class StoredSweep:
-    """A dataset that `rotor-mbs sweep` wrote, complete or not.
+    """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none, or is damaged; with
+    allow_damaged_runs, not where only runs are.
 
-    Attributes
-    ----------
-    attributes : of the file.
-    columns : every dataset, scales included.
-    keys : of the varied parameters.
-    damaged_runs : numbers of the stored runs that are not what was written, by their checksums.
-
-    Raises
-    ------
-    StoreError
-        Where it is none, or is damaged; with allow_damaged_runs, not where only runs are.
+    columns: every dataset, scales included. keys: of the varied parameters. damaged_runs: numbers of the stored runs
+    that are not what was written, by their checksums.
     """
 
     def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
@@ -200,18 +178,13 @@ class StoredSweep:
 
     @property
     def methods(self) -> list[str]:
-        """Names of the methods, by their code."""
+        """Their names, by their code."""
         names: list[str] = self.attributes["methods"]
         return names
 
     def column(self, name: str) -> NDArray[Any]:
         """A dataset, such as `status` or `angles`; computed ones as they lie in the file, read where they are indexed.
-
-        Raises
-        ------
-        StoreError
-            Where there is none of that name.
-        """
+        Raises StoreError where there is none of that name."""
         table = self._table
         if name == "run":
             return table.runs

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError, saving
-from rotor_mbs.runs import digests, files
+from rotor_mbs.runs import files
 from rotor_mbs.runs.files import Column
 from rotor_mbs.solution.status import STATUSES
 
@@ -88,12 +88,9 @@ class Table:
 class Place:
     """Where consecutive rows lie in a file. Worker processes that see the file write them by it.
 
-    Attributes
-    ----------
-    path, inode : the file, and its number: another file of that name is not written to.
-    first : number of the first row; its checksum begins with it.
-    offsets : bytes from the beginning of the file to the first row, by column.
-    row : type of a row, its columns in the order in which the checksum covers them.
+    inode: of the file; another file of that name is not written to. first: number of the first row; its checksum begins
+    with it. offsets: bytes from the beginning of the file to the first row, by column. row: type of a row, its columns
+    in the order in which the checksum covers them.
     """
 
     path: Path
@@ -103,13 +100,8 @@ class Place:
     row: np.dtype[np.void]
 
     def write(self, first: int, rows: Rows) -> None:
-        """Store the rows from number `first` on, their statuses last; meanwhile they are missing.
-
-        Raises
-        ------
-        StoreError
-            Where the file cannot be written, or is another one by now.
-        """
+        """Store the rows from number `first` on, their statuses last; meanwhile they are missing. Raises StoreError
+        where the file cannot be written, or is another one by now."""
         columns = rows | {"crc32": checksums(first, rows, self.row)}
         statuses = {name: columns.pop(name) for name in (STATUS_REPEATED, "status") if name in columns}
         with saving(self.path), self.path.open("r+b") as file:
@@ -128,13 +120,7 @@ class Place:
                 file.write(np.ascontiguousarray(status, np.int8).data)
 
     def read(self, count: int = 1, start: int = 0, file: IO[bytes] | None = None) -> Rows:
-        """(count, ...) The columns of the rows from `start` on; file: one that is open.
-
-        Raises
-        ------
-        OSError, ValueError
-            Where the file cannot be read, or ends before.
-        """
+        """(count, ...) The columns of the rows from `start` on; file: one that is open. Raises OSError, ValueError."""
         with nullcontext(file) if file is not None else self.path.open("rb") as source:
             rows = {}
             for name in self.row.names or ():
@@ -184,12 +170,7 @@ class Place:
 
 
 def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
-    """Return a CRC-32 for each row, over its number and its columns.
-
-    Returns
-    -------
-    ndarray of uint32, shape (rows,)
-    """
+    """(rows,) CRC-32 of each row, over its number and its columns."""
     sums = [first + i & 0xFFFFFFFF for i in range(len(rows["status"]))]
     for name in (name for name in row.names or () if name != "crc32"):
         contents: Any = np.ascontiguousarray(rows[name], row[name].base).reshape(len(sums), -1)
@@ -226,10 +207,8 @@ def lay_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object
 
 @contextmanager
 def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, object]) -> Iterator[Path]:
-    """The new file under a temporary name, which takes the place of `path` after the block.
-
-    The space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins.
-    """
+    """The new file under a temporary name, which takes the place of `path` after the block. Its space is reserved
+    twice: HDF5 does not survive a disk that fills up under it, and truncates the file it begins."""
     with files.replacing(path) as temporary:
         rows = sum(len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known))) for table in tables)
         _reserve(temporary, _HEAD_BYTES + rows)
@@ -237,7 +216,7 @@ def laid_out(path: Path, tables: Sequence[Table], attributes: Mapping[str, objec
             files.put_attributes(file, attributes)
             for table in tables:
                 _put_table(file, table)
-            digests.seal_all(file)
+            files.seal_all(file)
         _reserve(temporary, temporary.stat().st_size)
         yield temporary
 
@@ -283,7 +262,7 @@ def _put_table(file: Any, table: Table) -> None:
     of_reference = [name for name, column in table.computed.items() if "run" not in column.dimensions]
     if of_reference:
         files.put_attributes(group, {_OF_REFERENCE: of_reference})
-    digests.seal(group, later=table.computed.keys())
+    files.seal(group, later=table.computed.keys())
 
 
 # Reading
@@ -302,14 +281,8 @@ class StoredColumn(NamedTuple):
 class StoredTable:
     """A table in a file as it was laid out; rows are read by their `Place`.
 
-    Attributes
-    ----------
-    path, inode, group : where it stands.
-    runs : (rows,) texts or numbers of the rows.
-    known : by name, the values of scales and of what the design says of each row.
-    labels : texts for the entries of a scale.
-    computed : the computed columns by name, in the order of the checksum.
-    attributes : of the group.
+    runs: (rows,) texts or numbers. known: by name, the values of scales and of what the design says of each row.
+    labels: texts for the entries of a scale. computed: the computed columns by name, in the order of the checksum.
     """
 
     path: Path
@@ -337,7 +310,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
     """A table in an open file. Raises StoreError where what was laid out has changed since."""
     path, item = Path(file.filename), file[group] if group else file
     _refuse_changes(item, group)
-    computed_names = digests.computed_in(digests.stored_digests(item.attrs))
+    computed_names = files.computed_in(files.stored_digests(item.attrs))
     attributes = files.attributes_of(item)
     of_reference = attributes.pop(_OF_REFERENCE, [])
     known: dict[str, NDArray[Any]] = {}
@@ -362,10 +335,8 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
 
 
 def refuse_changed_layout(path: Path) -> None:
-    """Raises StoreError where what is said of a table, its units too, is not what was laid out.
-
-    Reading a table compares all of this but the attributes of computed columns, which take most of the time.
-    """
+    """Raises StoreError where what is said of a table, its units too, is not what was laid out. Reading a table
+    compares all of this but the attributes of computed columns, which take most of the time."""
     groups = table_groups(path)
     with files.open_file(path) as file, files.reading(path):
         for group in groups:
@@ -373,7 +344,7 @@ def refuse_changed_layout(path: Path) -> None:
 
 
 def _refuse_changes(item: Any, group: str, *, with_columns: bool = False) -> None:
-    changed = digests.damages_of(item, with_columns=with_columns)
+    changed = files.damages_of(item, with_columns=with_columns)
     if changed:
         place = f"{item.file.filename}: {group or 'file'}"
         raise StoreError(f"{place}: {', '.join(changed)} changed after the file was laid out")

@@ -69,7 +69,7 @@ def find_scenes(arguments: Sequence[str]) -> list[Scene]:
     """The scenes that names, folders and paths of TOML files mean, in their order, each once; a shipped name goes
     before a path (write ./paper for a folder of one's own). Raises InputError with all errors of all arguments and
     files."""
-    from rotor_mbs.scenario.scene_file import load_scene
+    from rotor_mbs.scenario.scene import load_scene
 
     problems: list[str] = []
     files: dict[Path, tuple[Path, str]] = {}  # by where it leads to: the path that was given, the scene's name

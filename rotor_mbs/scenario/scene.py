@@ -8,21 +8,36 @@ import functools
 import hashlib
 import json
 import math
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, fields
 from itertools import pairwise
 from operator import attrgetter
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind, counted, file_key, list_of, read_each, shown, where, wrong
 from rotor_mbs.scenario.time_table import Table, is_constant, is_one_table, value_at
-from rotor_mbs.scenario.toml_file import KEY_FORM, KeyPath, KeyProblem, TableError, parse_key, shown_key, toml_lines
+from rotor_mbs.scenario.toml_file import (
+    KEY_FORM,
+    KeyPath,
+    KeyProblem,
+    TableError,
+    parse_key,
+    parse_toml,
+    read_toml,
+    shown_key,
+    shown_path,
+    toml_lines,
+    toml_value,
+)
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
 
 DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
 OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
@@ -535,3 +550,128 @@ def _plain(value: object) -> object:
     if isinstance(value, tuple | list):
         return [_plain(entry) for entry in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+__all__ = ["load_scene", "new_scene_text", "parse_scene", "scene_toml"]
+
+
+def load_scene(path: Path | str, name: str | None = None) -> Scene:
+    """The scene in the TOML file `path`, under `name` or the file's own. Raises InputError with all errors of the file,
+    a line each: `file:line: key: what is wrong; allowed: ...`; entries are counted from 0."""
+    path = Path(path)
+    text, tables = read_toml(path)
+    if "axis" in tables and "scene" in tables:
+        shown = shown_path(path)
+        raise InputError(f"{shown}: is a sweep; allowed: a scene, or: rotor-mbs sweep {shown}")
+    return _scene(text, tables, path.stem if name is None else name, shown_path(path))
+
+
+def parse_scene(text: str, name: str) -> Scene:
+    """The scene in a TOML text, as it is stored with results. Raises InputError as `load_scene`."""
+    return _scene(text, parse_toml(text, name), name, name)
+
+
+def _scene(text: str, tables: dict[str, Any], name: str, source: str) -> Scene:
+    try:
+        return scene_from_tables(tables, name, text)
+    except TableError as error:
+        raise error.in_file(text, source) from error
+
+
+_HEADER = """\
+# A scene: a rotor, its loads and its start. SI units; angles in rad.
+# Numbers may be arithmetic in quotes, "11*pi/12", with pi, sqrt(x), hypot(x, y) and deg(x).
+"""
+_EXAMPLE: dict[str, Any] = {
+    "title": "My rotor",
+    "blades": 3,
+    "gravity": 9.81,
+    "duration": 10.0,
+    "samples": 1001,
+    "blade.mass": 15000.0,
+    "blade.centre_of_mass": [0.08, 0.0, 15.4],
+    "blade.inertia": [0, 0, 0, 0, 0, 0],
+    "blade.tip": [0.08, 0.0, 33.4],
+    "initial.angles": ["deg(30)", 0, "pi/4", 0],
+    "initial.rates": [0, 0, 0, 0],
+    "torque.rotor": 1000.0,
+}
+
+
+def new_scene_text() -> str:
+    """A scene file with every key, a value and what is allowed, to start a scene from."""
+    lines: dict[str, list[str]] = {"": _HEADER.splitlines()}
+    needed = {"blade"}
+    declarations: dict[str, Mapping[str, Any]] = {}  # by path; those of a blade in the place of `blade`
+    for declared in SCENE_KEYS.values():
+        if declared["key"] == "blade":
+            declarations |= {f"blade.{name}": of_blade for name, of_blade in BLADE_KEYS.items()}
+        elif declared["key"] != "settings":
+            declarations[declared["key"]] = declared
+    for path, declared in declarations.items():
+        table, _, name = path.rpartition(".")
+        value = _EXAMPLE.get(path, declared.get("optional"))
+        if value == () and declared["unit"] != "1":  # no load
+            value = 0.0
+        entry = f"{name} = {toml_value(value)}"
+        comment = declared["allowed"]
+        if "optional" not in declared:
+            needed.add(table)
+        elif table in ("", "blade"):
+            comment = f"optional: {comment}"
+        first, *more = textwrap.wrap(comment, 117 - max(34, len(entry)))
+        lines.setdefault(table, []).append(f"{entry:34} # {first}")
+        lines[table] += [f"{'':34} # {rest}" for rest in more]
+    lines["settings"] = [f"{'# step = 1e-3':34} # {SCENE_KEYS['settings']['allowed']}"]
+    parts = []
+    for table, entries in lines.items():
+        header = [f"[{table}]" if table in needed else f"{f'[{table}]':34} # optional"] if table else []
+        parts.append("\n".join([*header, *entries, ""]))
+    return "\n".join(parts)
+
+
+TURN = 2.0 * math.pi
+MAX_RATE = 100.0  # rad/s: a thousand revolutions per minute
+MAX_DISTANCE, MIN_DISTANCE = (
+    300.0,
+    0.01,
+)  # m, from the shaft to the farthest point of a blade: the longest built have 130
+MAX_MASS, MIN_MASS = 1e6, 0.01  # kg
+USUAL_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
+
+
+def doubts(scene: Scene) -> list[str]:
+    """A line for each number that looks like a slip: key, value, and what may have been meant; [] where all is well."""
+    lines = []
+    # Where one is more than a turn, other whole numbers are in degrees, too.
+    in_degrees = any(abs(angle) > TURN for angle in scene.initial_angles)
+    for i, angle in enumerate(scene.initial_angles):
+        if abs(angle) > TURN or (in_degrees and abs(angle) >= 1.0 and angle == round(angle)):
+            lines.append(f"initial.angles[{i}]: {_as_degrees(angle)}")
+    for i in range(len(scene.blades)):
+        rest = max((value for _, value in scene.pitch_load(i)[1]), key=abs, default=0.0)
+        if abs(rest) > 0.5 * TURN:
+            lines.append(f"bearing.rest[{i}]: {_as_degrees(rest)}")
+    for i, rate in enumerate(scene.initial_rates):
+        if abs(rate) > MAX_RATE:
+            lines.append(f'initial.rates[{i}]: {rate:g} rad/s; degrees per second? write "deg({rate:g})"')
+    blades = scene.blades[:1] if len(set(scene.blades)) == 1 else scene.blades
+    for i, blade in enumerate(blades):
+        name = "blade" if len(blades) == 1 else f"blade[{i}]"
+        if not MIN_MASS <= blade.mass <= MAX_MASS:
+            lines.append(f"{name}.mass: {blade.mass:g} kg; is it in kg?")
+        for key, point in (("centre_of_mass", blade.centre_of_mass), ("tip", blade.tip)):
+            distance = math.hypot(*point)
+            if not MIN_DISTANCE <= distance <= MAX_DISTANCE:
+                lines.append(f"{name}.{key}: {distance:g} m from the shaft; is it in m?")
+        gyration = math.sqrt(max(blade.inertia[:3]) / blade.mass) if blade.mass else 0.0
+        if gyration > 2.0 * math.hypot(*blade.tip):
+            far = f"a radius of gyration of {gyration:.3g} m, far beyond the tip"
+            lines.append(f"{name}.inertia: {far}; is it in kg m^2, mass in kg?")
+    if scene.gravity and not USUAL_GRAVITY[0] <= scene.gravity <= USUAL_GRAVITY[1]:
+        lines.append(f"gravity: {scene.gravity:g} m/s^2; 9.81 is usual, 0 is none")
+    return lines
+
+
+def _as_degrees(angle: float) -> str:
+    return f'{angle:g} rad are {round(abs(angle) / TURN, 1):.6g} turns; degrees? write "deg({angle:g})"'

@@ -23,7 +23,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder
 from rotor_mbs.methods.catalogue import find_method, ladders, settings_for
 from rotor_mbs.runs import last_core
-from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.records import points_table, row_of_point
 from rotor_mbs.runs.results import TableFile, extend_file

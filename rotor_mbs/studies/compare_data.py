@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, as_dictionary
 from rotor_mbs.errors import InputError
-from rotor_mbs.foreign.channels import channels
-from rotor_mbs.foreign.trajectory import ForeignData
+from rotor_mbs.foreign.channels import ForeignData, channels
 from rotor_mbs.models.lagrange import samples
 from rotor_mbs.models.lagrange.parameters import work_is_integrated
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at

@@ -20,12 +20,12 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.errors import RotorError
-from rotor_mbs.foreign.trajectory import ForeignData
+from rotor_mbs.foreign.channels import ForeignData
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations
 from rotor_mbs.models.lagrange.reference import LEFT_OUT, TimedReference, at_azimuths, motion_at
 from rotor_mbs.models.ode45 import Ode45Settings
-from rotor_mbs.models.printed.matrices import Errata
+from rotor_mbs.models.printed.derivation import Errata
 from rotor_mbs.models.printed.methods import PrintedModel
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields

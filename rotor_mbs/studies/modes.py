@@ -30,7 +30,7 @@ from rotor_mbs.analysis.modes import GROWTH, floquet, isotropic_modes, modes_of,
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
-from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.pool import local_pool, run_in
 from rotor_mbs.runs.records import Record, read_records, write_records
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -60,10 +60,8 @@ def modes_of_scenes(
 ) -> list[Outcome]:
     """The modes of every scene into the file `output`; those of other scenes that it has are kept.
 
-    speeds        rad/s, of the Campbell diagram and the Floquet multipliers
-    stiffnesses   N m/rad, of every bearing, for the stability chart over speed
-
-    Raises InputError for a negative or repeated speed or stiffness, StoreError, KeyboardInterrupt.
+    speeds: rad/s, of the Campbell diagram and the Floquet multipliers. stiffnesses: N m/rad, of every bearing, for the
+    stability chart over speed. Raises InputError for a negative or repeated speed or stiffness, StoreError.
     """
     speeds, stiffnesses = _increasing(speeds, "speeds"), _increasing(stiffnesses, "stiffnesses")
     made: list[Outcome] = []
@@ -218,10 +216,8 @@ def _linearized(method: Method, point: _Point) -> Linearization:
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
-    """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down.
-
-    Raises MethodRefusal where heyoka is not installed.
-    """
+    """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down. Raises
+    MethodRefusal where heyoka is not installed."""
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     turns: list[Turn] = []

@@ -1,4 +1,7 @@
-"""References in quad precision, recomputed and stored as they are frozen: without what follows from them."""
+"""References in quad precision, recomputed and stored as they are frozen: without what follows from them.
+
+The digests of their arrays stand in a text file beside each file of references: a changed number is found and located.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,17 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs.freeze import KEPT, write_references
-from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import Asked
+from rotor_mbs.runs.files import array_digest, replace_file, writing
+from rotor_mbs.runs.read import OpenResults, open_results
+from rotor_mbs.runs.results import FROZEN, Asked, extend_file, repeat, runs_table, scene_table
+from rotor_mbs.runs.table import blank_rows
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.status import code_of
 from rotor_mbs.studies.run import OnProgress, RunReport, ignore_progress, run_scenes
+
+_FACTS = ("steps", "time_reached", "setup_time_s", "run_time_s", "output_time_s")
 
 
 def compute_references(
@@ -26,12 +32,7 @@ def compute_references(
 ) -> RunReport:
     """The reference of every scene into the file `output`, which is replaced as a whole, and its digests beside it.
 
-    Raises
-    ------
-    InputError
-        Where `output` has something else.
-    StoreError
-        Where it cannot be read or written.
+    Raises InputError where `output` has something else, StoreError where it cannot be read or written.
     """
     full = output.with_name(f"{output.name}.full.h5")
     none: dict[str, Sequence[str]] = {scene.name: () for scene in scenes}
@@ -41,23 +42,64 @@ def compute_references(
             scenes, none, full, workers=workers, timeout_s=timeout_s, use_frozen=False, on_progress=on_progress
         )
         if not report.not_computed:
-            _freeze(scenes, full, output)
+            with open_results(full) as results:
+                _freeze(scenes, results, output)
             full.unlink()
     return report
 
 
-def _freeze(scenes: Sequence[Scene], source: Path, target: Path) -> None:
-    """The kept arrays of every reference in `source` into `target`."""
-    date = datetime.now(UTC).date().isoformat()
+def _freeze(scenes: Sequence[Scene], results: OpenResults, target: Path) -> None:
+    """The arrays of every reference that are `FROZEN` into the file `target`, and the digests beside it."""
+    target.unlink(missing_ok=True)
+    versions = {"frozen_with": f"heyoka {results.attributes['heyoka']}, {datetime.now(UTC).date().isoformat()}"}
     references = []
-    with open_results(source) as results:
-        made_with = {"frozen_with": f"heyoka {results.attributes['heyoka']}, {date}"}
-        for scene in scenes:
-            run = results.scenes[scene.name].reference if scene.name in results.scenes else None
-            if run is not None:
-                arrays = {name: run.array(name) for name in KEPT if name in run}
-                references.append((Asked(scene, REFERENCE, versions=made_with), run.attributes, arrays))
-        write_references(target, references)
+    for scene in scenes:
+        run = results.scenes[scene.name].reference if scene.name in results.scenes else None
+        if run is not None:
+            references.append((Asked(scene, REFERENCE, versions=versions), run))
+    tables = [scene_table([asked], arrays=[name for name in FROZEN if name in run]) for asked, run in references]
+    file = extend_file(target, [runs_table([asked for asked, _ in references]), *tables])
+    for asked, run in references:
+        place = file.place(asked.run)
+        row = blank_rows(1, place.row)
+        row["status"][0], row["samples"][0] = code_of(run.status), run.samples
+        for name in _FACTS:
+            row[name][0] = run.attributes[name]
+        for name in FROZEN:
+            if name in run and name in row:
+                row[name][0, : run.samples] = run.array(name)
+        repeat(row)
+        place.write(place.first, row)
+    with open_results(target) as frozen:
+        lines = [f"{digest}  {scene} {name}\n" for (scene, name), digest in _digests(frozen).items()]
+    replace_file(target.with_suffix(".sha256"), "".join(lines).encode())
+
+
+def changed_arrays(results: OpenResults) -> dict[str, list[str]]:
+    """By scene, the arrays of its reference that are not what was frozen, are new or are gone; [] where all is well.
+
+    Raises StoreError where there is no digest file.
+    """
+    path = results.path.with_suffix(".sha256")
+    try:
+        rows = [line.split() for line in path.read_text().splitlines()]
+    except (OSError, UnicodeDecodeError) as exc:
+        raise StoreError(f"{path}: cannot be read ({exc}); `rotor-mbs reference` writes it") from exc
+    frozen = {(row[1], row[2]): row[0] for row in rows if len(row) == 3}
+    present = _digests(results)
+    scenes: dict[str, list[str]] = {}
+    for scene, name in {**present, **frozen}:
+        changed = scenes.setdefault(scene, [])
+        if frozen.get((scene, name)) != present.get((scene, name)):
+            changed.append(name)
+    return scenes
+
+
+def _digests(results: OpenResults) -> dict[tuple[str, str], str]:
+    references = [scene.reference for scene in results.scenes.values()]
+    return {
+        (run.scene, name): array_digest(run.array(name)) for run in references if run is not None for name in run.names
+    }
 
 
 def _refuse_other_contents(path: Path, wanted: set[str]) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,11 +16,12 @@ import rotor_mbs
 from rotor_mbs.analysis.claim_study import claim_study
 from rotor_mbs.analysis.claims import claims, finding
 from rotor_mbs.analysis.run_tables import finding_lines, method_table
-from rotor_mbs.errors import RotorError
+from rotor_mbs.errors import OF_THE_MACHINE, RotorError, one_line
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, ladders
-from rotor_mbs.runs.pool import OF_THE_MACHINE, Workers, one_line
+from rotor_mbs.runs.files import writing
+from rotor_mbs.runs.pool import Workers
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.results import TableFile
+from rotor_mbs.runs.results import extend_file, results_tables
 from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import versions
@@ -44,9 +44,11 @@ from rotor_mbs.studies.run import (
     RunReport,
     RunTask,
     able_methods,
+    asked_runs,
+    compute_tasks,
     ignore_progress,
     perform_run,
-    run_scenes,
+    run_tasks,
     work_of,
 )
 from rotor_mbs.studies.stored_references import read_reference
@@ -71,10 +73,14 @@ def reproduce(
     names = (*default_methods(), *errata_methods().values())
     methods = {scene.name: able_methods(scene, names)[0] for scene in scenes}
     curves = short_curves(benched)
-
-    def curve_tasks(file: TableFile, missing: Collection[str]) -> list[CurveTask]:
+    asked = asked_runs(scenes, methods, {})
+    with writing(output):
+        file = extend_file(output, [*results_tables(asked), bench_table(curves)], replaced_points(output, curves))
+        missing, kept = file.take_back_missing(asked, timeout_s)
+        runs: list[Task] = [*run_tasks(file, missing, timeout_s)]
         reference = f"{benched.name}/{REFERENCE}"
-        return [
+        is_new = reference in [run.run for run in missing]
+        of_curves = [
             CurveTask(
                 label=curve.label,
                 method=curve.ladder.method,
@@ -85,14 +91,11 @@ def reproduce(
                 curve=curve,
             )
             for curve in curves
-            if reference in missing or not is_measured(file, curve)
+            if is_new or not is_measured(file, curve)
         ]
-
-    return run_scenes(
-        scenes, methods, output, workers=workers, timeout_s=timeout_s, on_progress=on_progress,
-        beside=curve_tasks, beside_tables=[bench_table(curves)],
-        dropped=replaced_points(output, curves), perform=perform,
-    )  # fmt: skip
+        made = compute_tasks([*runs, *of_curves], perform, workers, on_progress)
+        labels = {task.label for task in runs}
+        return RunReport([outcome for outcome in made if outcome.label in labels], kept)
 
 
 def made_from(results: Path, timeout_s: float) -> str:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rotor_mbs.errors import InputError, MethodRefusal, RotorError
+from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorError, one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     check_names,
@@ -23,11 +23,11 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
-from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.pool import OF_THE_MACHINE, Finished, TaskPool, Workers, one_line, pool_of
+from rotor_mbs.runs.files import writing
+from rotor_mbs.runs.pool import Finished, TaskPool, Workers, pool_of
 from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables, row_of_run
 from rotor_mbs.runs.runner import Task, compute
-from rotor_mbs.runs.table import Rows, Table, text_of
+from rotor_mbs.runs.table import Rows, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.toml_file import of_file
@@ -67,14 +67,8 @@ def work_of(scene: Scene, method: str) -> float:
 class Outcome:
     """A run, or other rows of a study, that this call computed or tried to.
 
-    Attributes
-    ----------
-    label, method : what was computed.
-    status, message : of the run; of a task of which nothing is stored, why.
-    seconds : run time; NaN where nothing was timed.
-    is_stored : whether there is a row; else the same call tries again.
-    is_shipped : whether it was read from a shipped file and not computed.
-    share : how much of the work of the call was done when it ended, from 0 to 1.
+    seconds: run time; NaN where nothing was timed. is_stored: whether there is a row; else the same call tries again.
+    is_shipped: read from a shipped file and not computed. share: of the work of the call that was done when it ended.
     """
 
     label: str
@@ -96,14 +90,10 @@ def ignore_progress(_done: int, _total: int, _outcome: Outcome) -> None:
 
 @dataclass(frozen=True)
 class RunReport:
-    """What became of a list of runs: those that this call computed, and how many were stored already.
-
-    stored_failures   a line for each of the latter that should have succeeded and did not
-    """
+    """What became of a list of runs: of those that this call computed, and of those that were stored already."""
 
     made: list[Outcome]
-    kept: int
-    stored_failures: list[str] = field(default_factory=list)
+    kept: list[tuple[Asked, str, str]]  # with status and message
 
     @property
     def failures(self) -> list[Outcome]:
@@ -111,9 +101,13 @@ class RunReport:
         return [run for run in self.made if run.is_stored and run.status != "ok" and is_corrected(run.method)]
 
     @property
-    def printed_not_ok(self) -> list[Outcome]:
-        """Runs of the printed equations that are not ok."""
-        return [run for run in self.made if run.is_stored and run.status != "ok" and not is_corrected(run.method)]
+    def stored_failures(self) -> list[str]:
+        """A line for each run that was stored already, should have succeeded and did not."""
+        return [
+            f"{run.scene.name} {run.method} {status}: {message}"
+            for run, status, message in self.kept
+            if status != "ok" and is_corrected(run.method)
+        ]
 
     @property
     def not_computed(self) -> list[Outcome]:
@@ -131,10 +125,6 @@ def run_scenes(
     settings: Mapping[str, object] | None = None,
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
-    beside: Callable[[TableFile, Collection[str]], Sequence[Task]] | None = None,
-    beside_tables: Sequence[Table] = (),
-    dropped: Collection[tuple[str, str]] = (),
-    perform: Callable[[Any], Rows] | None = None,
 ) -> RunReport:
     """Every scene's reference and runs into the results file `output`; what it has already is kept.
 
@@ -145,48 +135,76 @@ def run_scenes(
     timeout_s : a run over this ends itself, and is stored with the status timed_out.
     settings : of the methods that have them, in place of defaults and of the scene's own.
     use_frozen : whether a shipped reference may stand for a computed one.
-    beside, beside_tables, dropped, perform : of another study that is computed with the runs and not reported, its
-        tasks (from the file and the runs that are missing in it), its tables, rows that go, and what computes runs
-        and tasks.
 
     Raises
     ------
     InputError, StoreError, KeyboardInterrupt
         The same call then goes on where it stopped.
     """
-    settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings or {})
+    asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
+    with writing(output):
+        file = extend_file(output, results_tables(asked))
+        missing, kept = file.take_back_missing(asked, timeout_s)
+        made = compute_tasks(run_tasks(file, missing, timeout_s), perform_run, workers, on_progress)
+        return RunReport(made, kept)
+
+
+def asked_runs(
+    scenes: Sequence[Scene],
+    methods: Mapping[str, Sequence[str]],
+    settings: Mapping[str, object],
+    *,
+    use_frozen: bool = True,
+) -> list[Asked]:
+    """The rows of these scenes by their `methods`, the reference of each scene first. Raises InputError."""
+    given = settings_for(list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings)
     asked: list[Asked] = []
     for scene in scenes:
         asked.append(asked_reference(scene, use_frozen=use_frozen))
-        asked += [Asked(scene, name, own_settings(scene, name, settings or {})) for name in methods[scene.name]]
-    with writing(output):
-        file = extend_file(output, [*results_tables(asked), *beside_tables], dropped)
-        missing, kept = file.take_back_missing(asked, timeout_s)
-        others = list(beside(file, {run.run for run in missing})) if beside is not None else []
-        tasks = [_task(file, run, timeout_s) for run in missing]
-        made: list[Outcome] = []
-        if tasks or others:
-            with pool_of(workers) as pool:
-                ends = compute_in_order(pool, perform or perform_run, tasks, others)
-                for done, outcome in enumerate(outcomes(ends, [*tasks, *others]), 1):
-                    made.append(outcome)
-                    on_progress(done, len(tasks) + len(others), outcome)
-        labels = {task.label for task in tasks}
-        made = [outcome for outcome in made if outcome.label in labels]
-        failures = [
-            f"{run.scene.name} {run.method} {status}: {message}"
-            for run, status, message in kept
-            if status != "ok" and is_corrected(run.method)
-        ]
-        return RunReport(made, len(kept), failures)
+        asked += [Asked(scene, name, own_settings(scene, name) | given[name]) for name in methods[scene.name]]
+    return asked
 
 
-def compute_in_order(
-    pool: TaskPool, perform: Callable[[Any], Rows], tasks: Sequence[Task], others: Sequence[Task] = ()
+def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list[RunTask]:
+    """What computes these rows of a file."""
+    return [
+        RunTask(
+            label=f"{run.scene.name} {run.method}",
+            method=run.method,
+            place=file.place(run.run),
+            reference=None if run.method == REFERENCE else file.place(f"{run.scene.name}/{REFERENCE}"),
+            # What ends itself at its time limit needs a while before, to load its engine and compile, and to write
+            # after.
+            kill_after_s=1.2 * timeout_s + 10.0,
+            work=work_of(run.scene, run.method),
+            asked=run,
+            time_limit_s=timeout_s,
+        )
+        for run in asked
+    ]
+
+
+def compute_tasks(
+    tasks: Sequence[Task], perform: Callable[[Any], Rows], workers: Workers, on_progress: OnProgress
+) -> list[Outcome]:
+    """References first; then, if their references are there, the other rows, the slowest first; what became of each."""
+    made: list[Outcome] = []
+    if not tasks:
+        return made
+    with pool_of(workers) as pool:
+        work, done = sum(task.work for task in tasks), 0.0
+        for end in _compute_in_order(pool, perform, tasks):
+            done += end.task.work
+            made.append(_outcome(end, done / work))
+            on_progress(len(made), len(tasks), made[-1])
+    return made
+
+
+def _compute_in_order(
+    pool: TaskPool, perform: Callable[[Any], Rows], tasks: Sequence[Task]
 ) -> Iterator[Finished[Task, Rows]]:
-    """References first; then, if their references are there, the other runs, the slowest first."""
     yield from compute(pool, perform, [task for task in tasks if task.reference is None])
-    waiting = [task for task in (*tasks, *others) if task.reference is not None]
+    waiting = [task for task in tasks if task.reference is not None]
     ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
     # Slowest first, so that no long one starts last and keeps one process busy while the others wait; between them the
     # fastest, which are those that are compiled, so that two processes seldom compile the same code at once.
@@ -199,36 +217,21 @@ def compute_in_order(
             yield Finished(task, None, "no_reference", "its reference was not computed")
 
 
-def outcomes(ends: Iterable[Finished[Any, Rows]], tasks: Sequence[Task]) -> Iterator[Outcome]:
-    """What is reported of tasks that have ended."""
-    work, done = sum(task.work for task in tasks), 0.0
-    for end in ends:
-        task = end.task
-        done += task.work
-        outcome = Outcome(task.label, task.method, end.failure, end.message, is_stored=False, share=done / work)
-        if end.value is not None and isinstance(task, RunTask):
-            status, message = STATUSES[int(end.value["status"][0])], text_of(end.value["message"][0])
-            seconds = float("nan") if task.asked.is_shipped else float(end.value["run_time_s"][0])
-            is_shipped = task.asked.is_shipped
-            outcome = replace(
-                outcome, status=status, message=message, seconds=seconds, is_stored=True, is_shipped=is_shipped
-            )
-        elif end.value is not None:
-            outcome = replace(outcome, status="ok", message=f"{len(end.value['status'])} points", is_stored=True)
-        yield outcome
-
-
-def _task(file: TableFile, run: Asked, timeout_s: float) -> RunTask:
-    return RunTask(
-        label=f"{run.scene.name} {run.method}",
-        method=run.method,
-        place=file.place(run.run),
-        reference=None if run.method == REFERENCE else file.place(f"{run.scene.name}/{REFERENCE}"),
-        # What ends itself at its time limit needs a while before, to load its engine and compile, and to write after.
-        kill_after_s=1.2 * timeout_s + 10.0,
-        work=work_of(run.scene, run.method),
-        asked=run,
-        time_limit_s=timeout_s,
+def _outcome(end: Finished[Task, Rows], share: float) -> Outcome:
+    task, row = end.task, end.value
+    if row is None:
+        return Outcome(task.label, task.method, end.failure, end.message, is_stored=False, share=share)
+    if not isinstance(task, RunTask):
+        return Outcome(task.label, task.method, "ok", f"{len(row['status'])} points", share=share)
+    is_shipped = task.asked.is_shipped
+    return Outcome(
+        task.label,
+        task.method,
+        STATUSES[int(row["status"][0])],
+        text_of(row["message"][0]),
+        seconds=float("nan") if is_shipped else float(row["run_time_s"][0]),
+        is_shipped=is_shipped,
+        share=share,
     )
 
 
@@ -249,7 +252,7 @@ def solve_judged(
         reference = frozen_solution(scene).trajectory
     elif compute_reference:
         reference = solve(REFERENCE, scene, {}).trajectory
-    own = own_settings(scene, method, {}) | dict(settings or {})
+    own = own_settings(scene, method) | dict(settings or {})
     try:
         run, _ = _judged(solve(method, scene, own, _REPEATS, _REPEAT_BUDGET_S, time_limit_s), reference)
     except OutOfTimeError as exc:
@@ -286,19 +289,13 @@ def asked_reference(scene: Scene, *, use_frozen: bool = True) -> Asked:
     return Asked(scene, REFERENCE, versions={**row_versions(find_method(REFERENCE)), **source})
 
 
-def own_settings(scene: Scene, method: str, given: Mapping[str, object]) -> dict[str, object]:
-    """Those of the scene's settings that the method has, with those of the `given` ones in their place.
-
-    Raises
-    ------
-    InputError
-        For a setting of the scene that no method at all has, or that is out of range.
-    """
-    of_scene: dict[str, dict[str, object]] = {}
-    if scene.settings:
-        of_scene = of_file(scene.name, scene.text, "settings", settings_for, method_names(), dict(scene.settings))
-    allowed = find_method(method).settings.allowed()
-    return of_scene.get(method, {}) | {name: value for name, value in given.items() if name in allowed}
+def own_settings(scene: Scene, method: str) -> dict[str, object]:
+    """Those of the scene's settings that the method has. Raises InputError for one that no method at all has."""
+    if not scene.settings:
+        return {}
+    return of_file(scene.name, scene.text, "settings", settings_for, method_names(), dict(scene.settings)).get(
+        method, {}
+    )
 
 
 def perform_run(task: RunTask) -> Rows:
@@ -358,12 +355,7 @@ def asked_methods(scenes: Sequence[Scene], names: Sequence[str]) -> dict[str, li
 
 def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], list[str]]:
     """The methods that each scene names itself, or that the rule selects, none where it refuses; and the reasons.
-
-    Raises
-    ------
-    InputError
-        Where a scene names a method that is unknown or cannot represent it.
-    """
+    Raises InputError where a scene names a method that is unknown or cannot represent it."""
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
     for scene in scenes:

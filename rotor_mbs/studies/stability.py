@@ -22,11 +22,10 @@ from rotor_mbs.analysis.stability import TARGET, SuiteRun, suite_runs
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, time_limit
-from rotor_mbs.runs.lock import writing
-from rotor_mbs.runs.pool import pool_of
+from rotor_mbs.runs.files import writing
 from rotor_mbs.runs.records import points_table, row_of_point
 from rotor_mbs.runs.results import TableFile, extend_file
-from rotor_mbs.runs.runner import Task, compute
+from rotor_mbs.runs.runner import Task
 from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -38,8 +37,8 @@ from rotor_mbs.studies.run import (
     OnProgress,
     Outcome,
     able_methods,
+    compute_tasks,
     ignore_progress,
-    outcomes,
     run_scenes,
     work_of,
 )
@@ -147,13 +146,7 @@ def complete_studies(
                         scene=scene,
                     )
                 )
-        made: list[Outcome] = []
-        if tasks:
-            with pool_of(workers) as pool:
-                for done, outcome in enumerate(outcomes(compute(pool, perform_study, tasks), tasks), 1):
-                    made.append(outcome)
-                    on_progress(done, len(tasks), outcome)
-        return made
+        return compute_tasks(tasks, perform_study, workers, on_progress)
 
 
 def study_points(table: str, scene: Scene, method: str) -> list[dict[str, object]]:

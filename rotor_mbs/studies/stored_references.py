@@ -15,19 +15,17 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.read import StoredRun, open_results
-from rotor_mbs.runs.results import RUNS, TableFile
+from rotor_mbs.runs.results import FROZEN, RUNS, TableFile
 from rotor_mbs.runs.table import MISSING, Place
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.quantities import LOADS, sample_times
+from rotor_mbs.solution.quantities import sample_times
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 
 # References that stay in memory: of so many samples, at some 30 numbers each, twenty of them take 25 MB at most.
 _SHORT, _MAX_RECENT = 5001, 20
 _recent: dict[tuple[object, ...], Trajectory] = {}
-# What cannot be computed again from angles and rates as precisely.
-_KEPT = ("work", "angle_uncertainty", "error_growth", *(load.name for load in LOADS))
 
 
 def shipped_files() -> list[Path]:
@@ -68,9 +66,7 @@ def digest(path: Path) -> str:
 
 def read_reference(place: Place, scene: Scene) -> Trajectory | None:
     """The reference of `scene` at a place of a results file, not to be changed; None where it is missing or empty.
-
-    Short ones stay in memory: a process judges runs of one scene by many methods.
-    """
+    Short ones stay in memory: a process judges runs of one scene by many methods."""
     row = place.read()
     samples = int(row["samples"][0])
     if int(row["status"][0]) == MISSING or samples <= 0:
@@ -78,7 +74,7 @@ def read_reference(place: Place, scene: Scene) -> Trajectory | None:
     key = (place.path, place.inode, int(row["crc32"][0]), scene)
     if key in _recent:
         return _recent[key]
-    arrays = {name: row[name][0][:samples] for name in ("angles", "rates", *_KEPT) if name in row}
+    arrays = {name: row[name][0][:samples] for name in FROZEN if name in row}
     reference = _rebuilt(scene, {"time": sample_times(scene)[:samples], **arrays})
     if scene.samples <= _SHORT:
         if len(_recent) >= _MAX_RECENT:
@@ -89,7 +85,7 @@ def read_reference(place: Place, scene: Scene) -> Trajectory | None:
 
 def rebuilt_reference(scene: Scene, stored: StoredRun) -> Trajectory:
     """A stored reference with what its scene asks for, computed from its angles and rates by its own closed form."""
-    names = [name for name in ("time", "angles", "rates", *_KEPT) if name in stored]
+    names = [name for name in ("time", *FROZEN) if name in stored]
     return _rebuilt(scene, {name: stored.array(name) for name in names})
 
 
@@ -100,18 +96,12 @@ def _rebuilt(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     moving = scene.moving_coordinates
     states = np.hstack([known["angles"][:, moving], known["rates"][:, moving]])
     reference = samples.trajectory(scene, known["time"], states)
-    reference.quantities |= {name: known[name] for name in _KEPT if name in known}
+    reference.quantities |= {name: known[name] for name in FROZEN[2:] if name in known}
     return reference
 
 
 def frozen_solution(scene: Scene) -> Solution:
-    """The shipped reference of a scene, with the settings and times of when it was computed.
-
-    Raises
-    ------
-    StoreError
-        Where none is shipped.
-    """
+    """The shipped reference of a scene, with the settings and times of when it was computed. Raises StoreError."""
     shipped = shipped_reference(scene_hash(scene))
     if shipped is None:
         raise StoreError(f"{reference_folder()}: no frozen reference of {scene.name}; `rotor-mbs reference` makes one")

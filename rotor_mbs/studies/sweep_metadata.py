@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.runs.files import KEYWORDS, replace_file
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.scenario.sweep_design import SPLITS
+from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import code_of
 
 _PIECE = 1 << 24  # bytes of a variable that are read at once

@@ -15,7 +15,7 @@ from support.printed_entries import NAMES, TOLERANCE, check_errata, random_state
 from support.symbols import Symbol
 
 from rotor_mbs.analysis.published import checked_entries
-from rotor_mbs.models.printed import literal, matrices
+from rotor_mbs.models.printed import derivation, literal
 
 REFERENCE = Path(__file__).parents[2] / "reference" / "errata.toml"
 
@@ -91,13 +91,13 @@ def test_other_states_find_the_same(checks):
 @pytest.mark.parametrize(
     ("module", "name", "row", "column"),
     [
-        (matrices, "u32", 0, 3),
-        (matrices, "u33", 2, 1),
-        (matrices, "u32_2", 2, 3),
-        (matrices, "u32_3", 0, 0),
-        (matrices, "u33_2", 2, 3),
-        (matrices, "u33_3", 0, 3),
-        (matrices, "a3", 1, 3),
+        (derivation, "u32", 0, 3),
+        (derivation, "u33", 2, 1),
+        (derivation, "u32_2", 2, 3),
+        (derivation, "u32_3", 0, 0),
+        (derivation, "u33_2", 2, 3),
+        (derivation, "u33_3", 0, 3),
+        (derivation, "a3", 1, 3),
         (literal, "mass_one", 0, 1),
         (literal, "mass_three", 2, 0),
         (literal, "gravity_one", 1, None),
@@ -139,7 +139,7 @@ def test_derivatives_of_a3_against_the_complex_step():
         q2, q3 = state.angles[:2]
 
         def a3(q2, q3, state=state):
-            return np.array(matrices.a3(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3), state.c, state.d), complex)
+            return np.array(derivation.a3(np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3), state.c, state.d), complex)
 
         by_turns = entries.derivatives_of_a3(q2, q3, state)
         np.testing.assert_allclose(by_turns[0], a3(q2 + 1j * h, q3).imag / h, atol=1e-14)

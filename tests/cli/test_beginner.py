@@ -10,8 +10,7 @@ from support.commands import rotor_mbs
 import rotor_mbs as rm
 from rotor_mbs.errors import PlausibilityWarning
 from rotor_mbs.scenario.catalogue import list_scenes
-from rotor_mbs.scenario.plausibility import doubts
-from rotor_mbs.scenario.scene_file import new_scene_text
+from rotor_mbs.scenario.scene import doubts, new_scene_text
 
 # Mistake: (edits of the template, the command with {file} for the scene file, what the one line must say).
 MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {

@@ -13,8 +13,7 @@ from support.scenes import paper
 import rotor_mbs as rm
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, RotorError
-from rotor_mbs.foreign.channels import channels, guess
-from rotor_mbs.foreign.trajectory import load_data
+from rotor_mbs.foreign.channels import channels, guess, load_data
 
 SCENE = paper("fig08")
 TIME = np.linspace(0.0, 10.0, 201)

@@ -19,7 +19,7 @@ from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.runs.results import Asked, extend_file, results_tables
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import MISSING, text_of
-from rotor_mbs.scenario.scene_file import parse_scene, scene_toml
+from rotor_mbs.scenario.scene import parse_scene, scene_toml
 from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.run import RunTask, able_methods, perform_run, selected_methods

@@ -23,7 +23,7 @@ from support.fuzzing import write
 from support.scenes import paper
 from support.sweeps import stored_runs
 
-from rotor_mbs.scenario.scene_file import scene_toml
+from rotor_mbs.scenario.scene import scene_toml
 
 pytestmark = [
     pytest.mark.full,

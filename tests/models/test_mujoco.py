@@ -35,8 +35,7 @@ from rotor_mbs.solution.trajectory import Trajectory
 pytest.importorskip("mujoco")
 
 from rotor_mbs.models.mujoco import mjcf
-from rotor_mbs.models.mujoco.adapter import Engine
-from rotor_mbs.models.mujoco.solver import MujocoSolver
+from rotor_mbs.models.mujoco.solver import Engine, MujocoSolver
 
 RK4_STEP = 2.5e-4
 

@@ -12,8 +12,7 @@ from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.printed import literal
-from rotor_mbs.models.printed.derivation import DerivedRotor
-from rotor_mbs.models.printed.matrices import AS_PRINTED, CORRECTED, Errata
+from rotor_mbs.models.printed.derivation import AS_PRINTED, CORRECTED, DerivedRotor, Errata
 from rotor_mbs.scenario.scene import Blade, Scene
 
 THIRDS = tuple(2.0 * math.pi * i / 3.0 for i in range(3))

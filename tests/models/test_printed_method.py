@@ -13,8 +13,7 @@ from support.rotors import PAPER, make_scene, pendulum
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.ode45 import ode45
-from rotor_mbs.models.printed.derivation import DerivedRotor
-from rotor_mbs.models.printed.matrices import Errata
+from rotor_mbs.models.printed.derivation import DerivedRotor, Errata
 from rotor_mbs.models.printed.methods import METHODS, right_hand_side
 
 PI = math.pi

@@ -23,8 +23,7 @@ from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.runs.pool import WorkerPool, run_in
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import reference_folder
-from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.scenario.scene_file import parse_scene
+from rotor_mbs.scenario.scene import Scene, parse_scene, scene_hash
 from rotor_mbs.solution.trajectory import Integration
 
 FROZEN = reference_folder() / "paper.h5"

@@ -19,7 +19,7 @@ from rotor_mbs.solution.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts
 from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.studies.sweep_work import Chunk, rows_of
+from rotor_mbs.studies.sweep import Chunk, rows_of
 
 pytest.importorskip("heyoka")
 LANES = lanes()

@@ -16,7 +16,7 @@ from support.sweeps import made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.digests import seal
+from rotor_mbs.runs.files import seal
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.sweeps import StoredSweep

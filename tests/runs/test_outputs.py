@@ -12,8 +12,7 @@ from support.commands import rotor_mbs
 from support.sweeps import made_sweep
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.files import replace_file
-from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.files import replace_file, writing
 from rotor_mbs.runs.read import open_results
 
 SWEEP = """

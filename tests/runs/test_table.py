@@ -14,8 +14,7 @@ from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, Column
-from rotor_mbs.runs.lock import writing
+from rotor_mbs.runs.files import CHARACTERS, Column, writing
 from rotor_mbs.runs.records import points_table, row_of_point
 from rotor_mbs.runs.results import Asked, TableFile, extend_file, results_tables
 from rotor_mbs.runs.table import (
@@ -271,7 +270,7 @@ def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(results:
 def test_no_other_process_writes_a_locked_output(path: Path) -> None:
     program = (
         "import sys, pathlib\n"
-        "from rotor_mbs.runs.lock import writing\n"
+        "from rotor_mbs.runs.files import writing\n"
         "with writing(pathlib.Path(sys.argv[1])):\n"
         "    print('locked', flush=True)\n"
         "    sys.stdin.read()\n"

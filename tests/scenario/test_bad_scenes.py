@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.scene_file import load_scene
+from rotor_mbs.scenario.scene import load_scene
 from rotor_mbs.scenario.toml_file import MAX_BYTES
 
 SCENE = """\

@@ -19,9 +19,12 @@ from rotor_mbs.scenario.scene import (
     SCENE_KEYS,
     Scene,
     known_outputs,
+    load_scene,
+    new_scene_text,
+    parse_scene,
     scene_hash,
+    scene_toml,
 )
-from rotor_mbs.scenario.scene_file import load_scene, new_scene_text, parse_scene, scene_toml
 
 # A file key, a value that differs from check/general, and the field that it reaches.
 CHANGES: dict[str, tuple[Any, str]] = {

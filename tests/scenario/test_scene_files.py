@@ -28,10 +28,10 @@ from rotor_mbs.scenario.scene import (
     OUTPUTS,
     Scene,
     is_rigid_body_inertia,
+    load_scene,
     scene_hash,
     values_per_sample,
 )
-from rotor_mbs.scenario.scene_file import load_scene
 from rotor_mbs.scenario.time_table import segments
 from rotor_mbs.scenario.toml_file import find_lines, line_of
 

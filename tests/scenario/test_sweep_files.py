@@ -12,8 +12,7 @@ import pytest
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes, sweeps_folder
 from rotor_mbs.scenario.scene import scene_tables, unit_of
-from rotor_mbs.scenario.sweep import Sweep, Variants, load_sweep, sweep_of
-from rotor_mbs.scenario.sweep_design import Axis, Design, split_rows
+from rotor_mbs.scenario.sweep import Axis, Design, Sweep, Variants, load_sweep, split_rows, sweep_of
 from rotor_mbs.scenario.toml_file import parse_key
 
 _HEAD = 'title = "t"\nscene = "paper/fig11"\n'

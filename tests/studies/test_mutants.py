@@ -55,7 +55,7 @@ EQUIVALENT = {
     r"literal\.three_blade_accelerations .*c[345] -> s[345]": (
         "goes into the first row of (56) alone, whose place `rotor_gravity` takes"
     ),
-    r"matrices\.a3 .*-> (0\.001|1\.000001)$": "the last row of a transformation matrix: nothing reads it",
+    r"derivation\.a3 .*-> (0\.001|1\.000001)$": "the last row of a transformation matrix: nothing reads it",
     r"derivation\.blade_terms .*[sc]3 -> [sc]3": (
         "the matrix's last column, which is all that a point mass in the frame's origin takes of it, does not have it"
     ),

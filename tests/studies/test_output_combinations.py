@@ -10,8 +10,7 @@ from support.commands import rotor_mbs
 from support.scenes import paper
 
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.scene import OUTPUTS
-from rotor_mbs.scenario.scene_file import scene_toml
+from rotor_mbs.scenario.scene import OUTPUTS, scene_toml
 
 ALL = [chosen for count in range(1, 1 + len(OUTPUTS)) for chosen in itertools.combinations(OUTPUTS, count)]
 METHODS = ("-m", "lagrange/taylor", "-m", "exudyn_tree/rk67")

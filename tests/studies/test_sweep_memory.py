@@ -15,8 +15,7 @@ import pytest
 from rotor_mbs.runs.cluster import open_task_pool
 from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.sweep import load_sweep
-from rotor_mbs.studies.sweep import plan_sweep
-from rotor_mbs.studies.sweep_work import perform
+from rotor_mbs.studies.sweep import perform, plan_sweep
 
 pytestmark = [
     pytest.mark.full,

@@ -24,8 +24,7 @@ from rotor_mbs.runs.table import MISSING, Rows
 from rotor_mbs.runs.versions import code_digest
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.sweep import load_sweep, sweep_of
-from rotor_mbs.studies.sweep import plan_sweep, run_sweep
-from rotor_mbs.studies.sweep_work import Chunk, perform
+from rotor_mbs.studies.sweep import Chunk, perform, plan_sweep, run_sweep
 
 _SWEEP = """
 title = "starts and springs"

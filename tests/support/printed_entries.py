@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 
 from rotor_mbs.analysis.published import CheckedEntry
-from rotor_mbs.models.printed import literal, matrices
-from rotor_mbs.models.printed.derivation import BladeTerms, blade_terms
-from rotor_mbs.models.printed.matrices import Errata
+from rotor_mbs.models.printed import derivation, literal
+from rotor_mbs.models.printed.derivation import BladeTerms, Errata, blade_terms
 from rotor_mbs.solution.trajectory import Array
 from support.symbols import Symbol
 
@@ -93,7 +92,7 @@ def printed_entries(names: Mapping[str, Any]) -> Entries:
     """Every entry as printed: numbers for `State.names`, texts for SYMBOLS."""
     entries: Entries = {}
     for equation, name in MATRICES:
-        entries |= _matrix_entries(equation, _call(getattr(matrices, name), names))
+        entries |= _matrix_entries(equation, _call(getattr(derivation, name), names))
     entries |= _mass_entries((("(25)",) * 2,) * 2, _call(literal.mass_one, names))
     entries |= _mass_entries(_MASS_THREE, _call(literal.mass_three, names))
     for equation, name in _RATE_ROWS:
@@ -109,7 +108,7 @@ def derived_entries(state: State, errata: Errata) -> Entries:
     names = state.names
     entries: Entries = {}
     for equation, name in MATRICES:
-        entries |= _matrix_entries(equation, _call(getattr(matrices, name), {**names, "errata": errata}))
+        entries |= _matrix_entries(equation, _call(getattr(derivation, name), {**names, "errata": errata}))
     terms = [blade_terms(q2, q3, state.m, state.c, state.d, state.g, errata) for q2, q3 in state.blades]
     return entries | assembled_entries(terms, errata.e3)
 
@@ -130,8 +129,8 @@ def right_formulas() -> Entries:
     """Text of the right entries, in closed form."""
     entries: Entries = {}
     for equation, name in MATRICES:
-        names = {**SYMBOLS, "errata": matrices.CORRECTED}
-        entries |= _matrix_entries(equation, _call(getattr(matrices, name), names))
+        names = {**SYMBOLS, "errata": derivation.CORRECTED}
+        entries |= _matrix_entries(equation, _call(getattr(derivation, name), names))
     m, c, d, g = (SYMBOLS[name] for name in "mcdg")
     terms = []
     for number, turn in zip(_PITCHES, ("", "+2π/3", "+4π/3"), strict=True):
@@ -167,7 +166,7 @@ def derivatives_of_a3(q2: float, q3: float, state: State) -> tuple[Array, ...]:
     quarter = math.pi / 2.0
 
     def a3(q2: float, q3: float) -> Array:
-        return np.array(matrices.a3(math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3), state.c, state.d), float)
+        return np.array(derivation.a3(math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3), state.c, state.d), float)
 
     def by_q2(f: Callable[[float, float], Array]) -> Callable[[float, float], Array]:
         return lambda q2, q3: (f(q2 + quarter, q3) - f(q2 - quarter, q3)) / 2.0

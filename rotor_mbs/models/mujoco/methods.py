@@ -60,7 +60,7 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
         distributions=("mujoco",),
         fixed_step=True,
         relative_cost=10.0,
-        load=lambda: import_module("rotor_mbs.models.mujoco.adapter"),
+        load=lambda: import_module("rotor_mbs.models.mujoco.solver"),
         **facts,
     )
 

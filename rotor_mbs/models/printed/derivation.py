@@ -6,10 +6,95 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from rotor_mbs.models.printed import matrices
-from rotor_mbs.models.printed.matrices import AS_PRINTED, Errata, Matrix
+Matrix = tuple[tuple[Any, Any, Any, Any], ...]
+LAST_ROW_OF_DERIVATIVE = (0, 0, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Errata:
+    """Which faults are in: e1, (8) row 2 column 4 is c c3 (and (17) its derivative), where y does not depend on q2; e2,
+    (19) row 1 column 4 has s2 in place of c2; e3, the last terms of (53)-(55) have the pitch rate, not its square."""
+
+    e1: bool = True
+    e2: bool = True
+    e3: bool = True
+
+
+AS_PRINTED = Errata()
+CORRECTED = Errata(e1=False, e2=False, e3=False)
+
+
+def a3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
+    """(3), base from frame 3, whose origin is the blade's mass point: Ry(q2) Rz(q3), the origin at (c, 0, d)."""
+    return (
+        (c2 * c3, -c2 * s3, s2, c * c2 * c3 + d * s2),
+        (s3, c3, 0, c * s3),
+        (-s2 * c3, s2 * s3, c2, -c * s2 * c3 + d * c2),
+        (0, 0, 0, 1),
+    )
+
+
+def u32(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any, errata: Errata = AS_PRINTED) -> Matrix:
+    """(8), derivative of (3) by q2."""
+    return (
+        (-s2 * c3, s2 * s3, c2, -c * s2 * c3 + d * c2),
+        (0, 0, 0, c * c3 if errata.e1 else 0),
+        (-c2 * c3, c2 * s3, -s2, -c * c2 * c3 - d * s2),
+        LAST_ROW_OF_DERIVATIVE,
+    )
+
+
+def u33(s2: Any, c2: Any, s3: Any, c3: Any, c: Any) -> Matrix:
+    """(9), derivative of (3) by q3."""
+    return (
+        (-c2 * s3, -c2 * c3, 0, -c * c2 * s3),
+        (c3, -s3, 0, c * c3),
+        (s2 * s3, s2 * c3, 0, c * s2 * s3),
+        LAST_ROW_OF_DERIVATIVE,
+    )
+
+
+def u32_2(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, d: Any) -> Matrix:
+    """(16), derivative of (8) by q2."""
+    return (
+        (-c2 * c3, c2 * s3, -s2, -c * c2 * c3 - d * s2),
+        (0, 0, 0, 0),
+        (s2 * c3, -s2 * s3, -c2, c * s2 * c3 - d * c2),
+        LAST_ROW_OF_DERIVATIVE,
+    )
+
+
+def u32_3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, errata: Errata = AS_PRINTED) -> Matrix:
+    """(17), derivative of (8) by q3."""
+    return (
+        (s2 * s3, s2 * c3, 0, c * s2 * s3),
+        (0, 0, 0, -c * s3 if errata.e1 else 0),
+        (c2 * s3, c2 * c3, 0, c * c2 * s3),
+        LAST_ROW_OF_DERIVATIVE,
+    )
+
+
+def u33_2(s2: Any, c2: Any, s3: Any, c3: Any, c: Any) -> Matrix:
+    """(18), derivative of (9) by q2."""
+    return (
+        (s2 * s3, s2 * c3, 0, c * s2 * s3),
+        (0, 0, 0, 0),
+        (c2 * s3, c2 * c3, 0, c * c2 * s3),
+        LAST_ROW_OF_DERIVATIVE,
+    )
+
+
+def u33_3(s2: Any, c2: Any, s3: Any, c3: Any, c: Any, errata: Errata = AS_PRINTED) -> Matrix:
+    """(19), derivative of (9) by q3."""
+    return (
+        (-c2 * c3, c2 * s3, 0, -c * s2 * c3 if errata.e2 else -c * c2 * c3),
+        (-s3, -c3, 0, -c * s3),
+        (s2 * c3, -s2 * s3, 0, c * s2 * c3),
+        LAST_ROW_OF_DERIVATIVE,
+    )
 
 
 class BladeTerms(NamedTuple):
@@ -41,24 +126,24 @@ def blade_terms(
 ) -> BladeTerms:
     """(24), (26), (27), (31) for one blade whose own rotor angle is q2."""
     s2, c2, s3, c3 = math.sin(q2), math.cos(q2), math.sin(q3), math.cos(q3)
-    u2 = matrices.u32(s2, c2, s3, c3, c, d, errata)
-    u3 = matrices.u33(s2, c2, s3, c3, c)
-    u22 = matrices.u32_2(s2, c2, s3, c3, c, d)
-    u23 = matrices.u32_3(s2, c2, s3, c3, c, errata)
-    u32 = matrices.u33_2(s2, c2, s3, c3, c)
-    u33 = matrices.u33_3(s2, c2, s3, c3, c, errata)
+    by_2 = u32(s2, c2, s3, c3, c, d, errata)
+    by_3 = u33(s2, c2, s3, c3, c)
+    by_22 = u32_2(s2, c2, s3, c3, c, d)
+    by_23 = u32_3(s2, c2, s3, c3, c, errata)
+    by_32 = u33_2(s2, c2, s3, c3, c)
+    by_33 = u33_3(s2, c2, s3, c3, c, errata)
     return BladeTerms(
-        d_22=trace(u2, m, u2),
-        d_23=trace(u3, m, u2),
-        d_33=trace(u3, m, u3),
-        h_2_22=trace(u22, m, u2),
-        h_2_23=trace(u23, m, u2) + trace(u32, m, u2),
-        h_2_33=trace(u33, m, u2),
-        h_3_22=trace(u22, m, u3),
-        h_3_23=trace(u23, m, u3) + trace(u32, m, u3),
-        h_3_33=trace(u33, m, u3),
-        gravity_2=m * g * u2[2][3],  # (31): gravity (0, 0, -g, 0), the mass in the origin of frame 3
-        gravity_3=m * g * u3[2][3],
+        d_22=trace(by_2, m, by_2),
+        d_23=trace(by_3, m, by_2),
+        d_33=trace(by_3, m, by_3),
+        h_2_22=trace(by_22, m, by_2),
+        h_2_23=trace(by_23, m, by_2) + trace(by_32, m, by_2),
+        h_2_33=trace(by_33, m, by_2),
+        h_3_22=trace(by_22, m, by_3),
+        h_3_23=trace(by_23, m, by_3) + trace(by_32, m, by_3),
+        h_3_33=trace(by_33, m, by_3),
+        gravity_2=m * g * by_2[2][3],  # (31): gravity (0, 0, -g, 0), the mass in the origin of frame 3
+        gravity_3=m * g * by_3[2][3],
     )
 
 

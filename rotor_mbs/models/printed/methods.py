@@ -11,8 +11,7 @@ from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.base import BuiltItem, Method
 from rotor_mbs.models.equations import Ode45Settings, equation_items
 from rotor_mbs.models.printed import literal
-from rotor_mbs.models.printed.derivation import DerivedRotor
-from rotor_mbs.models.printed.matrices import Errata
+from rotor_mbs.models.printed.derivation import DerivedRotor, Errata
 
 if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.models.ode45 import Ode45Result, RightHandSide

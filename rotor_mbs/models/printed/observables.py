@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor_mbs.models.ode45 import Ode45Result
-from rotor_mbs.models.printed import matrices
-from rotor_mbs.models.printed.matrices import CORRECTED
+from rotor_mbs.models.printed import derivation
+from rotor_mbs.models.printed.derivation import CORRECTED
 from rotor_mbs.scenario.time_table import Segment, Table, segments
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
@@ -42,7 +42,7 @@ class PointMassRotor:
         x, y, z = self.tip
         paths = []
         for sines in self._sines(angles):
-            rows = matrices.a3(*sines, self.c, self.d)[:3]
+            rows = derivation.a3(*sines, self.c, self.d)[:3]
             paths.append(np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in rows], axis=-1))
         return np.stack(paths, axis=1)
 
@@ -50,8 +50,8 @@ class PointMassRotor:
         """(n,) J: ½ m v² with v from the last columns of (8), E1 corrected, and (9)."""
         total = np.zeros(len(angles))
         for pitch, sines in enumerate(self._sines(angles), start=1):
-            u32 = matrices.u32(*sines, self.c, self.d, CORRECTED)
-            u33 = matrices.u33(*sines, self.c)
+            u32 = derivation.u32(*sines, self.c, self.d, CORRECTED)
+            u33 = derivation.u33(*sines, self.c)
             for by_q2, by_q3 in zip(u32[:3], u33[:3], strict=True):
                 total += 0.5 * self.m * (by_q2[3] * rates[:, 0] + by_q3[3] * rates[:, pitch]) ** 2
         return total
@@ -60,7 +60,7 @@ class PointMassRotor:
         """(n,) J, zero at the height of the shaft."""
         total = np.zeros(len(angles))
         for sines in self._sines(angles):
-            total += self.m * self.g * matrices.a3(*sines, self.c, self.d)[2][3]
+            total += self.m * self.g * derivation.a3(*sines, self.c, self.d)[2][3]
         return total
 
     def loads(self, angles: Array, rates: Array, accelerations: Array, torque: Array) -> dict[str, Array]:
@@ -68,12 +68,14 @@ class PointMassRotor:
         forces, moments = [], []
         shaft_force, shaft_moment = np.zeros((2, len(angles), 3))
         for pitch, sines in enumerate(self._sines(angles), start=1):
-            place = np.stack(np.broadcast_arrays(*(row[3] for row in matrices.a3(*sines, self.c, self.d)[:3])), axis=1)
+            place = np.stack(
+                np.broadcast_arrays(*(row[3] for row in derivation.a3(*sines, self.c, self.d)[:3])), axis=1
+            )
             force = self._acceleration(sines, rates[:, [0, pitch]], accelerations[:, [0, pitch]])
             force[:, 2] += self.g
             force *= self.m
             axes = np.array(
-                [np.broadcast_arrays(*row[:3], angles[:, 0])[:3] for row in matrices.a3(*sines, 0.0, 0.0)[:3]]
+                [np.broadcast_arrays(*row[:3], angles[:, 0])[:3] for row in derivation.a3(*sines, 0.0, 0.0)[:3]]
             )
             forces.append(np.einsum("ijn,ni->nj", axes, force))
             moments.append(np.cross([self.c, 0.0, self.d], forces[-1]))
@@ -88,12 +90,12 @@ class PointMassRotor:
         c, d = self.c, self.d
         w2, w3 = rates.T
         terms = (
-            (matrices.u32(*sines, c, d, CORRECTED), accelerations[:, 0]),
-            (matrices.u33(*sines, c), accelerations[:, 1]),
-            (matrices.u32_2(*sines, c, d), w2 * w2),
-            (matrices.u32_3(*sines, c, CORRECTED), w2 * w3),
-            (matrices.u33_2(*sines, c), w2 * w3),
-            (matrices.u33_3(*sines, c, CORRECTED), w3 * w3),
+            (derivation.u32(*sines, c, d, CORRECTED), accelerations[:, 0]),
+            (derivation.u33(*sines, c), accelerations[:, 1]),
+            (derivation.u32_2(*sines, c, d), w2 * w2),
+            (derivation.u32_3(*sines, c, CORRECTED), w2 * w3),
+            (derivation.u33_2(*sines, c), w2 * w3),
+            (derivation.u33_3(*sines, c, CORRECTED), w3 * w3),
         )
         return np.stack([sum((u[row][3] * rate for u, rate in terms), np.zeros(len(w2))) for row in range(3)], axis=1)
 

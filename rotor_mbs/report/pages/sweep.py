@@ -18,7 +18,7 @@ from rotor_mbs.report.core.numbers import SPACE, apart
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import status_text, versions
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
-from rotor_mbs.scenario.scene_file import parse_scene
+from rotor_mbs.scenario.scene import parse_scene
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Array
 
