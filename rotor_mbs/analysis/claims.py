@@ -13,6 +13,7 @@ from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.catalogue import natural_order
+from rotor_mbs.solution.status import GOOD
 from rotor_mbs.solution.trajectory import Array
 
 # Numbers read off runs
@@ -224,7 +225,7 @@ def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Findi
     energy = None
     if gains:
         rising = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
-        largest = max((gains[name] for name in rising if runs[name].status == "ok"), default=None)
+        largest = max((gains[name] for name in rising if runs[name].status in GOOD), default=None)
         energy = PrintedEnergy(Tally(len(rising), len(gains)), largest)
     return Finding(
         _tally(claim.printed.holds for claim in numbers),

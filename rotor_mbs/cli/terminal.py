@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self, TextIO
 
 from rotor_mbs.cli import printable
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import GOOD, STATUSES
 
 if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
     from rotor_mbs.scenario.scene import Scene
@@ -129,7 +129,7 @@ class ProgressLine(_RenewedLine):
             seconds = " (read, not computed)"
         reason = f": {outcome.message}" if outcome.message else ""
         text = f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
-        keep = outcome.status != "ok"  # a person must not miss it
+        keep = outcome.status not in GOOD  # a person must not miss it
         self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
     def stage(self, text: str, done: int, total: int) -> None:
@@ -176,7 +176,7 @@ class SweepProgress(_RenewedLine):
             facts = {"done": done, "total": total, "runs_per_s": round(rate, 3), "statuses": self._made}
             self._show(json.dumps({"event": "progress", **facts}))
             return
-        failed = [f"{count} {name}" for name, count in sorted(self._made.items()) if name != "ok"]
+        failed = [f"{count} {name}" for name, count in sorted(self._made.items()) if name not in GOOD]
         text = ", ".join([f"{done}/{total} runs", f"{rate:.4g} per s", f"{span((total - done) / rate)} left", *failed])
         room = min(40, self._width - len(text) - 3)
         if self._is_terminal and room > 5:

@@ -57,8 +57,17 @@ _COMPUTED = {
     "energy_scale_J": Column(("run",), "J", "what energy errors are relative to"),
     "energy_drift_max": Column(("run",), "1", "largest energy error over the run, of the energy scale"),
     "energy_gain_J": Column(("run",), "J", "largest energy gained without work"),
+    "defect_max": Column(("run",), "rad", "largest defect of an interval between samples"),
+    "defect_median": Column(("run",), "rad", "median of the intervals' defects"),
+    "defect_time": Column(("run",), "s", "end of the interval of the largest defect"),
+    "defect_mean": Column(("run",), "rad", "signed mean of the defects, of the coordinate where it is largest"),
+    "defect_drift": Column(("run",), "rad", "largest sum of the defects of 100 intervals, each carried to their end"),
+    "defect_floor": Column(("run",), "rad", "what the rounding of the samples may make of a defect"),
+    "defects_not_judged": Column(("run",), "1", "intervals in which an error may grow by more than 1e5"),
     "angle_error_max": Column(("run",), "rad", "largest angle error up to the horizon"),
-    "angle_error_per_growth": Column(("run",), "1", "largest relative angle error per unit of error growth"),
+    "angle_error_predicted": Column(
+        ("run",), "rad", "largest angle error up to the horizon, predicted from the defects"
+    ),
     "angle_error_whole": Column(("run",), "rad", "largest angle error over the run"),
     "angle_error_end": Column(("run",), "rad", "angle error at the last sample"),
     "horizon_s": Column(("run",), "s", "last sample before the error growth reaches 1e5, or the end"),
@@ -125,7 +134,7 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
     columns = dict(_COMPUTED)
     for quantity in quantities(outputs):
         if quantity.judgement is not None:
-            unit = "1" if quantity.judgement.per_growth_of else quantity.units
+            unit = "1" if quantity.judgement.scale_of else quantity.units
             columns[quantity.judgement.metric] = Column(("run",), unit, f"largest error of {quantity.long_name}")
         if quantity.has_peak:
             columns[f"{quantity.name}_max"] = Column(("run",), quantity.units, f"largest {quantity.long_name}")

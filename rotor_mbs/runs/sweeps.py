@@ -40,6 +40,12 @@ METRICS = {
     "rhs_evaluations": Column(("run",), "1", "evaluations of the right-hand side, -1 where not known", "<i8"),
     "time_reached": Column(("run",), "s", "time of the last finite sample"),
     "energy_drift_max": Column(("run",), "1", "largest energy error of the run, of its energy scale"),
+    "defect_max": Column(("run",), "rad", "largest defect of an interval between samples"),
+    "defect_median": Column(("run",), "rad", "median of the intervals' defects"),
+    "defect_time": Column(("run",), "s", "end of the interval of the largest defect"),
+    "angle_error_predicted": Column(
+        ("run",), "rad", "largest angle error up to the horizon, predicted from the defects"
+    ),
     "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, either way"),
     "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate, either way"),
     "pitch_max": Column(("run",), "rad", "largest pitch angle of any blade, either way"),

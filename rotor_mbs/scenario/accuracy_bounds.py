@@ -17,9 +17,9 @@ from rotor_mbs.scenario.keys import file_key
 from rotor_mbs.scenario.toml_file import TableError, read_toml, shown_path
 
 CHECKS = (
-    "complete", "status", "times", "start", "agreement", "tip", "energies", "energy", "impulse", "loads", "gap",
-    "exact", "published", "reference", "growth", "integrity", "copied", "settings", "steps", "uncertainty", "horizon",
-    "frozen",
+    "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "tip", "energies", "energy",
+    "impulse", "loads", "gap", "exact", "published", "reference", "growth", "integrity", "copied", "settings", "steps",
+    "uncertainty", "frozen",
 )  # fmt: skip
 
 

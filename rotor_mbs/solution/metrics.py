@@ -8,6 +8,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
+from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.impulse import angular_balance, linear_balance
 from rotor_mbs.solution.quantities import Array, array_of, deviation, energy_error, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Trajectory
@@ -63,7 +64,7 @@ def energy_scale(scene: Scene, run: Trajectory) -> float:
     return weights + springs + kinetic + work
 
 
-def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> Metrics:
+def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defects: Defects | None = None) -> Metrics:
     """The metrics stored with a run, by the names of the file format; those that do not exist are left out."""
     metrics: Metrics = {}
     if not len(run.time):
@@ -76,6 +77,8 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
         metrics["energy_gain_J"] = float(energy.max())
     if reference is not None and scene.wants("angles"):
         metrics |= _angle_errors(run, reference)
+    if defects is not None:
+        metrics |= defect_metrics(defects, metrics.get("horizon_s"))
     if scene.wants("angles") and scene.wants("rates"):
         with np.errstate(over="ignore", invalid="ignore"):
             balances = {"angular": angular_balance(scene, run), "linear": linear_balance(scene, run)}
@@ -99,40 +102,48 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None) -> M
             peaks[f"{quantity.name}_max_time_s"] = float(run.time[peak[0]])
             if quantity.dimensions[1:2] == ("blade",):
                 peaks[f"{quantity.name}_max_blade"] = float(peak[1] + 1)
-        rule, errors = quantity.judgement, deviation(quantity, scene, run, reference)
+        rule, compared = quantity.judgement, reference
+        if rule is not None and rule.at_own_state:
+            compared = None if defects is None else defects.own_loads
+        errors = deviation(quantity, scene, run, compared)
         if rule is None or errors is None:
             continue
-        if rule.with_reference and reference is not None:
+        if rule.with_reference and reference is not None and not rule.at_own_state:
             until = min(horizon_samples(reference), len(errors))
             errors = errors[: until if until > 1 else 0]  # the first sample is given, and equal in every run
-            if rule.per_growth_of is not None:
-                scale = rule.per_growth_of(scene, reference, until)
-                # What a relative error of 1 at the start would have become in a quantity that follows from all angles.
-                carried = running_growth(reference) * np.maximum(*_motion_sizes(reference))
-                errors = errors / (scale * carried[: len(errors)])
         if len(errors):
-            metrics[rule.metric] = float(errors.max())
+            metrics[rule.metric] = float(errors.max()) / (rule.scale_of(scene, run) if rule.scale_of else 1.0)
     return metrics | peaks
+
+
+def defect_metrics(defects: Defects, horizon_s: float | None) -> Metrics:
+    """Numbers of a run's interval defects; horizon_s: that of the reference, None where there is none."""
+    judged = defects.is_judged
+    metrics = {"defects_not_judged": float((~judged).sum())}
+    if judged.any():
+        sizes = np.where(judged, defects.sizes, 0.0)
+        largest = int(sizes.argmax())
+        metrics |= {
+            "defect_max": float(sizes[largest]),
+            "defect_median": float(np.median(defects.sizes[judged])),
+            "defect_time": float(defects.time[1 + largest]),
+            "defect_mean": defects.mean,
+            "defect_floor": float(defects.floor[judged].max()),
+        }
+    predicted = defects.predicted
+    if predicted is not None:
+        metrics["defect_drift"] = defects.drift
+        if horizon_s is None:
+            metrics["horizon_s"] = horizon_s = float(defects.time[max(defects.horizon_samples(HORIZON_GROWTH) - 1, 0)])
+        metrics["angle_error_predicted"] = float(np.abs(predicted[defects.time <= horizon_s]).max())
+    return {name: value for name, value in metrics.items() if not np.isnan(value)}
 
 
 def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
     """Errors only where there is a second sample: the first one is given, and equal in every run."""
     error = angle_error(run, reference)
     until = min(horizon_samples(reference), len(error))
-    metrics = {"horizon_s": horizon(reference)}
-    if until > 1:
-        metrics["angle_error_max"] = float(error[:until].max())
-        # The larger of the rotor's and the pitches' angle errors, each of what an error of 1 at the start would have
-        # become: the growth times how far the rotor has turned from its start, or the largest pitch (at least 1).
-        n = len(error)
-        errors = np.abs(run.angles[:n] - reference.angles[:n])
-        rotor, pitch = (size[:n] for size in _motion_sizes(reference))
-        relative = np.maximum(errors[:, 0] / rotor, errors[:, 1:].max(axis=1) / pitch) / running_growth(reference)[:n]
-        metrics["angle_error_per_growth"] = float(relative[:until].max())
-    if len(error) > 1:
-        metrics["angle_error_whole"] = float(error.max())
-        if len(run.time) == len(reference.time):
-            metrics["angle_error_end"] = float(error[-1])
+    metrics: Metrics = {}
     # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and how fast they left.
     zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
     if zero:
@@ -141,19 +152,23 @@ def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
         if (away > _LEFT_ZERO).any():
             metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > _LEFT_ZERO))])
             large = away >= _LINEAR_TO
-            until = int(np.argmax(large)) if large.any() else len(away)
-            linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < until)
+            linear_until = int(np.argmax(large)) if large.any() else len(away)
+            linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < linear_until)
             if linear.sum() >= 10:
                 slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
                 metrics["zero_pitch_growth_per_s"] = float(slope)
+        # The reference's horizon is that of motions which keep these pitches at zero. A run that has left them grows as
+        # they do, from there on: to the horizon once what it left with has grown as much.
+        beyond = np.flatnonzero(away[:until] > _LEFT_ZERO * HORIZON_GROWTH)
+        until = int(beyond[0]) if len(beyond) else until
+    metrics["horizon_s"] = float(reference.time[max(until - 1, 0)])
+    if until > 1:
+        metrics["angle_error_max"] = float(error[:until].max())
+    if len(error) > 1:
+        metrics["angle_error_whole"] = float(error.max())
+        if len(run.time) == len(reference.time):
+            metrics["angle_error_end"] = float(error[-1])
     return metrics
-
-
-def _motion_sizes(reference: Trajectory) -> tuple[Array, Array]:
-    """((n,), (n,)) rad: the rotor's largest way from its start so far, and the largest pitch; each at least 1."""
-    turned = np.abs(reference.angles[:, 0] - reference.angles[0, 0])
-    pitch = np.abs(reference.angles[:, 1:]).max(axis=1)
-    return np.maximum(np.maximum.accumulate(turned), 1.0), np.maximum(np.maximum.accumulate(pitch), 1.0)
 
 
 def largest(values: Array) -> Array:

@@ -41,9 +41,9 @@ class QuantityMetric:
     with_reference: bool = True  # the size is that of the difference from the reference's array, up to the horizon
     # from the scene to what the number is divided by before it is judged; None for 1
     relative_to: Callable[[Scene], float] | None = None
-    # from (scene, reference, number of samples up to the horizon) to a scale; the number is then the error of each
-    # sample divided by it and by the error growth up to there, which is not the method's fault
-    per_growth_of: Callable[[Scene, Samples, int], float] | None = None
+    # the size is that of the difference from what the closed form has at the run's own state: judged at every sample
+    at_own_state: bool = False
+    scale_of: Callable[[Scene, Samples], float] | None = None  # of a run, what the number is divided by; None for 1
     # name of the check in reference/accuracy.toml, whose bound then counts; "" where the bound is given here
     check: str = ""
     bound: float | None = None  # largest value that passes where no check has one; None where the number is not judged
@@ -157,26 +157,27 @@ def longest_arm(scene: Scene) -> float:
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 
 
-def _largest_root_force(_scene: Scene, run: Samples, until: int) -> float:
-    """N, over the blades and the first samples; 1 where there is none."""
+def _largest_root_force(_scene: Scene, run: Samples) -> float:
+    """N, over the blades and the samples; 1 where there is none."""
     forces = run.get("blade_root_force")
-    return 1.0 if forces is None else float(np.linalg.norm(forces[:until], axis=-1).max(initial=0.0)) or 1.0
+    return 1.0 if forces is None else float(np.linalg.norm(forces, axis=-1).max(initial=0.0)) or 1.0
 
 
-def _largest_root_force_at_arm(scene: Scene, run: Samples, until: int) -> float:
+def _largest_root_force_at_arm(scene: Scene, run: Samples) -> float:
     """N m, that force at the longest arm: a scale for moments, which may all be next to nothing."""
-    return _largest_root_force(scene, run, until) * longest_arm(scene)
+    return _largest_root_force(scene, run) * longest_arm(scene)
 
 
 def _load(name: str, dimensions: tuple[str, ...], long_name: str, title: str, look_at: str) -> Quantity:
     is_force = name.endswith("force")
     rule = QuantityMetric(
         f"{name}_error",
-        per_growth_of=_largest_root_force if is_force else _largest_root_force_at_arm,
+        at_own_state=True,
+        scale_of=_largest_root_force if is_force else _largest_root_force_at_arm,
         check="loads",
         channel=name.replace("_", " "),
-        unit="of the largest, per growth",
-        fault=f"{name.replace('_', ' ')} off by {{value}} of the largest load per unit of error growth",
+        unit="of the largest",
+        fault=f"{name.replace('_', ' ')} off by {{value}} of the largest load from what its own motion gives",
         look_at=look_at,
     )
     plot = Plot(title, "force (N)" if is_force else "moment (N m)")

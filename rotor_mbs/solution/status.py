@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
-# Those that a run's state can have ("unchecked": complete, with nothing to judge it by), a point of which no run was
-# made, and a run whose process died. Codes are places in this list: new ones go to its end.
+# Those that a run's state can have ("unchecked": complete, with nothing to judge it by; "completed": the printed
+# equations at their end, of which nothing is claimed), a point of which no run was made, and a run whose process died.
+# Codes are places in this list: new ones go to its end.
 STATUSES = (
     "ok", "inaccurate", "diverged", "singular", "solver_failed", "timed_out", "left_out", "worker_died", "unchecked",
+    "completed",
 )  # fmt: skip
 # Those of runs that reached the end.
-COMPLETE = ("ok", "inaccurate", "unchecked")
+COMPLETE = ("ok", "inaccurate", "unchecked", "completed")
+
+# Those that nobody has to look at: "ok" may be acted on, and of a "completed" run no more is asked.
+GOOD = ("ok", "completed")
 
 
 def code_of(status: str) -> int:

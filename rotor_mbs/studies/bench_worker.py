@@ -14,12 +14,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Solver
 from rotor_mbs.methods.catalogue import REFERENCE, find_method
 from rotor_mbs.runs.results import TableFile
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
@@ -31,7 +31,7 @@ _MOST_INTERVALS = 100
 # An error as large as the motion itself: such a run is a failure, not a point on the curve.
 USELESS_RAD = 1.0
 USELESS_DRIFT = 0.1  # of the energy scale, where there is no reference
-ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max")
+ERRORS = ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "defect_max", "defect_median")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.data_verdict import DEFAULT_TOLERANCE, LEVELS, ChannelErrors, DataVerdict, as_dictionary
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.foreign.channels import ForeignData, channels
 from rotor_mbs.models.lagrange import samples
@@ -21,7 +22,6 @@ from rotor_mbs.runs.records import Record
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
@@ -184,7 +184,7 @@ def _as_run(scene: Scene, data: ForeignData, reference: Trajectory, tolerance: f
         scene = with_energy
         trajectory.quantities |= samples.trajectory(scene, data.time, states[:, columns]).quantities
     bounds = (
-        Bound("agreement", METHOD, tolerance, "as asked for"),
+        Bound("defect", METHOD, tolerance, "as asked for"),
         Bound("energy", METHOD, _ENERGY_PER_ANGLE * tolerance, "what an error of the tolerance does to the energy"),
     )
     return Solution(scene, METHOD, trajectory, Integration(True), bounds=bounds)

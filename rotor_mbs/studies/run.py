@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorError, one_line
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
@@ -31,9 +32,8 @@ from rotor_mbs.runs.table import Rows, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.toml_file import of_file
-from rotor_mbs.solution.judgement import judge
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import GOOD, STATUSES
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies.stored_references import digest, frozen_solution, read_reference, shipped_reference
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from rotor_mbs.analysis import exact as theory
+from rotor_mbs.analysis.judgement import Judgement, judge
 from rotor_mbs.analysis.stability import TARGET, SuiteRun, suite_runs
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names, settings_for
 from rotor_mbs.methods.solve import solve
@@ -30,7 +31,6 @@ from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.impulse import angular_momentum
-from rotor_mbs.solution.judgement import Judgement, judge
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Trajectory
 from rotor_mbs.studies.run import (
@@ -281,7 +281,7 @@ def _judged(
         with time_limit(2.0 * _LONGEST_RUN_S):
             run = solve(method, scene, settings)
     except OutOfTimeError as exc:
-        return Judgement("timed_out", str(exc), False, {}), 2.0 * _LONGEST_RUN_S
+        return Judgement("timed_out", str(exc), False, {}, None), 2.0 * _LONGEST_RUN_S
     return judge(scene, run, reference), run.run_times_s[0]
 
 

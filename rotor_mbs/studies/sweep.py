@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
@@ -29,14 +30,14 @@ from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants
 from rotor_mbs.scenario.toml_file import TableError, of_file, shown_path
-from rotor_mbs.solution.judgement import clearly_ok, judge
-from rotor_mbs.solution.metrics import energy_drifts, horizon, largest, running_growth
+from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock, Trajectory
 
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")  # outputs that every `Method.solve_many` computes
+_OF_DEFECTS = ("defect_max", "defect_median", "defect_time", "angle_error_predicted")
 _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
 
 
@@ -155,7 +156,8 @@ def _put_run(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
 def _put_verdict(rows: Rows, i: int, scene: Scene, run: Solution) -> None:
     verdict = judge(scene, run, None)
     put_end(rows, i, verdict.status, verdict.message)
-    rows["energy_drift_max"][i] = verdict.metrics.get("energy_drift_max", np.nan)
+    for name in ("energy_drift_max", *_OF_DEFECTS):
+        rows[name][i] = verdict.metrics.get(name, np.nan)
 
 
 def _put_effort(rows: Rows, i: int, integration: Integration, time_reached: float) -> None:
@@ -180,7 +182,8 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     errors = energy_balance(kinetic, found["potential_energy"], work)
     drifts = energy_drifts(scenes, kinetic, work, errors)
     angles = largest(found["angles"].reshape(len(scenes), -1))
-    ok = clearly_ok(scenes, method.name, block.integrations, block.samples, drifts, angles, method.bounds)
+    of_runs = [_metrics(scene, block.trajectory(i), drifts[i]) for i, scene in enumerate(scenes)]
+    ok = clearly_ok(scenes, method.name, block.integrations, block.samples, of_runs, angles, method.bounds)
     row = chunk.place.row
     metrics = np.dtype([(name, row[name]) for name in row.names or () if name in METRICS | AMPLIFICATION])
     rows = blank_rows(len(scenes), metrics)
@@ -189,7 +192,8 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
             values = errors if name == "energy_error" else _quantity(block, scenes, method, name)
             rows[name] = np.ascontiguousarray(values, row[name].base)
     rows["status"][ok] = code_of("ok")
-    rows["energy_drift_max"] = drifts
+    for name in ("energy_drift_max", *_OF_DEFECTS):
+        rows[name] = np.array([run.get(name, np.nan) for run in of_runs])
     _put_extremes(rows, slice(None), found["angles"], found["rates"])
     for i, integration in enumerate(block.integrations):
         _put_effort(rows, i, integration, integration.time_reached)
@@ -198,6 +202,12 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
         run.is_corrected, run.bounds = method.is_corrected, method.bounds
         _put_verdict(rows, i, scenes[i], run)
     return rows
+
+
+def _metrics(scene: Scene, run: Trajectory, drift: float) -> Metrics:
+    """What decides whether a run is clearly ok."""
+    defects = defects_of(scene, run)
+    return {"energy_drift_max": float(drift)} | ({} if defects is None else defect_metrics(defects, None))
 
 
 def _quantity(block: RunBlock, scenes: Sequence[Scene], method: Method, name: str) -> Array:

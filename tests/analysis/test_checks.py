@@ -21,7 +21,7 @@ from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import energy_slack, start_slack
+from rotor_mbs.analysis.judgement import energy_slack, start_slack
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
 from rotor_mbs.solution.quantities import Quantity, QuantityMetric
 from rotor_mbs.solution.solution import Solution

@@ -16,7 +16,7 @@ from rotor_mbs.methods.selection import choose, singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import judge
+from rotor_mbs.analysis.judgement import judge
 
 DEFAULT_METHODS = tuple(method.name for method in methods() if method.is_default)
 

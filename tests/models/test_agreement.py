@@ -14,7 +14,7 @@ from rotor_mbs.analysis.exact import exact_rotor_angle
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import judge
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of, running_growth
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Trajectory

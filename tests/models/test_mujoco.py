@@ -28,7 +28,7 @@ from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import judge
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Trajectory
 

@@ -15,7 +15,7 @@ from rotor_mbs.runs.sweeps import sweep_table
 from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import Variants, sweep_of
-from rotor_mbs.solution.judgement import clearly_ok, judge
+from rotor_mbs.analysis.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts
 from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.solution import Solution

@@ -16,7 +16,7 @@ from support.scenes import paper
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import Judgement, judge
+from rotor_mbs.analysis.judgement import Judgement, judge
 
 FAULTS = {
     "Coriolis term dropped": ("2.0 * (spin * rate) + ", ""),

@@ -22,7 +22,7 @@ from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.solvers import MultibodySolver
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.solution.judgement import Judgement, energy_conditioning, judge
+from rotor_mbs.analysis.judgement import Judgement, energy_conditioning, judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 

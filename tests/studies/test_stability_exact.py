@@ -15,7 +15,7 @@ from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.records import points_table
 from rotor_mbs.runs.results import Asked, extend_file, results_tables
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.solution.judgement import judge
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.metrics import horizon_samples, metrics_of
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.stability import (

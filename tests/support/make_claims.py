@@ -31,7 +31,7 @@ from rotor_mbs.models.printed import literal
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.judgement import judge
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.status import COMPLETE
 from support.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 

@@ -108,7 +108,7 @@ _TARGETS = (
     # A thousandth: of fourth order, this model is bound to 1e-8.
     Target("mujoco", f"{_J}.mjcf", "loads_of model _blade _joint _inertial _possible", 0.001),
     Target("mujoco", f"{_J}.solver", "_advance observe _work _springs", 0.001),
-    Target("rules", "rotor_mbs.solution.judgement",
+    Target("rules", "rotor_mbs.analysis.judgement",
            "allowed_of judge _is_close _broken_off _through_singularity _inaccurate _unchecked start_slack "
            "energy_slack energy_conditioning _shares_at_quarter_turns smallest_rotor_inertia_share "
            "rotor_inertia_shares _shaft_inertia_forms _SINGULAR_SHARE _ROUND_OFF _RESEMBLES _NO_INERTIA", 0.5),
@@ -176,7 +176,7 @@ _TESTS = {
         f"{_MUJOCO}torque_ramp_on_a_balanced_rotor",
         f"{_MUJOCO}full_inertia_springs_dampers_and_torque_follow_the_closed_form",
     ),
-    "rotor_mbs.solution.judgement": ("solution/test_judgement_messages.py", *_RULES),
+    "rotor_mbs.analysis.judgement": ("solution/test_judgement_messages.py", *_RULES),
     "rotor_mbs.solution.metrics": _RULES,
     "rotor_mbs.models.ode45": (_DEFAULTS, "models/test_ode45.py"),
     f"{_M}.schemes": (

@@ -48,10 +48,10 @@ class OdeSolver:
         self.states: Array = self._initial[None, :]
 
     def integrate(self) -> Integration:
-        self.states, integration = over_segments(self._times, self._segments, self._initial, self._advance)
+        self.states, integration = over_segments(self._times, self._segments, self._initial, self.advance)
         return integration
 
-    def _advance(self, segment: Segment, state: Array, times: Array) -> Advance:
+    def advance(self, segment: Segment, state: Array, times: Array) -> Advance:
         return self._integrator(self._right_hand_side(segment), segment.start, segment.end, state, times)
 
     def _right_hand_side(self, segment: Segment) -> RightHandSide:

@@ -162,6 +162,20 @@ def work_is_integrated(scene: Scene) -> bool:
     return scene.wants("energy") and scene.work_needs_path
 
 
+def resting_pitches(scene: Scene) -> tuple[int, ...]:
+    """Coordinates of the pitches that the equations leave at zero for ever: started there at rest, without a load, of a
+    blade whose mass and inertia are symmetric about its x-z plane."""
+    form, tables = rotor_form(scene, Fraction), load_tables(scene)
+    resting = []
+    for i, (column, blade) in enumerate(zip(scene.moving_coordinates[1:], form.blades, strict=True)):
+        torque, rest = tables[1 + i], tables[1 + len(form.blades) + i]
+        loads = [value for _, value in torque] + [value for _, value in rest if blade.stiffness]
+        asymmetry = blade.weight_y, blade.half_slope_cs, blade.coupling_c
+        if not any([scene.initial_angles[column], scene.initial_rates[column], *loads, *asymmetry]):
+            resting.append(column)
+    return tuple(resting)
+
+
 # Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's blades: 10.7).
 _UNIT_FREQUENCY = 100.0
 

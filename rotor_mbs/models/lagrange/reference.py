@@ -11,11 +11,12 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
-from rotor_mbs.models.lagrange.parameters import Number, rate_units, rotor_form
+from rotor_mbs.models.lagrange.parameters import Number, rate_units, resting_pitches, rotor_form
 from rotor_mbs.models.lagrange.samples import quad_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene
@@ -98,7 +99,8 @@ def _in_doubles(scene: Scene, tolerances: tuple[float, float], times: Array | No
 
 def error_growth(scene: Scene) -> Array:
     """(samples,) How many times a small error of the initial state may have grown, at most: the largest singular value
-    of the state transition matrix (rad, `rate_units`); infinite once past what double precision can hold."""
+    of the state transition matrix (rad, `rate_units`) in the coordinates that the motion can have, which pitches at
+    rest by symmetry are not; infinite once past what double precision can hold."""
     return _largest_growth(scene, _variational_matrices(scene))
 
 
@@ -138,8 +140,17 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
     """(samples,) from the state transition matrices of the first samples, as far as they are finite."""
     growth = np.full(max(scene.samples, len(matrices)), np.inf)
     finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
-    growth[finite] = np.linalg.norm(_in_units(scene, matrices[finite]), ord=2, axis=(1, 2))
+    free = free_variables(scene)
+    scaled = _in_units(scene, matrices[finite])[:, free[:, None], free]
+    growth[finite] = np.linalg.norm(scaled, ord=2, axis=(1, 2))
     return growth
+
+
+def free_variables(scene: Scene) -> NDArray[np.int64]:
+    """Places, among angles and then rates of the coordinates that move, of those that are not at rest by symmetry."""
+    moving, resting = scene.moving_coordinates, resting_pitches(scene)
+    free = np.array([i for i, coordinate in enumerate(moving) if coordinate not in resting])
+    return np.concatenate([free, len(moving) + free])
 
 
 def _in_units(scene: Scene, matrices: Array) -> Array:
@@ -156,7 +167,7 @@ class TimedReference:
 
     trajectory: Trajectory  # as far as it got: time, angles, rates, error_growth
     # (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs may
-    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed
+    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed or at rest by symmetry
     growth: Array
     units: Array  # (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
 
@@ -169,14 +180,15 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     trajectory, matrices = run.observe(), _transition_matrices(scene, times)
     trajectory.error_growth = _largest_growth(scene, matrices)[: len(trajectory.time)]
     rows, moving, count = len(trajectory.time), scene.moving_coordinates, len(scene.initial_angles)
-    columns = [*moving, *(count + i for i in moving)]
+    columns = np.array([*moving, *(count + i for i in moving)])
+    free = free_variables(scene)
     units, growth = np.ones(2 * count), np.ones((rows, 2 * count))
     units[[count + i for i in moving]] = rate_units(scene)
-    growth[:, columns] = np.inf
+    growth[:, columns[free]] = np.inf
     known = min(rows, len(matrices))
     with np.errstate(all="ignore"):
-        norms = np.linalg.norm(_in_units(scene, matrices[:known]), axis=2)
-    growth[np.ix_(range(known), columns)] = np.where(np.isfinite(norms), norms, np.inf)
+        norms = np.linalg.norm(_in_units(scene, matrices[:known])[:, free[:, None], free], axis=2)
+    growth[np.ix_(range(known), columns[free])] = np.where(np.isfinite(norms), norms, np.inf)
     return TimedReference(trajectory, growth, units)
 
 

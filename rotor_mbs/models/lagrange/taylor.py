@@ -119,25 +119,29 @@ class Propagation:
         if variational:
             equations, start = equations[:count], start[:count]
             equations = engine.var_ode_sys(equations, args=engine.var_args.vars, order=1)
-        self._integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options))
-        set_parameters(self._integrator, array_of(parameters.values, quad=quad))
+        self.integrator = compiled(key, lambda: engine.taylor_adaptive(equations, state=start, **options))
+        set_parameters(self.integrator, array_of(parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
         self._segments = load_segments(scene)
         self.times = sample_times(scene) if times is None else times
         self.states = self._initial[None, :]
 
     def integrate(self) -> Integration:
-        self._integrator.time = self._initial.dtype.type(0)
-        self._integrator.state[:] = self._initial
+        self.integrator.time = self._initial.dtype.type(0)
+        self.integrator.state[:] = self._initial
         self.states, integration = over_segments(self.times, self._segments, self._initial, self._advance)
         return integration
 
-    def _advance(self, segment: Segment, _state: Array, times: Array) -> Advance:
-        """From where the integrator is, the end of the segment before."""
-        integrator, kind = self._integrator, self._initial.dtype
+    def enter(self, segment: Segment) -> None:
+        """The loads from now on are those of the segment."""
         if self._changing:
             numbers = [number for i in self._changing for number in segment.lines[i]]
-            integrator.pars[-len(numbers) :] = array_of(numbers, quad=kind != np.float64)
+            self.integrator.pars[-len(numbers) :] = array_of(numbers, quad=self._initial.dtype != np.float64)
+
+    def _advance(self, segment: Segment, _state: Array, times: Array) -> Advance:
+        """From where the integrator is, the end of the segment before."""
+        integrator, kind = self.integrator, self._initial.dtype
+        self.enter(segment)
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with deadline.polled():

@@ -14,6 +14,7 @@ from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.scene_tables import metric, status_text
 from rotor_mbs.runs.read import OpenResults
+from rotor_mbs.solution.status import GOOD
 
 _TOKEN = re.compile(
     r"(?:(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)|q̇(?P<rate_index>\d)|(?P<name>[A-Za-zα-ω]))(?P<square>[²³]?)"
@@ -51,7 +52,7 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
             if run is None:
                 row += ["", "", ""]
                 continue
-            status = "" if run.status == "ok" else status_text(run.status)
+            status = "" if run.status in GOOD else status_text(run.status)
             row.append(TableCell(number(metric(run, "angle_error_max")), note=status))
             row += [number(metric(run, "angle_error_whole")), prefixed(metric(run, "energy_gain_J"), "J")]
         if any(run is not None for run in runs):

@@ -26,7 +26,15 @@ from rotor_mbs.runs.read import OpenResults, StoredScene
 Scenes = Mapping[str, StoredScene]
 # Errors of the heat map: a shade for each of these powers of ten and below, the last for all that is larger.
 _SHADES = (-12, -10, -8, -6, -4, -2, 0)
-_MARKS = {"ok": "", "inaccurate": "≠", "timed_out": "T", "diverged": "↯", "singular": "S", "unchecked": "?"}
+_MARKS = {
+    "ok": "",
+    "inaccurate": "≠",
+    "timed_out": "T",
+    "diverged": "↯",
+    "singular": "S",
+    "unchecked": "?",
+    "completed": "",
+}
 _FAILED = "✗"
 _LOWEST_ENERGY = 1e-16  # relative: smaller errors are drawn there
 

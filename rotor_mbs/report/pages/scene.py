@@ -78,7 +78,7 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
         "quantities": quantities.quantity_sections(scene, drawn, horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)]),
         "has_horizon": horizon is not None,
-        "has_printed": any(run.status == "ok" and not is_corrected(run.method) for run in scene.runs.values()),
+        "has_printed": any(run.status == "completed" and not is_corrected(run.method) for run in scene.runs.values()),
         "has_zero_pitch": has_zero_pitch,
         "escape_rate": escape_rate(parsed) if has_zero_pitch and parsed is not None else None,
         "previous": pages[place - 1],

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up
+from rotor_mbs.methods.catalogue import REFERENCE, look_up
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
 from rotor_mbs.report.core.numbers import number, prefixed, with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.solution.status import GOOD
 
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_whole", "tip_error_max")  # against the reference
 # Attributes of a results file that say what made it.
@@ -22,9 +23,9 @@ def status_text(status: str) -> str:
 
 
 def status_cell(run: StoredRun) -> TableCell | str:
-    """The status; "runs to the end" of an "ok" run of equations that are not claimed to be correct."""
-    if run.status == "ok":
-        return TableCell("ok", tone="good") if is_corrected(run.method) else "runs to the end"
+    """The status; nothing good or bad is said of a completed run, of which nothing is claimed."""
+    if run.status in GOOD:
+        return TableCell("ok", tone="good") if run.status == "ok" else run.status
     return TableCell(status_text(run.status), tone="bad")
 
 

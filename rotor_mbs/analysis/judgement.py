@@ -1,6 +1,9 @@
-"""The one judgement of a run, from its samples, by the bounds that `check` reads, too. An engine's report can only
-lower a status. The printed equations are not judged against the reference or by their energy: that they depart from
-them is the finding."""
+"""The one judgement of a run, from its samples, by the bounds that `check` reads, too.
+
+ok: every interval's defect within the method's bound, the energy balance kept, and the error of the angles up to the
+horizon at most 0.01 rad (from the reference, or predicted from the defects). An engine's report can only lower a
+status. The printed equations are "completed" where they reach the end: nothing is claimed of them.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,20 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
 from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, Metrics, metrics_of
 from rotor_mbs.solution.quantities import Array, Quantity, QuantityMetric, known_quantities
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
+
+# rad: the largest error of an angle, up to the horizon, of a run that is called ok.
+OK_ERROR = 0.01
+
+# What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many times larger.
+FLOOR_SAFETY = 3.0
 
 # Share of the rotor's inertia that is left once every pitch is free: below this a run that broke off broke off there.
 _SINGULAR_SHARE = 1e-3
@@ -29,11 +40,12 @@ _ROUND_OFF = 1e-14
 _START_ROUND_OFF = 10.0 * float(np.finfo(float).eps)
 
 # A run is checked where one of these could be found.
-_CHECKS = ("energy_drift_max", "angle_error_per_growth")
+_CHECKS = ("energy_drift_max", "defect_max")
 
-# A hundredth: of the energy scale, of what a quantity is relative to, or of the largest angle beyond what the scene
-# itself makes of an error at the start.
+# A claim of success is not false while a run resembles the motion: a hundredth, of the energy scale, of a radian for
+# an interval's defect, of what a quantity is relative to; and a radian for the angles up to the horizon.
 _RESEMBLES = 1e-2
+_RESEMBLING_ANGLE = 1.0
 
 # Below this share the last bit of a pitch decides the rotor's inertia: (π/2 known to 1e-16)², a hundredfold. What comes
 # after such a sample follows from round-off alone, whatever an engine reports.
@@ -49,18 +61,14 @@ class Judgement:
     message: str  # one line; "" for ok
     false_success: bool  # the engine reported success of a run that is wrong
     metrics: Metrics  # see `metrics.metrics_of`
+    defects: Defects | None  # see `defects_of`
 
 
-@functools.cache
-def allowed_of(method: str, own: tuple[Bound, ...] = ()) -> tuple[float, float] | None:
-    """(angle, energy) bounds on "model/integrator", `own` first; None for methods that have none (the printed
-    equations). Angle: relative error (of the rotor's way, of the largest pitch, each at least 1 rad) per unit of error
-    growth, up to the horizon; energy: of the scene's energy scale, over the whole run, see `energy_conditioning`."""
-    bounds = shipped_bounds().with_entries(own)
-    angle, energy = (bounds.find(check, method) for check in ("agreement", "energy"))
-    if angle is None or energy is None:
+def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
+    """The defects of a run's intervals; None where angles or rates are not asked for, or there is one sample."""
+    if len(run.time) < 2 or not (scene.wants("angles") and scene.wants("rates")):
         return None
-    return angle.value, energy.value
+    return interval_defects(scene, run.time, run.angles, run.rates)
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
@@ -70,17 +78,20 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a runaway: what is not finite is judged
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
-    """Finite? End reached? Through a singularity? Energy, quantities, reference? The first no names the status."""
-    metrics = metrics_of(scene, run.trajectory, reference)
+    """Finite? End reached? Through a singularity? Energy, quantities, defects, error? The first no names the status."""
+    defects = defects_of(scene, run.trajectory)
+    metrics = metrics_of(scene, run.trajectory, reference, defects)
     status, message = _broken_off(scene, run)
-    if not status and run.is_corrected:
+    if not status and not run.is_corrected:
+        status = "completed"
+    if not status:
         status, message = _through_singularity(scene, run, reference)
     if not status:
         status, message = _inaccurate(scene, run, metrics)
     if status == "ok":
         status, message = _unchecked(run, metrics)
     false_success = run.integration.success and not _is_close(scene, status, metrics)
-    return Judgement(status, message, false_success, metrics)
+    return Judgement(status, message, false_success, metrics, defects)
 
 
 def clearly_ok(
@@ -88,29 +99,44 @@ def clearly_ok(
     method: str,
     integrations: Sequence[Integration],
     samples: Sequence[int],
-    drifts: Array,
+    metrics: Sequence[Metrics],
     angles: Array,
     own: tuple[Bound, ...] = (),
 ) -> NDArray[np.bool_]:
-    """(k,) whether `judge`, without a reference, is certain to call each of k runs of a method ok; of a method without
-    bounds it is not. From energy errors `drifts` (of their scale) and the largest `angles` (rad) of each."""
-    allowed = allowed_of(method, own)
+    """(k,) whether `judge`, without a reference, is certain to call each of k runs of a method ok.
+
+    Parameters
+    ----------
+    metrics : of each run its energy_drift_max, and those of its defects.
+    angles : (k,) rad, the largest of each run.
+    """
+    bounds = shipped_bounds().with_entries(own)
+    energy, defect = (bounds.of(check, method).value for check in ("energy", "defect"))
     complete = np.array([run.success and n == scenes[0].samples for run, n in zip(integrations, samples, strict=True)])
     complete &= angles <= ANGLE_LIMIT
-    if allowed is None:
-        return np.zeros_like(complete)
     shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
-    return complete & (drifts <= allowed[1]) & (np.array(shares) > _CLEAR_SHARE)
+    within = [
+        run["energy_drift_max"] <= energy
+        and run.get("defect_max", np.inf) <= defect
+        and run.get("angle_error_predicted", np.inf) <= OK_ERROR
+        for run in metrics
+    ]
+    return complete & np.array(within) & (np.array(shares) > _CLEAR_SHARE)
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
     """Whether a claim of success may stand: an inaccurate run that resembles the motion is no false success; against an
     unchecked run's claim nothing is known."""
     if status != "inaccurate":
-        return status in ("ok", "unchecked")
+        return status in ("ok", "unchecked", "completed")
     errors = [metrics[name] for name in _CHECKS if name in metrics]
-    errors += [error for _, rule, error in quantity_errors(scene, metrics) if rule.relative_to or rule.per_growth_of]
-    return all(error <= _RESEMBLES for error in errors)
+    errors += [error for _, rule, error in quantity_errors(scene, metrics) if rule.relative_to or rule.check == "loads"]
+    return all(error <= _RESEMBLES for error in errors) and largest_angle_error(metrics) <= _RESEMBLING_ANGLE
+
+
+def largest_angle_error(metrics: Metrics) -> float:
+    """rad: up to the horizon, from the reference, or predicted from the defects; 0 where neither is known."""
+    return metrics.get("angle_error_max", metrics.get("angle_error_predicted", 0.0))
 
 
 def quantity_errors(scene: Scene, metrics: Metrics) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
@@ -151,36 +177,48 @@ def _through_singularity(scene: Scene, run: Solution, reference: Trajectory | No
 
 
 def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str]:
-    allowed = allowed_of(run.method, run.bounds)
-    if allowed is None:
-        return "ok", ""
-    energy = allowed[1] + energy_slack(scene, run.trajectory)
+    bounds = shipped_bounds().with_entries(run.bounds)
+    energy = bounds.of("energy", run.method).value + energy_slack(scene, run.trajectory)
     if "energy_drift_max" in metrics and not metrics["energy_drift_max"] <= energy:
         return "inaccurate", f"energy drift {metrics['energy_drift_max']:.1e} of its scale, allowed {energy:.0e}"
-    bounds = shipped_bounds().with_entries(run.bounds)
     for _, rule, error in quantity_errors(scene, metrics):
         bound = quantity_bound(rule, bounds, run.method)
         if bound is not None and not error <= bound:
             fault = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()
             return "inaccurate", f"{fault.format(value=f'{error:.1e}')}, allowed {bound:.0e}"
-    angle = allowed[0] + start_slack(scene)
-    if "angle_error_per_growth" in metrics and not metrics["angle_error_per_growth"] <= angle:
+    defect = bounds.of("defect", run.method).value
+    if "defect_max" in metrics and not judged_defect(metrics) <= defect:
         return "inaccurate", (
-            f"angle error {metrics['angle_error_max']:.1e} rad before the horizon, "
-            f"{metrics['angle_error_per_growth']:.1e} per unit of error growth, allowed {angle:.0e}"
+            f"defect {metrics['defect_max']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s, "
+            f"allowed {defect:.0e}"
         )
+    error = largest_angle_error(metrics)
+    if not error <= OK_ERROR + start_slack(scene):
+        how = "angle error" if "angle_error_max" in metrics else "predicted angle error"
+        growth = (
+            ", as the motion makes much of small errors" if error > _GROWN * metrics.get("defect_max", error) else ""
+        )
+        return "inaccurate", f"{how} {error:.1e} rad up to the horizon{growth}; ok is up to {OK_ERROR:g} rad"
     return "ok", ""
 
 
+# Steps of a run: an error that is this many times the largest defect has not only been added up, but has grown.
+_GROWN = 1e4
+
+
+def judged_defect(metrics: Metrics) -> float:
+    """rad: the largest defect less what the rounding of the run's own numbers explains."""
+    return max(metrics["defect_max"] - FLOOR_SAFETY * metrics["defect_floor"], 0.0)
+
+
 def _unchecked(run: Solution, metrics: Metrics) -> tuple[str, str]:
-    """Complete runs with nothing to judge them by; the printed equations are asked for no more than their end."""
+    """Complete runs with nothing to judge them by."""
     largest = float(np.abs(run.trajectory.angles).max())
     if largest > ANGLE_LIMIT:
         return "unchecked", f"angles of {largest:.1e} rad; up to {ANGLE_LIMIT:.0e} rad a double has the digits to judge"
-    if allowed_of(run.method, run.bounds) is None or any(name in metrics for name in _CHECKS):
+    if any(name in metrics for name in _CHECKS):
         return "ok", ""
-    compared = "the horizon is before the second sample" if "horizon_s" in metrics else "no reference for its angles"
-    return "unchecked", f"nothing to judge it by: its outputs have no energy, and {compared}"
+    return "unchecked", "nothing to judge it by: its outputs have no energy, and not angles and rates"
 
 
 def start_slack(scene: Scene) -> float:

@@ -1,0 +1,165 @@
+"""Interval defects by the closed form: from each sample of a run to the next one, exact at jumps of the loads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.heyoka_adapter import failure, is_available
+from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
+from rotor_mbs.models.lagrange.parameters import load_segments, rate_units, resting_pitches, rotor_form
+from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
+from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.time_table import Segment
+from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.trajectory import Array, Trajectory
+
+# Of one interval: a stiff bearing of 1e12 N m/rad takes some 600; a run far from any motion would take for ever.
+_MAX_STEPS = 5_000
+# The transition matrices are wanted to a share of about 1e-5: Runge-Kutta steps of order 4 over a quarter of a radian.
+_RADIANS_PER_STEP = 0.25
+_MAX_RUNGE_KUTTA_STEPS = 32
+_DIFFERENCE = 1e-6  # rad and rate units: cube root of the rounding, for central differences
+
+
+def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array) -> Defects:
+    """The defects of a run's samples, or of anybody's.
+
+    Parameters
+    ----------
+    time : (n,) s, increasing, within the scene's duration.
+    angles, rates : (n, 1 + blades) rad and rad/s.
+
+    Returns
+    -------
+    Defects
+        Of n - 1 intervals. By heyoka at its tightest, or by SciPy's DOP853 where that is not installed.
+    """
+    moving = scene.moving_coordinates
+    states = np.hstack([angles[:, moving], rates[:, moving]])
+    half = len(moving)
+    ends = _ends(scene, time, states)
+    angle_defects, rate_defects = angles[:-1] - angles[1:], rates[:-1] - rates[1:]  # of pitches that are fixed
+    angle_defects[:, moving] = ends[:, :half] - states[1:, :half]
+    rate_defects[:, moving] = ends[:, half:] - states[1:, half:]
+    units = np.full(angles.shape[1], 1.0)
+    units[moving] = rate_units(scene)
+    if len(time) > 1:
+        units = np.maximum(units, 1.0 / float(np.median(np.diff(time))))
+    loads = sampled_loads(scene, time, angles, rates) if scene.wants("loads") else {}
+    start = np.concatenate([np.array(scene.initial_angles)[moving], np.array(scene.initial_rates)[moving]])
+    return Defects(
+        time=time,
+        angles=angle_defects,
+        rates=rate_defects,
+        rate_units=units,
+        transitions=_transitions(scene, time, states),
+        moving=tuple(moving),
+        resting=resting_pitches(scene),
+        states=states,
+        start=start,
+        growth_units=np.concatenate([np.ones(half), rate_units(scene)]),
+        own_loads=Trajectory(time, angles, rates, **loads),
+    )
+
+
+def _ends(scene: Scene, time: Array, states: Array) -> Array:
+    """(n - 1, m) where the closed form gets from each state by the time of the next one; NaN where it does not."""
+    segments = load_segments(scene)
+    advance = _advance_by_taylor(scene, states.shape[1]) if is_available() else _advance_by_dop853(scene)
+    ends = np.full((len(states) - 1, states.shape[1]), np.nan)
+    place = 0
+    for k in range(len(ends)):
+        state, reached = states[k], float(time[k])
+        while place + 1 < len(segments) and segments[place].end <= reached:
+            place += 1
+        part = place
+        while True:
+            segment = segments[part]
+            # Data may go on after the scene's end, with the last loads.
+            end = float(time[k + 1]) if part + 1 == len(segments) else min(float(time[k + 1]), segment.end)
+            state = advance(segment, reached, end, state)
+            reached, part = end, part + 1
+            if reached >= time[k + 1] or not np.isfinite(state).all():
+                break
+        ends[k] = state
+    return ends
+
+
+_Advance = Callable[[Segment, float, float, Array], Array]
+
+
+def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
+    """By the code that is compiled for lagrange/taylor."""
+    propagation = Propagation(scene, tol=2.0**-52, compact_mode=is_compact(scene), high_accuracy=True)
+    integrator = propagation.integrator
+    state = integrator.state
+    entered: list[Segment] = []
+
+    def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
+        if not entered or entered[-1] is not segment:
+            entered[:] = [segment]
+            propagation.enter(segment)
+        integrator.time = start
+        state[:] = 0.0  # the work, too, where it is a variable
+        state[:count] = values
+        outcome = integrator.propagate_until(end, max_steps=_MAX_STEPS)[0]
+        return np.full(count, np.nan) if failure(outcome) else state[:count].copy()
+
+    return advance
+
+
+def _advance_by_dop853(scene: Scene) -> _Advance:
+    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), scipy_integrator("DOP853", 2.3e-14, 1e-16))
+
+    def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
+        part = solver.advance(Segment(start, end, segment.lines), values, np.empty(0))
+        return np.full(len(values), np.nan) if part.message else part.end
+
+    return advance
+
+
+def _transitions(scene: Scene, time: Array, states: Array) -> Array | None:
+    """(n - 1, m, m) state transition matrices of the intervals, all at once; None where the motion is too stiff for
+    explicit steps."""
+    if len(time) < 2:
+        return np.empty((0, states.shape[1], states.shape[1]))
+    interval = np.diff(time)
+    form, half = rotor_form(scene), states.shape[1] // 2
+    fastest = float(np.nanmax(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
+    for blade in form.blades:
+        moment = blade.stiffness + math.hypot(blade.weight_x, blade.weight_y)
+        fastest = max(fastest, math.sqrt(moment / blade.pitch_inertia), blade.damping / blade.pitch_inertia)
+    steps = math.ceil(fastest * float(interval.max()) / _RADIANS_PER_STEP) if math.isfinite(fastest) else math.inf
+    if steps > _MAX_RUNGE_KUTTA_STEPS:
+        return None
+    steps = max(int(steps), 1)
+    units = np.concatenate([np.ones(half), rate_units(scene)])
+    count = 2 * half
+    # (m, directions, n - 1): the state of every interval, moved by a difference either way in every direction.
+    moved = np.repeat(states[:-1].T[:, None, :], 2 * count, axis=1)
+    for i in range(count):
+        moved[i, i] += _DIFFERENCE * units[i]
+        moved[i, count + i] -= _DIFFERENCE * units[i]
+
+    def derivative(at: Array, state: Array) -> Array:
+        angles, rates = list(state[:half]), list(state[half:])
+        accelerations = closed_form.accelerations(angles, rates, form, loads_at(scene, at), np.sin, np.cos)
+        return np.concatenate([state[half:], np.stack([np.broadcast_to(row, rates[0].shape) for row in accelerations])])
+
+    h = interval / steps
+    with np.errstate(all="ignore"):
+        for step in range(steps):
+            at = time[:-1] + step * h
+            k1 = derivative(at, moved)
+            k2 = derivative(at + 0.5 * h, moved + 0.5 * h * k1)
+            k3 = derivative(at + 0.5 * h, moved + 0.5 * h * k2)
+            k4 = derivative(at + h, moved + h * k3)
+            moved = moved + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        columns = (moved[:, :count] - moved[:, count:]) / (2.0 * _DIFFERENCE * units[None, :, None])
+    return np.ascontiguousarray(columns.transpose(2, 0, 1))
