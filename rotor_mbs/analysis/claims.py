@@ -193,13 +193,14 @@ class PrintedEnergy(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """A method's largest errors over its runs that are ok, and its longest run (s).
+    """A method's largest errors over its runs that ended well, and its longest run (s).
 
-    angle_error rad up to each horizon, energy_drift relative to the energy scale; None without data.
+    defect rad of an interval, angle_error rad up to each horizon, energy_drift relative to the energy scale; None without data.
     """
 
     method: str
-    runs: Tally  # ok, of all
+    runs: Tally  # ok or completed, of all
+    defect: float | None
     angle_error: float | None
     energy_drift: float | None
     longest_s: float
@@ -249,10 +250,11 @@ def agreement(runs: Iterable[StoredRun]) -> tuple[Agreement, ...]:
     rows = []
     for method in run_selection.in_catalogue_order(by_method):
         own = by_method[method]
-        ok = [run for run in own if run.status == "ok"]
-        error, drift = _largest(ok, "angle_error_max"), _largest(ok, "energy_drift_max")
+        good = [run for run in own if run.status in GOOD]
+        names = ("defect_max", "angle_error_max", "energy_drift_max")
+        defect, error, drift = (_largest(good, name) for name in names)
         longest = _largest(own, "run_time_s") or 0.0
-        rows.append(Agreement(method, Tally(len(ok), len(own)), error, drift, longest))
+        rows.append(Agreement(method, Tally(len(good), len(own)), defect, error, drift, longest))
     return tuple(rows)
 
 

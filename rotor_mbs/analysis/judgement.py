@@ -121,7 +121,7 @@ def clearly_ok(
         and run.get("angle_error_predicted", np.inf) <= OK_ERROR
         for run in metrics
     ]
-    return complete & np.array(within) & (np.array(shares) > _CLEAR_SHARE)
+    return np.asarray(complete & np.array(within) & (np.array(shares) > _CLEAR_SHARE))
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
@@ -187,6 +187,9 @@ def _inaccurate(scene: Scene, run: Solution, metrics: Metrics) -> tuple[str, str
             fault = rule.fault or f"{rule.metric} is {{value}} {rule.unit}".rstrip()
             return "inaccurate", f"{fault.format(value=f'{error:.1e}')}, allowed {bound:.0e}"
     defect = bounds.of("defect", run.method).value
+    median = bounds.find("defect median", run.method)
+    if "defect_max" in metrics and median is not None and not metrics["defect_median"] <= median.value:
+        return "inaccurate", f"median of the defects {metrics['defect_median']:.1e} rad, allowed {median.value:.0e}"
     if "defect_max" in metrics and not judged_defect(metrics) <= defect:
         return "inaccurate", (
             f"defect {metrics['defect_max']:.1e} rad in the interval up to t = {metrics['defect_time']:.6g} s, "

@@ -195,14 +195,16 @@ def span(seconds: float) -> str:
 def print_summary(report: RunReport, output: Path) -> int:
     """The runs in a few lines; the exit status: 1 where a run that should succeed did not, or was not computed."""
     is_lost = print_not_computed(report.made)
-    is_ok = [run.status == "ok" and run.is_stored for run in report.made]
+    statuses = [run.status for run in report.made if run.is_stored]
     failed, lost = len(report.failures), len(report.not_computed)
+    ok, completed = statuses.count("ok"), statuses.count("completed")
     counts = {
+        "completed": completed,
         "failed": failed,
-        "of the printed equations not ok": is_ok.count(False) - failed - lost,
+        "of the printed equations broke off": len(statuses) - ok - completed - failed,
         "not computed": lost,
     }
-    parts = [f"{sum(is_ok)} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
+    parts = [f"{ok} ok", *(f"{n} {what}" for what, n in counts.items() if n)]
     made = f"{len(report.made)} runs made ({', '.join(parts)})" if report.made else "nothing to do"
     print(f"{output}: {made}, {len(report.kept)} already stored")
     for line in report.stored_failures:

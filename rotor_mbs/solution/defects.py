@@ -11,6 +11,7 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
@@ -32,7 +33,7 @@ class Defects:
     transitions : (n - 1, m, m) of the angles, then rates, of the coordinates that move; None where they are not known.
     moving : the coordinates that move.
     resting : pitches that stay at zero by symmetry: there the error is the state itself.
-    own_loads : the loads of the closed form at the run's own states, as samples; without arrays where none are asked for.
+    own_loads : the loads of the closed form at the run's own states, as samples; without arrays where not asked for.
     growth_units : (m,) in which the error growth of the scene counts angles, then rates.
     states : (n, m) angles, then rates, of the run, in the coordinates that move.
     start : (m,) the scene's own start in these coordinates.
@@ -87,8 +88,8 @@ class Defects:
         return np.asarray(np.abs(scaled).max(axis=(1, 2)))
 
     @property
-    def is_judged(self) -> Array:
-        """(n - 1,) of bool: not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval."""
+    def is_judged(self) -> NDArray[np.bool_]:
+        """(n - 1,) not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval."""
         return np.asarray(~(self.growth > MAX_INTERVAL_GROWTH))
 
     @functools.cached_property
@@ -149,8 +150,10 @@ class Defects:
     def horizon_samples(self, limit: float) -> int:
         """How many samples lie before the error growth along the run reaches `limit`."""
         growth = self.error_growth
-        beyond = np.flatnonzero(~(growth < limit)) if growth is not None else []
-        return int(beyond[0]) if len(beyond) else len(self.time)
+        if growth is None:
+            return len(self.time)
+        beyond = np.flatnonzero(~(growth < limit))
+        return int(beyond[0]) if len(beyond) else len(growth)
 
     def _accumulated(self, rows: int) -> Array | None:
         """(n, m) errors of the state, from zero again after so many rows; over all rows from the start's own error."""

@@ -33,7 +33,7 @@ from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.toml_file import of_file
 from rotor_mbs.solution.solution import Solution
-from rotor_mbs.solution.status import GOOD, STATUSES
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 from rotor_mbs.studies.stored_references import digest, frozen_solution, read_reference, shipped_reference
 

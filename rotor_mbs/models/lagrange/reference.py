@@ -167,7 +167,7 @@ class TimedReference:
 
     trajectory: Trajectory  # as far as it got: time, angles, rates, error_growth
     # (n, 2 (1 + blades)) of angles, then rates, how many times larger than an error of the initial state theirs may
-    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch that is fixed or at rest by symmetry
+    # be, at most: 2-norms of the rows of the state transition matrix; 1 for a pitch fixed or at rest by symmetry
     growth: Array
     units: Array  # (2 (1 + blades),) rad or rad/s: what counts as 1 in these norms
 
@@ -188,7 +188,7 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     known = min(rows, len(matrices))
     with np.errstate(all="ignore"):
         norms = np.linalg.norm(_in_units(scene, matrices[:known])[:, free[:, None], free], axis=2)
-    growth[np.ix_(range(known), columns[free])] = np.where(np.isfinite(norms), norms, np.inf)
+    growth[np.ix_(np.arange(known), columns[free])] = np.where(np.isfinite(norms), norms, np.inf)
     return TimedReference(trajectory, growth, units)
 
 
