@@ -40,7 +40,7 @@ _ROUND_OFF = 1e-14
 _START_ROUND_OFF = 10.0 * float(np.finfo(float).eps)
 
 # A run is checked where one of these could be found.
-_CHECKS = ("energy_drift_max", "defect_max")
+_CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 
 # A claim of success is not false while a run resembles the motion: a hundredth, of the energy scale, of a radian for
 # an interval's defect, of what a quantity is relative to; and a radian for the angles up to the horizon.
@@ -129,7 +129,7 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
     unchecked run's claim nothing is known."""
     if status != "inaccurate":
         return status in ("ok", "unchecked", "completed")
-    errors = [metrics[name] for name in _CHECKS if name in metrics]
+    errors = [metrics[name] for name in ("energy_drift_max", "defect_max") if name in metrics]
     errors += [error for _, rule, error in quantity_errors(scene, metrics) if rule.relative_to or rule.check == "loads"]
     return all(error <= _RESEMBLES for error in errors) and largest_angle_error(metrics) <= _RESEMBLING_ANGLE
 
