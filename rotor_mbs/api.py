@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from rotor_mbs.analysis.judgement import defects_of
 from rotor_mbs.analysis.rehydrate import rehydrate
 from rotor_mbs.analysis.run_tables import RUN_HEAD, run_row
 from rotor_mbs.errors import InputError, MethodRefusal, PlausibilityWarning, StoreError
@@ -32,6 +33,7 @@ from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import MISSING, table_groups
 from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, doubts, load_scene, parse_scene
+from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import known_quantities
 from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.status import STATUSES
@@ -184,10 +186,25 @@ class Run(Solution):
     Attributes
     ----------
     reference : the trajectory it was judged against; None where there was none.
+    defects : of its intervals between samples.
     plot : `run.plot()` draws the motion; `run.plot.energy()`, `.error()`, `.tips()`, `.loads("shaft_force")`.
     """
 
     reference: Trajectory | None = None
+
+    @property
+    def defects(self) -> Defects | None:
+        """What the closed form makes of each sample by the next one, less what the run has there: signed vectors, and
+        the error that they add up to. None for fewer than two samples, or without angles and rates.
+
+        Examples
+        --------
+        >>> import rotor_mbs as rm
+        >>> defects = rm.run("check/general", "lagrange/ode45").defects
+        >>> defects.angles.shape, bool(defects.sizes.max() < 1e-5)
+        ((150, 4), True)
+        """
+        return defects_of(self.scene, self.trajectory)
 
     @property
     def plot(self) -> RunPlots:

@@ -102,7 +102,9 @@ def check(arguments: argparse.Namespace) -> int:
 
     bounds = load_bounds(arguments.bounds)
     required = check_names(arguments.require or ())
-    earlier = None if arguments.against is None else study.judge_file(arguments.against, bounds)
+    earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
+    if earlier is not None and arguments.file is not None and is_sweep(arguments.against) != is_sweep(arguments.file):
+        raise InputError(f"--against {arguments.against}: a file of another kind than {arguments.file}")
     if arguments.file is not None:
         verdicts = study.check_file(arguments.file, bounds, required)
     else:

@@ -36,6 +36,7 @@ class Defects:
     own_loads : the loads of the closed form at the run's own states, as samples; without arrays where not asked for.
     growth_units : (m,) in which the error growth of the scene counts angles, then rates.
     states : (n, m) angles, then rates, of the run, in the coordinates that move.
+    rounding : (n, m) half a unit in the last place of each of these numbers.
     start : (m,) the scene's own start in these coordinates.
     """
 
@@ -47,6 +48,7 @@ class Defects:
     moving: tuple[int, ...]
     resting: tuple[int, ...]
     states: Array
+    rounding: Array
     start: Array
     growth_units: Array
     own_loads: Trajectory
@@ -59,18 +61,17 @@ class Defects:
 
     @functools.cached_property
     def floor(self) -> Array:
-        """(n - 1,) rad: what the rounding of the run's own numbers to doubles may add up to in an interval."""
+        """(n - 1,) rad: what the rounding of the run's own numbers may add up to in an interval."""
         eps = 0.5 * float(np.finfo(float).eps)
         units = self._units
-        rounding = eps * np.abs(self.states)
         half = self.states.shape[1] // 2
         # The sample times are rounded, too: by as much the state goes on.
         slip = eps * np.abs(self.time[1:, None]) * np.abs(self.states[1:, half:])
-        carried = rounding[:-1]
+        carried = self.rounding[:-1]
         if self.transitions is not None:
             known = np.where(np.isfinite(self.transitions), np.abs(self.transitions), 0.0)
-            carried = np.einsum("kij,kj->ki", known, rounding[:-1])
-        total = carried + rounding[1:]
+            carried = np.einsum("kij,kj->ki", known, self.rounding[:-1])
+        total = carried + self.rounding[1:]
         total[:, :half] += slip
         # and the rates by their change
         change = np.abs(np.diff(self.states[:, half:], axis=0)) / np.diff(self.time)[:, None]

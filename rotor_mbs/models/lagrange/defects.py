@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import failure, is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
@@ -24,16 +25,22 @@ _MAX_STEPS = 5_000
 # The transition matrices are wanted to a share of about 1e-5: Runge-Kutta steps of order 4 over a quarter of a radian.
 _RADIANS_PER_STEP = 0.25
 _MAX_RUNGE_KUTTA_STEPS = 32
+# Rows of a window in which rates are found from angles: two leave no residual, and noise as it is.
+FIT_ROWS = 5
+_FIT_ROUNDS = 4
 _DIFFERENCE = 1e-6  # rad and rate units: cube root of the rounding, for central differences
 
 
-def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array) -> Defects:
+def interval_defects(
+    scene: Scene, time: Array, angles: Array, rates: Array, rounding: Array | None = None
+) -> Defects:
     """The defects of a run's samples, or of anybody's.
 
     Parameters
     ----------
     time : (n,) s, increasing, within the scene's duration.
     angles, rates : (n, 1 + blades) rad and rad/s.
+    rounding : (2 + 2 blades,), or of each row, half a unit of the last digit of angles, then rates, where they are no doubles.
 
     Returns
     -------
@@ -52,6 +59,10 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array) -> 
     if len(time) > 1:
         units = np.maximum(units, 1.0 / float(np.median(np.diff(time))))
     loads = sampled_loads(scene, time, angles, rates) if scene.wants("loads") else {}
+    last_digits = 0.5 * float(np.finfo(float).eps) * np.abs(states)
+    if rounding is not None:
+        count = angles.shape[1]
+        last_digits = np.maximum(last_digits, rounding[..., [*moving, *(count + i for i in moving)]])
     start = np.concatenate([np.array(scene.initial_angles)[moving], np.array(scene.initial_rates)[moving]])
     return Defects(
         time=time,
@@ -62,10 +73,62 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array) -> 
         moving=tuple(moving),
         resting=resting_pitches(scene),
         states=states,
+        rounding=last_digits,
         start=start,
         growth_units=np.concatenate([np.ones(half), rate_units(scene)]),
         own_loads=Trajectory(time, angles, rates, **loads),
     )
+
+
+def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
+    """Rates of data that have angles alone, by the closed form through five rows around each.
+
+    Least squares over the state at the first row of every window, carried through it by the transition matrices; from
+    differences, until the rates stand still.
+
+    Returns
+    -------
+    (n, 1 + blades) rad/s
+
+    Raises
+    ------
+    InputError
+        Where there are fewer rows than a window has, or the motion is too stiff to carry a state from row to row.
+    """
+    count = len(time)
+    if count < FIT_ROWS:
+        raise InputError(f"{count} rows; allowed: at least {FIT_ROWS} where the rates are to be found from the angles")
+    moving = scene.moving_coordinates
+    half = len(moving)
+    rates = np.zeros_like(angles)
+    rates[:, moving] = np.gradient(angles[:, moving], time, axis=0, edge_order=2)
+    firsts = np.arange(count - FIT_ROWS + 1)
+    middle = FIT_ROWS // 2
+    # Of every row the window in whose middle it is, or the first or the last one.
+    windows = np.clip(np.arange(count) - middle, 0, len(firsts) - 1)
+    places = np.arange(count) - windows
+    scale = np.concatenate([np.ones(half), np.full(half, 1.0 / float(np.median(np.diff(time))))])
+    for _ in range(_FIT_ROUNDS):
+        states = np.hstack([angles[:, moving], rates[:, moving]])
+        transitions = _transitions(scene, time, states)
+        if transitions is None:
+            raise InputError("the rates cannot be found from the angles: the rows are too far apart for this motion")
+        jumps = _ends(scene, time, states) - states[1:]
+        # Away from the data's own states: row by row matrix @ (at the first row) + offset.
+        matrices = [np.broadcast_to(np.eye(2 * half), (len(firsts), 2 * half, 2 * half))]
+        offsets = [np.zeros((len(firsts), 2 * half))]
+        for row in range(FIT_ROWS - 1):
+            step = transitions[firsts + row]
+            matrices.append(step @ matrices[-1])
+            offsets.append(np.einsum("kij,kj->ki", step, offsets[-1]) + jumps[firsts + row])
+        design = np.concatenate([matrix[:, :half] * scale for matrix in matrices], axis=1)
+        residual = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
+        at_first = -np.einsum("kij,kj->ki", np.linalg.pinv(design), residual) * scale
+        all_rows = np.stack(
+            [np.einsum("kij,kj->ki", m, at_first) + offset for m, offset in zip(matrices, offsets, strict=True)]
+        )
+        rates[:, moving] += all_rows[places, windows, half:]
+    return rates
 
 
 def _ends(scene: Scene, time: Array, states: Array) -> Array:
