@@ -36,24 +36,6 @@ def of(statistic: str, coordinate: int = 0, scene: str = "paper/fig11", quantity
     return TrajectoryNumber(scene, quantity, coordinate, statistic)
 
 
-@pytest.mark.parametrize(
-    ("statistic", "exact"),
-    [
-        # x = t sin(2π t) over 0..10: the extremes lie near t = n + 1/4 and n + 3/4 and are about t high.
-        ("range", 9.25 + 9.75),
-        ("reversals", 19.0),  # zero at every half second, both ends left out
-        ("net_change", 0.0),
-        ("growth", 9.75 / 4.75),  # largest |x| in either half: near t = 9.75 and 4.75
-    ],
-)
-def test_statistics_of_a_growing_oscillation(tmp_path: Path, statistic: str, exact: float) -> None:
-    made = Made(FIG11, PRINTED, rotor(lambda t: t * np.sin(2.0 * np.pi * t)))
-    with open_results(store(tmp_path / "r.h5", [made])) as results:
-        value = measure(results.scenes["paper/fig11"].methods[PRINTED], of(statistic))
-    # 50 samples a period: an extreme is missed by at most (2π/50)²/8 = 2e-3 of the amplitude of 10.
-    assert value == pytest.approx(exact, abs=0.05)
-
-
 SERIES = {
     "min": ((3.0, -2.0, 5.0), -2.0),
     "max": ((3.0, -2.0, 5.0), 5.0),
@@ -93,18 +75,6 @@ def test_one_sample_has_no_growth_and_none_no_number() -> None:
     assert measure(none, of("max")) is None
     timeless: Any = Arrays(PRINTED, angles=np.ones((1, 1)))
     assert measure(timeless, of("max")) is None
-
-
-def test_swings_are_counted_from_turning_point_to_turning_point(tmp_path: Path) -> None:
-    # Corners at 0, 2, -1, 3 s-wise: ways of 2, 3, 4; the last, unfinished one (to 0) is no swing.
-    def corners(t: np.ndarray) -> np.ndarray:
-        return np.interp(t, [0.0, 2.0, 4.0, 6.0, 10.0], [0.0, 2.0, -1.0, 3.0, 0.0])
-
-    with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(corners))])) as results:
-        run = results.scenes["paper/fig11"].methods[PRINTED]
-        assert measure(run, of("swing_ratio")) == pytest.approx(4.0 / 2.0)
-        assert measure(run, of("swing_ratio", coordinate=1)) is None  # at rest: no swing
-        assert measure(run, of("growth", coordinate=1)) is None
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def some_quick(names: Sequence[str]) -> list[object]:
 
 @pytest.mark.parametrize("hub", ["1e3", "1e0", "1e-3", "1e-6"])
 def test_through_the_singular_pitch(hub: str) -> None:
-    """Time and rotor angle at every tenth pitch that the run passes, against 40-digit integrals over the pitch."""
+    """Time and rotor angle at every tenth pitch that the run passes, against 30-digit integrals over the pitch."""
     one = scene(f"extreme/passage-{hub}")
     found = run(one).trajectory
     x, _, z = one.blades[0].centre_of_mass
