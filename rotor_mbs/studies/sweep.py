@@ -86,7 +86,7 @@ def prepare() -> None:
 
 
 def perform(chunk: Chunk) -> Rows:
-    """(runs, ...) columns of all runs of a chunk; a run's own failure is in its row. Raises InputError, MethodRefusal."""
+    """(runs, ...) columns of all runs of a chunk, failures of runs included. Raises InputError, MethodRefusal."""
     rows = rows_of(chunk)
     rows["time_limit_s"][rows["status"] == code_of("timed_out")] = chunk.time_limit_s
     rows["code"][:] = chunk.code
