@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, Column
+from rotor_mbs.runs.files import Column
 from rotor_mbs.runs.results import TableFile
-from rotor_mbs.runs.table import COLUMNS, MISSING, Place, Rows, Table, blank_rows, characters, text_of
+from rotor_mbs.runs.table import COLUMNS, MISSING, Place, Rows, Table, blank_rows, characters, known_columns, text_of
 from rotor_mbs.solution.status import STATUSES, code_of
 
 _MESSAGE_LENGTH = 300
@@ -40,17 +40,7 @@ POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
         "symmetry": "status message mirror_error relabelling_error reversal_error angular_momentum_drift crc32",
     }.items()
 }
-_KNOWN = {
-    "scene": "scene",
-    "method_name": "method, model/integrator",
-    "curve": "method with its fixed choices",
-    "setting_kind": "what varies along the curve",
-    "settings": "settings of the point, JSON",
-    "options": "of the study, JSON",
-    "versions": "versions of what computed the point, JSON",
-    "scene_hash": "SHA-256 of the scene's numbers",
-}
-_UNITS = {"step": ("s", "fixed step"), "tolerance": ("1", "tolerance"), "order_expected": ("1", "order of the method")}
+_NUMBERS = ("step", "tolerance", "order_expected")  # that the design says of a point
 
 
 @dataclass(frozen=True)
@@ -88,16 +78,8 @@ class Record:
 
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
     """The table `group` of these points: of each the known columns by name."""
-    known: dict[str, tuple[Column, Any]] = {
-        name: (Column(("run",), "1", long_name), [str(point[name]) for point in points])
-        for name, long_name in _KNOWN.items()
-        if points and name in points[0]
-    }
-    for name, (units, long_name) in _UNITS.items():
-        if points and name in points[0]:
-            known[name] = Column(("run",), units, long_name), np.array([float(str(point[name])) for point in points])
-    scales = {CHARACTERS: (Column((CHARACTERS,), "1", ""), np.empty(_MESSAGE_LENGTH, np.int8))}
-    return Table(group, [str(point["run"]) for point in points], known, POINT_COLUMNS[group], scales)
+    runs = [str(point["run"]) for point in points]
+    return Table(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
 
 
 def row_of_point(place: Place, status: str, message: str, values: Mapping[str, object]) -> Rows:
@@ -144,7 +126,7 @@ def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
         known = points[0]
         arrays = {column: np.array([row[column] for row in values]) for column in values[0]}
         messages = [text_of(text) for text in arrays.pop("message")]
-        arrays |= {column: np.array([row[column] for row in points]) for column in _UNITS if column in known}
+        arrays |= {column: np.array([row[column] for row in points]) for column in _NUMBERS if column in known}
         setting_kind = str(known.get("setting_kind", "step"))
         if setting_kind in arrays:
             arrays["setting"] = arrays[setting_kind]

@@ -21,7 +21,7 @@ import numpy as np
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.runs import files, table
-from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column
+from rotor_mbs.runs.files import KEYWORDS, Column
 from rotor_mbs.runs.table import (
     COLUMNS,
     STATUS_REPEATED,
@@ -31,6 +31,7 @@ from rotor_mbs.runs.table import (
     Table,
     blank_rows,
     characters,
+    known_columns,
     text_of,
 )
 from rotor_mbs.runs.versions import machine, row_versions, versions
@@ -58,13 +59,6 @@ _RUN_COLUMNS = (
 )  # fmt: skip
 # What a scene's table repeats of /runs, by its name there; in a row it has this name.
 REPEATED = {"status": STATUS_REPEATED, "samples": "samples_repeated"}
-_TEXTS = {
-    "scene": "scene",
-    "method_name": "method, model/integrator",
-    "settings": "settings of the method, JSON",
-    "versions": "versions of what computed the run, JSON",
-    "scene_hash": "SHA-256 of the scene's numbers",
-}
 
 
 @dataclass(frozen=True)
@@ -121,16 +115,9 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
 
 def runs_table(asked: Sequence[Asked]) -> Table:
     """The table /runs of these runs."""
-    known = [run.known for run in asked]
-    texts = {
-        name: (Column(("run",), "1", long_name), [row[name] for row in known]) for name, long_name in _TEXTS.items()
-    }
     outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
-    return Table(RUNS, [run.run for run in asked], texts, metric_columns(outputs), {CHARACTERS: _characters()})
-
-
-def _characters() -> tuple[Column, np.ndarray[Any, Any]]:
-    return Column((CHARACTERS,), "1", ""), np.empty(_TEXT_LENGTH, np.int8)
+    known = known_columns([run.known for run in asked])
+    return Table(RUNS, [run.run for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
 
 
 def arrays_of(run: Asked) -> dict[str, Column]:

@@ -93,9 +93,8 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
         for quantity in asked
     }
     scales, labels = scene_scales(sweep.base, trajectories.values())
-    scales[CHARACTERS] = Column((CHARACTERS,), "1", ""), np.empty(MESSAGE_LENGTH, np.int8)
     computed = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
-    return Table("", runs, known, computed, scales, labels, flags=flags)
+    return Table("", runs, known, computed, scales, labels, flags=flags, characters=MESSAGE_LENGTH)
 
 
 @contextmanager

@@ -106,6 +106,20 @@ COLUMNS = {
         "crc32": ("1", "CRC-32 of the row in all computed columns", "<u4"),
     }.items()
 }
+# What the design says of each row of a table, in this order: units, long name. What has no entry is no column.
+KNOWN = {
+    "scene": ("1", "scene"),
+    "method_name": ("1", "method, model/integrator"),
+    "curve": ("1", "method with its fixed choices"),
+    "setting_kind": ("1", "what varies along the curve"),
+    "settings": ("1", "settings of the method, JSON"),
+    "options": ("1", "of the study, JSON"),
+    "versions": ("1", "versions of what computed the row, JSON"),
+    "scene_hash": ("1", "SHA-256 of the scene's numbers"),
+    "step": ("s", "fixed step"),
+    "tolerance": ("1", "tolerance"),
+    "order_expected": ("1", "order of the method"),
+}
 _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
 _OF_REFERENCE = "columns_of_the_reference"  # the attribute with the names of those that have no value a run
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
@@ -125,6 +139,7 @@ class Table:
     labels : texts for the entries of a scale, by its name.
     attributes : of the group.
     flags : names that the codes of a known column stand for, by its name.
+    characters : of each computed text.
     """
 
     group: str
@@ -135,16 +150,28 @@ class Table:
     labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
     attributes: Mapping[str, object] = field(default_factory=dict)
     flags: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    characters: int = 0
 
     @property
     def row_type(self) -> np.dtype[np.void]:
         """The computed columns of one row, in the order in which its checksum covers them."""
-        lengths = {name: len(values) for name, (_, values) in self.scales.items()}
+        lengths = {name: len(values) for name, (_, values) in self.scales.items()} | {CHARACTERS: self.characters}
         shapes = {
             name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
             for name, column in self.computed.items()
         }
         return np.dtype([(name, column.kind, shapes[name]) for name, column in self.computed.items()])
+
+
+def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Column, Any]]:
+    """`known` of a table with these rows, texts and numbers by name, all with the same names."""
+    columns: dict[str, tuple[Column, Any]] = {}
+    for name, (units, long_name) in KNOWN.items():
+        if rows and name in rows[0]:
+            values: Any = [row[name] for row in rows]
+            is_text = isinstance(values[0], str)
+            columns[name] = Column(("run",), units, long_name), values if is_text else np.array(values, float)
+    return columns
 
 
 def scene_scales(
@@ -315,10 +342,9 @@ def _put_table(file: Any, table: Table) -> None:
     group = files.new_group(file, table.group) if table.group else file
     files.put_attributes(group, table.attributes)
     files.put(group, "run", table.runs, Column(("run",), "1", "run"))
+    if table.characters:
+        files.put_dimension(group, CHARACTERS, table.characters)
     for name, (column, values) in table.scales.items():
-        if name == files.CHARACTERS:
-            files.put_dimension(group, name, len(values))
-            continue
         dataset = files.put(group, name, values, column)
         if name in table.labels:
             files.put_attributes(dataset, {"labels": list(table.labels[name])})
@@ -403,7 +429,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
             if offset is None and dataset.size:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
             computed[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
-        elif name != files.CHARACTERS:
+        elif name != CHARACTERS:
             known[name] = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
             if "labels" in dataset.attrs:
                 labels[name] = files.plain(dataset.attrs["labels"])
@@ -432,14 +458,13 @@ def as_table(file: Any, group: str) -> Table:
     stored, item = stored_table(file, group), file[group] if group else file
     columns = columns_of(item)
     scales: dict[str, tuple[Column, NDArray[Any]]] = {}
-    if files.CHARACTERS in item:
-        scales[files.CHARACTERS] = Column((files.CHARACTERS,), "1", ""), np.empty(len(item[files.CHARACTERS]), np.int8)
     known: dict[str, tuple[Column, NDArray[Any]]] = {}
     for name, values in stored.known.items():
         (scales if columns[name].dimensions == (name,) else known)[name] = columns[name], values
     computed = {name: columns[name] for name in stored.computed}
     attributes = {name: value for name, value in stored.attributes.items() if group}
-    return Table(group, stored.runs.tolist(), known, computed, scales, stored.labels, attributes)
+    characters = len(item[CHARACTERS]) if CHARACTERS in item else 0
+    return Table(group, stored.runs.tolist(), known, computed, scales, stored.labels, attributes, characters=characters)
 
 
 def columns_of(group: Any) -> dict[str, Column]:
