@@ -22,7 +22,7 @@ from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import method_cell, status_text, versions
+from rotor_mbs.report.pages.scene_tables import method_cell, versions, words_of
 from rotor_mbs.runs.read import OpenResults, StoredScene
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.scenario.catalogue import natural_order
@@ -68,7 +68,7 @@ def bench_pages(main: str, site: Site, results: OpenResults) -> dict[str, str]:
             "facts": curves[0].attributes,
             "diagram": Section(pictures, cost_legend(curves)),
             "reach": Section(tables=[reach_table(curves)]),
-            "order": Section(tables=[PageTable(caption, ["method", "order", "expected"], orders, numeric=(1, 2))]),
+            "order": Section(tables=[PageTable(caption, ["method", "order", "expected"], orders)]),
             "failures": Section(tables=[failure_table(curves, results.scenes.get(name))]),
             "points": Section(tables=[_point_table(curves)]),
             "csv": csv_file,
@@ -216,7 +216,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
                 row.append(missing)
         rows.append(row)
     head = ["method", *_TARGETS]
-    return PageTable("Run time to an angle error, and its ratio to the fastest", head, rows, range(1, len(head)))
+    return PageTable("Run time to an angle error, and its ratio to the fastest", head, rows)
 
 
 def _point_table(curves: Sequence[Record]) -> PageTable:
@@ -242,9 +242,9 @@ def _point_table(curves: Sequence[Record]) -> PageTable:
                 row += ["", ""]
             row += [seconds[name] for name in ("setup_time_s", "setup_again_time_s", "output_time_s")]
             row += [str(curve.arrays[name][i]) for name in ("repeats", "steps")]
-            row.append(TableCell(status_text(status), tone="" if status == "ok" else "bad"))
+            row.append(TableCell(words_of(status), tone="" if status == "ok" else "bad"))
             rows.append(row)
-    return PageTable("Every setting measured.", head, rows, numeric=range(1, 14)).without_empty_columns()
+    return PageTable("Every setting measured.", head, rows)
 
 
 def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -> PageTable:
@@ -260,7 +260,7 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
                 setting += f" and {len(left_out) - 1} finer"
             claimed = "yes" if curve.arrays["false_success"][i] else ""
             seconds = prefixed(_finite(curve.arrays["run_time_s"][i]), "s")
-            rows.append([method_cell(curve.name), setting, seconds, status_text(status), claimed, message])
+            rows.append([method_cell(curve.name), setting, seconds, words_of(status), claimed, message])
     scene = None if stored is None else scene_of(stored)
     if scene is not None:
         for name in dict.fromkeys(ladder.method for ladder in ladders()):
@@ -270,7 +270,7 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
                 rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
     head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
     caption = "Runs that failed, found from their state, and settings that the budget left out."
-    return PageTable(caption, head, rows, numeric=(1, 2)).without_empty_columns()
+    return PageTable(caption, head, rows)
 
 
 def _setting(curve: Record, i: int) -> str:

@@ -256,7 +256,7 @@ def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
                 rotor = run.array("angles")[:, 0]
                 row[place] = number(float(rotor[-1] - rotor[0]), 3)
         rows.append(row)
-    return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
+    return PageTable("", head, rows)
 
 
 def _largest_pitch(run: StoredRun) -> str:

@@ -16,7 +16,7 @@ from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Sect
 from rotor_mbs.report.core.looks import BLUE, VERMILLION, Look, with_capital
 from rotor_mbs.report.core.numbers import SPACE, apart
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import status_text, versions
+from rotor_mbs.report.pages.scene_tables import versions, words_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.scenario.scene import parse_scene
 from rotor_mbs.solution.status import STATUSES
@@ -61,7 +61,7 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         distributions.append(picture(panels, f"of-{name}", caption))
     codes, counts = np.unique(statuses, return_counts=True)
     status_rows = [
-        (status_text(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / len(statuses):.1f} %")
+        (words_of(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / len(statuses):.1f} %")
         for code, count in sorted(zip(codes.tolist(), counts.tolist(), strict=True), key=lambda pair: -pair[1])
     ]
     parameter_rows = []
@@ -75,8 +75,8 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         "title": sweep.attributes["title"],
         "summary": lines,
         "plots": Section(plots),
-        "statuses": Section(tables=[PageTable("", ("Status", "Runs", "Share"), status_rows, (1, 2))]),
-        "parameters": Section(tables=[PageTable("", head, parameter_rows, (2, 3, 4))]),
+        "statuses": Section(tables=[PageTable("", ("Status", "Runs", "Share"), status_rows)]),
+        "parameters": Section(tables=[PageTable("", head, parameter_rows)]),
         "distributions": Section(distributions),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
         "versions": versions(sweep.attributes),
