@@ -76,7 +76,7 @@ def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> No
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
     assert text.count("<figcaption>") == text.count("<figure>") == 1 + 2 + 5 + 1 + 1 + 1
     assert text.count('role="img"') == text.count("<figure>") + text.count("<canvas")
-    opening = text[text.index('<div class="opening">') : text.index("What the paper says")]
+    opening = text[text.index('<div class="opening">') : text.index('<section id="paper">')]
     assert 'class="viewer"' in opening
     assert re.search(r"both models, which differ by up to [\d.]+ rad", opening)
     assert re.search(r">0\.05 rad apart at 0\.\d+ s<", opening)
@@ -328,7 +328,7 @@ def test_a_quantity_is_drawn_as_its_declaration_says(monkeypatch: pytest.MonkeyP
 
 
 def test_loads_are_drawn_once_with_the_errors_of_the_others_and_their_extremes(tmp_path: Path) -> None:
-    """Of the reference a picture with a panel per axis, one of the errors, and a table of the extremes with their times."""
+    """Of the reference a picture, a panel per axis; one of the errors; a table of the extremes with their times."""
     path = results_file(tmp_path / "r.h5", ["check/loads"], ["lagrange/dop853", TREE])
     text = text_of(write_report(path, tmp_path / "out").parent, "check-loads.html")
     sections = dict(re.findall(r'<section id="quantity-(\w+)">(.*?)</section>', text, re.S))

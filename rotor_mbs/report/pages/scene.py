@@ -180,8 +180,10 @@ def departure(
             axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
             if not place:
                 text = f"{VISIBLE:g} rad apart at {parted:.2g} s"
-                top = axes.get_ylim()[1]
-                axes.text(parted + 0.01 * end, top, text, color=GREY, ha="left", va="top", fontsize=8.5)
+                low, high = axes.get_ylim()
+                then = float(np.interp(parted, series[0].time, series[0].values))
+                side, height = ("bottom", low) if then > 0.5 * (low + high) else ("top", high)  # away from the curves
+                axes.text(parted + 0.01 * end, height, text, color=GREY, ha="left", va=side, fontsize=8.5)
     return panels
 
 
