@@ -48,7 +48,7 @@ class TableCell:
 Row = Sequence[TableCell | str]
 
 
-class Column(NamedTuple):
+class ShownColumn(NamedTuple):
     """A column that is shown: its place in the rows, its heading, whether it has numbers, aligned to the right."""
 
     place: int
@@ -64,14 +64,14 @@ class PageTable:
     head: Sequence[str]
     rows: Sequence[Row]
 
-    def columns(self) -> list[Column]:
+    def columns(self) -> list[ShownColumn]:
         shown = []
         for place, heading in enumerate(self.head):
             texts = [cell if isinstance(cell, str) else cell.text for cell in (row[place] for row in self.rows)]
             known = [text for text in texts if text not in ("", NOTHING)]
             count = sum(_NUMBER.fullmatch(text) is not None for text in known)
             if known or not place:
-                shown.append(Column(place, heading, place > 0 and 2 * count > len(known)))
+                shown.append(ShownColumn(place, heading, place > 0 and 2 * count > len(known)))
         return shown
 
 

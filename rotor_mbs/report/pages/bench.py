@@ -161,9 +161,10 @@ def cost_legend(curves: Sequence[Record]) -> list[LegendEntry]:
     """Methods, front, failed points and uncertainty, as far as they are in the diagram."""
     entries = []
     for curve in curves:
-        look = look_of(curve.name)
-        has_line = work_precision.succeeded(curve).sum() > 1
-        entries.append(LegendEntry(label_of(curve.name), look if has_line else replace(look, line="")))
+        look, count = look_of(curve.name), int(work_precision.succeeded(curve).sum())
+        if count < 2:  # a point alone, or none but failed ones
+            look = replace(look, line="", marker=look.marker if count else "x")
+        entries.append(LegendEntry(label_of(curve.name), look))
     points = [work_precision.points(curve) for curve in curves]
     if points and len(work_precision.pareto(*np.concatenate(points, axis=1))) > 1:
         entries.append(line_entry("best of all (Pareto front)", _FRONT_COLOUR, width=6.0))

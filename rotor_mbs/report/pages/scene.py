@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -339,10 +340,11 @@ def _energy_section(sides: Runs, drawn: Runs, horizon: float | None) -> Section:
     """Energy less work from its start, of every run; what each run has and how well it conserves it."""
     runs = {name: run for name, run in drawn.items() if "energy_error" in run}
     curves = quantities.over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
-    caption = "Total energy less work, from its start: filled marks gained, open ones lost"
+    caption = "Energy error: change of total energy less work"
     shown = quantities.error_picture(curves, "|energy error| (J)", "energy", caption, horizon, signed=True)
     if shown is None:
         return Section()
+    shown = replace(shown, notes=["Filled marks: gained. Open marks: lost.", *shown.notes])
     legend = [*quantities.run_legend(quantities.visible(curves)), *horizon_entry(horizon, sides.values())]
     head = (
         "Method", "Largest kinetic energy (J)", "Work at the end (J)", "Largest gain (J)", "Drift (relative)",
