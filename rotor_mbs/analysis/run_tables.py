@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from rotor_mbs.analysis.claim_study import ClaimShares
-from rotor_mbs.analysis.claims import Finding, agreement
+from rotor_mbs.analysis.claims import agreement
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.read import StoredRun, StoredScene
@@ -14,7 +13,6 @@ from rotor_mbs.runs.records import Record
 from rotor_mbs.solution.text_table import TextTable
 
 RUN_HEAD = ("method", "status", "error (rad)", "energy drift", "time (s)")
-_VERBS = {"holds": "hold", "fails": "fail"}
 _MOST_ROWS = 40  # of a table with a row for each run
 
 
@@ -46,11 +44,11 @@ def run_table(scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[s
 
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
-    """A row for each method: how many of its runs are ok, and the largest numbers among those."""
+    """A row for each method: how many of its runs ended well, and the largest numbers among those."""
     rows = []
     for row in agreement(runs):
         worst = {"angle_error_max": row.angle_error, "energy_drift_max": row.energy_drift}
-        rows.append(run_row(row.method, f"{row.runs.count} of {row.runs.of} ok", worst, row.longest_s))
+        rows.append(run_row(row.method, row.runs, worst, row.longest_s))
     return TextTable(("method", "runs", "largest error (rad)", "largest drift", "longest (s)"), rows)
 
 
@@ -66,28 +64,6 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
     return TextTable(
         ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e}" for target in TARGETS_RAD)), rows
     )
-
-
-def finding_lines(facts: Finding, shares: ClaimShares | None) -> list[str]:
-    """The paper's numbers and claims, a line each; claims over many runs where `shares` has them."""
-    lines = []
-    if facts.numbers is not None:
-        corrected = facts.numbers_corrected
-        gives = f"; the corrected ones give {corrected.count or 'none'}" if corrected else ""
-        lines.append(
-            f"published numbers: {facts.numbers.count} of {facts.numbers.of} come out of the printed equations{gives}"
-        )
-    if shares is not None:
-        for method in shares.methods:
-            counts = [f"{n} {_VERBS.get(verdict, verdict)}" for verdict, n in shares.count(method).items() if n]
-            lines.append(f"claims in words, {method}: {', '.join(counts)}")
-    elif facts.claims_printed is not None:
-        tally = facts.claims_printed
-        lines.append(f"claims in words: {tally.count} of {tally.of} hold in the printed equations")
-    if facts.energy is not None:
-        rises = facts.energy.rises
-        lines.append(f"energy gained without work by the printed equations: in {rises.count} of {rises.of} scenes")
-    return lines
 
 
 def _short(value: object) -> str:

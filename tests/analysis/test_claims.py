@@ -13,7 +13,7 @@ from support.scenes import paper
 from support.stored import Arrays, Made, rotor, store
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import STATISTICS, claims, finding, measure, rounds_to
+from rotor_mbs.analysis.claims import STATISTICS, Claim, ClaimResult, agreement, claims, finding, measure, rounds_to
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber
 from rotor_mbs.runs.read import open_results
@@ -173,15 +173,24 @@ def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
         Made(fig12, TAYLOR, rotor(lambda t: np.full_like(t, 1.0)), attributes={"status": "inaccurate"}),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as results:
-        facts = finding(results.scenes, [])
-    assert facts.energy is not None
-    assert (facts.energy.rises.count, facts.energy.rises.of) == (2, 2)
+        rows = finding(results.scenes, [])
+        printed, corrected = agreement(run for scene in results.scenes.values() for run in scene.methods.values())
     # The run that broke off made more, but what a runaway reaches is no measure.
-    assert facts.energy.gain == pytest.approx(3e5)
-    (agreement,) = facts.agreement
-    assert agreement.angle_error == pytest.approx(1e-9)
-    assert (agreement.runs.count, agreement.runs.of) == (1, 2)
-    assert facts.numbers is None
+    assert [(row.printed, row.corrected) for row in rows] == [("2 of 2", ""), ("0.3 MJ", "")]
+    assert corrected.angle_error == pytest.approx(1e-9)
+    assert (printed.runs, corrected.runs) == ("1 of 2 completed", "1 of 2 ok")
+
+
+def test_the_finding_counts_numbers_and_claims_that_are_decided() -> None:
+    def decided(item: Published, printed: bool | None, corrected: bool | None) -> Claim:
+        return Claim(item, ClaimResult(printed), ClaimResult(corrected))
+
+    item, words = number("max", 1.0), claim(Condition(of("max"), ">", bound=0.0))
+    evaluated = [decided(item, True, False), decided(item, None, False), decided(words, True, None)]
+    assert finding({}, evaluated) == [
+        ("Published numbers reproduced", "1 of 1", "0 of 2"),
+        ("Published claims that hold", "1 of 1", ""),
+    ]
 
 
 def test_escape_rate_of_a_pendulum_upside_down() -> None:

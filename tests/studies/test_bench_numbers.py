@@ -144,7 +144,7 @@ def test_the_diagram_draws_what_was_measured() -> None:
     drawn = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
     assert drawn == [[[1e-2, 1e-3], [1e-6, 2e-3], [1e-10, 4e-3]]]
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert axes.get_xlim()[0] > axes.get_xlim()[1]  # falling to the right
+    assert axes.get_xlim()[0] < axes.get_xlim()[1]  # errors fall to the left
     with_setup = diagram([FAST], with_setup=True).axes[0]
     drawn = [line.get_ydata().tolist() for line in with_setup.lines if line.get_marker() == "o"]
     assert drawn == [[1.001, 1.002, 1.004]]
