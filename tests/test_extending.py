@@ -168,6 +168,15 @@ def test_a_quantity_is_stored_judged_and_drawn_for_every_method() -> None:
     assert "Angular momentum about the shaft" in page
 
 
+@pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853"])
+def test_a_sweep_stores_a_quantity(method: str) -> None:
+    scene = rm.scene("paper/fig11").replace(duration=0.2, samples=5, outputs=["angles", "rates", "momentum"])
+    data = rm.sweep(scene, {"gravity": [9.0, 10.0]}, methods=[method], outputs=[*scene.outputs])
+    for i, gravity in enumerate((9.0, 10.0)):
+        alone = rm.run(scene.replace(gravity=gravity), method)["shaft_momentum"]
+        np.testing.assert_allclose(data.column("shaft_momentum")[i], alone, rtol=1e-10)
+
+
 @pytest.mark.full
 def test_bench_measures_its_ladder_and_its_order() -> None:
     command("bench", "one.toml", "-m", "outside/rk4", "-o", "bench.h5", "--repeats", "2", "--budget", "30")

@@ -213,7 +213,7 @@ def _changed_metric(run: StoredRun, metrics: Metrics, trajectory: Trajectory) ->
         allowance = allowances.get(name, 0.0)
         off = abs(stored - value)
         if name in ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max") and not is_corrected(run.method):
-            # Over the integrator's own points, four in each of its steps: at least as large as here, but for what may lie
+            # Over the integrator's own points, four in a step: at least as large as here, but for what may lie
             # between two of them.
             column = trajectory.rates[:, 0] if name == "rotor_rate_max" else trajectory.angles[:, 0]
             allowance = float(np.abs(np.diff(column, 2)).max(initial=0.0))

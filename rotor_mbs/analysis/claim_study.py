@@ -19,9 +19,10 @@ HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 SURE = 0.95  # share of the deciding runs from which on a claim holds; 1 - SURE: up to which it fails
 DECIDING = 0.5  # share of the runs that must decide
 RULE = (
-    f"A claim holds where at least {SURE:.0%} of the deciding runs say so for every duration, fails where at most "
-    f"{1 - SURE:.0%} do for every duration, and is undecided otherwise, also where fewer than {DECIDING:.0%} of the "
-    "runs decide. A run that broke off or whose energy rose a thousandfold decides nothing."
+    f"A claim holds where at least {100 * SURE:.0f} % of the deciding runs say so for every duration, fails where at "
+    f"most {100 * (1 - SURE):.0f} % do for every duration, and is undecided otherwise, also where fewer than "
+    f"{100 * DECIDING:.0f} % of the runs decide. A run that broke off or whose energy rose a thousandfold decides "
+    "nothing."
 )
 
 

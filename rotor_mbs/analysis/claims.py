@@ -10,9 +10,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
+from rotor_mbs.analysis.claim_study import HOLDS, ClaimShares
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
+from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.runs.read import StoredRun, StoredScene
-from rotor_mbs.scenario.catalogue import natural_order
 from rotor_mbs.solution.status import GOOD
 from rotor_mbs.solution.trajectory import Array
 
@@ -172,90 +173,86 @@ def claim_holds(item: Published, values: NumberValues) -> bool | None:
     return None if undecided else True
 
 
-# The finding in numbers
+# What came out
 
 # Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a thousandth of that
 # (3e-7 of the scale at most, on the corrected equations).
 ENERGY_RISE = 1e-3
 
 
-@dataclass(frozen=True)
-class Tally:
-    count: int
-    of: int
+class Finding(NamedTuple):
+    """A result with what the equations as printed and the corrected model give; "" where nothing is known."""
+
+    result: str
+    printed: str
+    corrected: str
 
 
-class PrintedEnergy(NamedTuple):
-    """Scenes in which the energy of the printed model rises without work; the largest gain (J) of a complete run."""
+def finding(
+    scenes: Mapping[str, StoredScene], claims: Iterable[Claim], shares: ClaimShares | None = None
+) -> list[Finding]:
+    """How much of the paper is reproduced, and the energy that its equations gain; empty for other scenes.
 
-    rises: Tally
-    gain: float | None
+    shares: claims in words by their shares of many runs, in place of the single stored ones.
+    """
+    evaluated = list(claims)
+    numbers = [claim for claim in evaluated if claim.published.is_number]
+    in_words = [claim for claim in evaluated if not claim.published.is_number]
+    rows = [Finding("Published numbers reproduced", *_counts(numbers))]
+    if shares is None:
+        rows.append(Finding("Published claims that hold", *_counts(in_words)))
+    else:
+        printed, corrected = (f"{shares.count(name)[HOLDS]} of {len(shares.claims)}" for name in shares.methods)
+        rows.append(Finding("Published claims that hold", printed, corrected))
+    runs = [run for scene in scenes.values() if (run := run_selection.printed_run(scene)) is not None]
+    runs = [run for run in runs if "energy_gain_J" in run.attributes]
+    rising = [run for run in runs if run.attributes["energy_gain_J"] > ENERGY_RISE * run.attributes["energy_scale_J"]]
+    if runs:
+        result = f"Scenes in which energy rises by more than {ENERGY_RISE:g} of its scale without work"
+        rows.append(Finding(result, f"{len(rising)} of {len(runs)}", ""))
+    gains = [run.attributes["energy_gain_J"] for run in rising if run.status in GOOD]
+    if gains:
+        rows.append(Finding("Largest spurious energy gain of a complete run", f"{1e-6 * max(gains):.3g} MJ", ""))
+    return [row for row in rows if row.printed or row.corrected]
+
+
+def _counts(claims: Iterable[Claim]) -> tuple[str, str]:
+    """How many hold, of those that are decided: as printed, corrected."""
+    texts = []
+    for results in ([claim.printed for claim in claims], [claim.corrected for claim in claims]):
+        decided = [result.holds for result in results if result.holds is not None]
+        texts.append(f"{sum(decided)} of {len(decided)}" if decided else "")
+    return texts[0], texts[1]
 
 
 class Agreement(NamedTuple):
     """A method's largest errors over its runs that ended well, and its longest run (s).
 
-    defect rad of an interval, angle_error rad up to each horizon, energy_drift relative to the energy scale; None without data.
+    defect rad of an interval, angle_error rad up to each horizon, energy_drift of the energy scale; None without data.
     """
 
     method: str
-    runs: Tally  # ok or completed, of all
+    runs: str  # "16 of 17 ok"; of equations that are not claimed to be correct "completed"
     defect: float | None
     angle_error: float | None
     energy_drift: float | None
     longest_s: float
 
 
-class Finding(NamedTuple):
-    """How much of the paper is reproduced, how well the corrected models agree; None, or empty, without data."""
-
-    numbers: Tally | None
-    numbers_corrected: Tally | None
-    claims_printed: Tally | None
-    energy: PrintedEnergy | None
-    agreement: tuple[Agreement, ...]
-
-
-def finding(scenes: Mapping[str, StoredScene], claims: Iterable[Claim]) -> Finding:
-    """Summarise the runs' stored metrics and the evaluated claims."""
-    evaluated = list(claims)
-    numbers = [claim for claim in evaluated if claim.published.is_number]
-    in_words = [claim for claim in evaluated if not claim.published.is_number]
-    runs = {name: run for name in natural_order(scenes) if (run := run_selection.printed_run(scenes[name])) is not None}
-    gains = {name: run.attributes["energy_gain_J"] for name, run in runs.items() if "energy_gain_J" in run.attributes}
-    energy = None
-    if gains:
-        rising = [name for name in gains if gains[name] > ENERGY_RISE * runs[name].attributes["energy_scale_J"]]
-        largest = max((gains[name] for name in rising if runs[name].status in GOOD), default=None)
-        energy = PrintedEnergy(Tally(len(rising), len(gains)), largest)
-    return Finding(
-        _tally(claim.printed.holds for claim in numbers),
-        _tally(claim.corrected.holds for claim in numbers),
-        _tally(claim.printed.holds for claim in in_words),
-        energy,
-        agreement(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values()),
-    )
-
-
-def _tally(results: Iterable[bool | None]) -> Tally | None:
-    decided = [holds for holds in results if holds is not None]
-    return Tally(sum(decided), len(decided)) if decided else None
-
-
-def agreement(runs: Iterable[StoredRun]) -> tuple[Agreement, ...]:
-    """Return a row for each method, in the order of the catalogue."""
+def agreement(runs: Iterable[StoredRun]) -> list[Agreement]:
+    """A row for each method, in the order of the catalogue."""
     by_method: dict[str, list[StoredRun]] = {}
     for run in runs:
         by_method.setdefault(run.method, []).append(run)
     rows = []
     for method in run_selection.in_catalogue_order(by_method):
         own = by_method[method]
-        good = [run for run in own if run.status in GOOD]
+        ended_well = [run for run in own if run.status in GOOD]
+        count = f"{len(ended_well)} of {len(own)} {'ok' if is_corrected(method) else 'completed'}"
         names = ("defect_max", "angle_error_max", "energy_drift_max")
-        defect, error, drift = (_largest(good, name) for name in names)
-        longest = _largest(own, "run_time_s") or 0.0
-        rows.append(Agreement(method, Tally(len(good), len(own)), defect, error, drift, longest))
-    return tuple(rows)
+        defect, error, drift = (_largest(ended_well, name) for name in names)
+        rows.append(Agreement(method, count, defect, error, drift, _largest(own, "run_time_s") or 0.0))
+    return rows
 
 
 def _largest(runs: Iterable[StoredRun], name: str) -> float | None:

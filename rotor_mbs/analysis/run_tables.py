@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from rotor_mbs.analysis.claim_study import ClaimShares
-from rotor_mbs.analysis.claims import Finding, agreement
+from rotor_mbs.analysis.claims import agreement
 from rotor_mbs.analysis.work_precision import TARGETS_RAD, points, succeeded, time_to_reach
-from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
+from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.runs.records import Record
 from rotor_mbs.solution.text_table import TextTable
@@ -51,8 +50,7 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
     rows = []
     for row in agreement(runs):
         worst = {"defect_max": row.defect, "angle_error_max": row.angle_error, "energy_drift_max": row.energy_drift}
-        word = "ok" if is_corrected(row.method) else "completed"
-        rows.append(run_row(row.method, f"{row.runs.count} of {row.runs.of} {word}", worst, row.longest_s))
+        rows.append(run_row(row.method, row.runs, worst, row.longest_s))
     return TextTable(
         ("method", "runs", "largest defect (rad)", "largest error (rad)", "largest drift", "longest (s)"), rows
     )
@@ -70,28 +68,6 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
     return TextTable(
         ("scene", "method", "ok", "best error (rad)", *(f"s to {target:.0e}" for target in TARGETS_RAD)), rows
     )
-
-
-def finding_lines(facts: Finding, shares: ClaimShares | None) -> list[str]:
-    """The paper's numbers and claims, a line each; claims over many runs where `shares` has them."""
-    lines = []
-    if facts.numbers is not None:
-        corrected = facts.numbers_corrected
-        gives = f"; the corrected ones give {corrected.count or 'none'}" if corrected else ""
-        lines.append(
-            f"published numbers: {facts.numbers.count} of {facts.numbers.of} come out of the printed equations{gives}"
-        )
-    if shares is not None:
-        for method in shares.methods:
-            counts = [f"{n} {_VERBS.get(verdict, verdict)}" for verdict, n in shares.count(method).items() if n]
-            lines.append(f"claims in words, {method}: {', '.join(counts)}")
-    elif facts.claims_printed is not None:
-        tally = facts.claims_printed
-        lines.append(f"claims in words: {tally.count} of {tally.of} hold in the printed equations")
-    if facts.energy is not None:
-        rises = facts.energy.rises
-        lines.append(f"energy gained without work by the printed equations: in {rises.count} of {rises.of} scenes")
-    return lines
 
 
 def _short(value: object) -> str:

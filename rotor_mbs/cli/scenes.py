@@ -5,23 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict, dataclass, field, fields
-from typing import TYPE_CHECKING
 
+from rotor_mbs.cli.terminal import print_doubts
 from rotor_mbs.errors import InputError, MethodRefusal
-from rotor_mbs.methods.base import BuiltItem
-from rotor_mbs.methods.catalogue import methods
+from rotor_mbs.methods.base import BuiltItem, Method
+from rotor_mbs.methods.catalogue import look_up, methods
 from rotor_mbs.scenario.catalogue import list_scenes, list_sweeps, only_scene
-from rotor_mbs.scenario.scene import Scene, scene_fields
-
-if TYPE_CHECKING:
-    from rotor_mbs.methods.base import Method
-    from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.scene import Scene, new_scene_text, scene_fields
 
 
 def list_all(arguments: argparse.Namespace) -> int:
     """Name and title of every shipped scene and sweep, name and label of every method."""
-    from rotor_mbs.methods.catalogue import methods
-
     scenes, sweeps = list_scenes(), list_sweeps()
     labels = [(method.name, method.label) for method in methods()]
     if arguments.json:
@@ -42,8 +36,6 @@ def list_all(arguments: argparse.Namespace) -> int:
 
 def new(arguments: argparse.Namespace) -> int:
     """A commented scene file; never in the place of another file."""
-    from rotor_mbs.scenario.scene import new_scene_text
-
     if arguments.file.suffix != ".toml":
         raise InputError(f"{arguments.file}: is not a TOML file's name; allowed: a name that ends in .toml")
     try:
@@ -59,8 +51,6 @@ def new(arguments: argparse.Namespace) -> int:
 
 def show(arguments: argparse.Namespace) -> int:
     """One scene's data and the methods of each model, with --build its items; or the settings of a method."""
-    from rotor_mbs.methods.catalogue import look_up
-
     method = look_up(arguments.scene)
     if method is None:
         _show_scene(only_scene(arguments.scene), arguments)
@@ -83,9 +73,6 @@ def _show_method(method: Method, arguments: argparse.Namespace) -> None:
 
 
 def _show_scene(scene: Scene, arguments: argparse.Namespace) -> None:
-    from rotor_mbs.cli.scenes import models_of, scene_data
-    from rotor_mbs.cli.terminal import print_doubts
-
     data, models = scene_data(scene), models_of(scene)
     if arguments.json:
         facts = {"name": scene.name, "scene": data, "models": {model.name: asdict(model) for model in models}}

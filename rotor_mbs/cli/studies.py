@@ -15,7 +15,7 @@ from pathlib import Path
 
 from rotor_mbs.cli.arguments import pages_beside
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.runs import cores
 from rotor_mbs.runs.files import replace_file
@@ -97,6 +97,7 @@ def modes(arguments: argparse.Namespace) -> int:
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
     from rotor_mbs.report.pages import check as formats
+    from rotor_mbs.runs.read import is_sweep
     from rotor_mbs.scenario.accuracy_bounds import load_bounds
     from rotor_mbs.studies import check as study
 

@@ -7,22 +7,28 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rotor_mbs.analysis import published, run_selection
-from rotor_mbs.analysis.campbell import read_modes
 from rotor_mbs.analysis.claim_study import claim_study
 from rotor_mbs.analysis.claims import claims
+from rotor_mbs.analysis.stability import suite_runs
 from rotor_mbs.analysis.work_precision import by_scene
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core import files
 from rotor_mbs.report.core.files import Site, page_names, render
+from rotor_mbs.report.data_comparison import stored_comparison_page
+from rotor_mbs.report.mode_study import stored_modes_page
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.bench import bench_pages
+from rotor_mbs.report.pages.check import check_page
 from rotor_mbs.report.pages.errata import errata_page
-from rotor_mbs.report.pages.figures import PaperFigure, available, figures_page, walk_figure
+from rotor_mbs.report.pages.figures import available, figures_page, walk_figure
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.scene import scene_page
-from rotor_mbs.report.pages.stability import is_stability_suite, stability_pages
+from rotor_mbs.report.pages.stability import is_stability_suite, stability_page
+from rotor_mbs.report.pages.sweep import sweep_page
 from rotor_mbs.runs.pool import Workers, pool_of, run_in
 from rotor_mbs.runs.read import OpenResults, is_sweep, open_results
 from rotor_mbs.runs.records import Record, read_records
@@ -53,8 +59,6 @@ def write_report(
         Where the file cannot be read or has nothing to report, or the folder cannot be written.
     """
     if is_sweep(results):
-        from rotor_mbs.report.pages.sweep import sweep_page  # late, as below: workers load what most files need
-
         return files.write_page(output, "sweep", sweep_page(StoredSweep(results)))
     with open_results(results) as opened:
         pages = _pages(opened, jobs, on_page, checked)
@@ -67,20 +71,21 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
     modes, bench, compared = (read_records(opened.path, kind) for kind in ("modes", "bench", "comparison"))
     has_runs = any(scene.methods for scene in opened.scenes.values()) or not (modes or bench or compared)
     is_suite = has_runs and is_stability_suite(opened)
-    figures = available(opened.scenes) if has_runs and not is_suite else ()
+    is_usual = has_runs and not is_suite
+    figures = available(opened.scenes) if is_usual else ()
+    printed = {run_selection.PRINTED, *errata_methods().values()}
+    data_files = [f"data--{i + 1}.html" if i else files.COMPARISON for i in range(len(compared))]
     labels: dict[str, str] = {}
     if has_runs:
         labels[files.INDEX] = "Stability suite" if is_suite else "Overview"
     if figures:
         labels[files.FIGURES] = "The paper's figures"
-    printed = {run_selection.PRINTED, *errata_methods().values()}
-    if has_runs and not is_suite and any(printed & {*scene.runs} for scene in opened.scenes.values()):
+    if is_usual and any(printed & {*scene.runs} for scene in opened.scenes.values()):
         labels[files.ERRATA] = "Errata"
     if bench:
         labels[files.BENCH] = "Error against run time"
     if modes:
         labels[files.MODES] = "Modes"
-    data_files = [f"data--{i + 1}.html" if i else files.COMPARISON for i in range(len(compared))]
     for file, record in zip(data_files, compared, strict=True):
         labels[file] = f"Data against {record.scene}"
     if has_runs and checked:
@@ -88,43 +93,49 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
     names = {file: file for file in labels}
     names[next(iter(labels))] = files.INDEX
     site = [(names[file], label) for file, label in labels.items()]
-    pages: dict[str, str] = {}
-    if is_suite:
-        pages |= stability_pages(opened, files.INDEX, site)
-    elif has_runs:
-        pages |= _run_pages(opened, site, figures, bench, jobs, on_page)
-    if bench and names[files.BENCH] not in pages:
-        pages |= bench_pages(names[files.BENCH], site, opened)
+
+    tasks: list[Task] = []
+    context = Context({})
+    if has_runs:
+        if not opened.scenes:
+            raise StoreError(f"{opened.path}: no scene in it, nothing to report")
+        context = _context(opened, bench, is_suite=is_suite, has_errata=files.ERRATA in labels)
+        template, content = ("stability", stability_page) if is_suite else ("index", index_page)
+        tasks += [partial(walk_figure, figure, context) for figure in figures]
+        tasks.append(partial(_page, template, files.INDEX, site, partial(content, context)))
+        for scene, file in context.files.items():
+            tasks.append(partial(_page, "scene", file, site, partial(scene_page, scene, context)))
+    if files.ERRATA in labels:
+        tasks.append(partial(_page, "errata", files.ERRATA, site, partial(errata_page, context)))
+    if bench:
+        tasks.append(partial(bench_pages, names[files.BENCH], site))
     if modes:
-        from rotor_mbs.report.mode_study import modes_page
-
-        page = modes_page(list(read_modes(opened.path).values()))
-        pages[names[files.MODES]] = render("modes", page, site, names[files.MODES])
-    for file, record in zip(data_files, compared, strict=True):
-        from rotor_mbs.report.data_comparison import comparison_page
-
-        pages[names[file]] = render("data_comparison", comparison_page(record), site, names[file])
-    if has_runs and checked:
-        from rotor_mbs.report.pages.check import check_page
-
-        pages[files.CHECK] = render("check", check_page(opened.path), site, files.CHECK)
+        tasks.append(partial(_page, "modes", names[files.MODES], site, stored_modes_page))
+    for place, file in enumerate(data_files):
+        tasks.append(partial(_page, "data_comparison", names[file], site, partial(stored_comparison_page, place)))
+    if files.CHECK in labels:
+        tasks.append(partial(_page, "check", files.CHECK, site, check_page))
+    made = _made(opened.path, tasks, jobs, on_page)
+    pages: dict[str, str] = {}
+    for part in made[len(figures) :]:
+        pages |= part
+    if figures:
+        page = figures_page(made[: len(figures)], opened.scenes)
+        pages[files.FIGURES] = render("figures", page, site, files.FIGURES)
     return pages
 
 
-def _run_pages(
-    opened: OpenResults,
-    site: Site,
-    figures: Sequence[PaperFigure],
-    bench: Sequence[Record],
-    jobs: Workers,
-    on_page: OnPage,
-) -> dict[str, str]:
-    """The index, figures, errata, error against run time, and a page per scene, made in `jobs` processes."""
-    if not opened.scenes:
-        raise StoreError(f"{opened.path}: no scene in it, nothing to report")
+def _context(opened: OpenResults, bench: Sequence[Record], *, is_suite: bool, has_errata: bool) -> Context:
+    if is_suite:
+        runs = suite_runs(opened.path)
+        ladders = [
+            record
+            for record in read_records(opened.path, "stability")
+            if np.isfinite(record.arrays["angle_error_max"]).any()
+        ]
+        return Context(page_names(dict.fromkeys(run.scene for run in runs)), suite_runs=runs, ladders=ladders)
     decided = claims(opened.scenes)
-    has_errata = any(file == files.ERRATA for file, _ in site)
-    context = Context(
+    return Context(
         page_names(opened.scenes),
         decided,
         published.conditions() if decided else {},
@@ -132,32 +143,22 @@ def _run_pages(
         by_scene(bench),
         published.errata() if has_errata else (),
     )
-    tasks: list[Task] = [partial(walk_figure, figure, context) for figure in figures]
-    tasks.append(partial(_page, "index", files.INDEX, site, partial(index_page, context)))
-    if has_errata:
-        tasks.append(partial(_page, "errata", files.ERRATA, site, partial(errata_page, context)))
-    if bench:
-        tasks.append(partial(bench_pages, files.BENCH, site))
-    for scene, file in context.files.items():
-        tasks.append(partial(_page, "scene", file, site, partial(scene_page, scene, context)))
+
+
+def _made(path: Path, tasks: Sequence[Task], jobs: Workers, on_page: OnPage) -> list[Any]:
+    """What each task makes, in `jobs` processes."""
     made: dict[int, Any] = {}
     on_page(0, len(tasks))
     with pool_of(0 if jobs == 1 else jobs) as pool:
         # More groups of pages than workers, so that none waits long for the last one; each group opens the file.
         count = min(_GROUPS * pool.workers, len(tasks)) if pool.workers > 1 else 1
         groups = [dict(list(enumerate(tasks))[start::count]) for start in range(count)]
-        for finished in run_in(pool, partial(make_parts, opened.path), groups, _TIMEOUT_S):
+        for finished in run_in(pool, partial(make_parts, path), groups, _TIMEOUT_S):
             if finished.value is None:
-                raise finished.error or StoreError(f"{opened.path}: a page was not made: {finished.message}")
+                raise finished.error or StoreError(f"{path}: a page was not made: {finished.message}")
             made |= finished.value
             on_page(len(made), len(tasks))
-    pages: dict[str, str] = {}
-    for i in range(len(figures), len(tasks)):
-        pages |= made[i]
-    if figures:
-        page = figures_page([made[i] for i in range(len(figures))], opened.scenes)
-        pages[files.FIGURES] = render("figures", page, site, files.FIGURES)
-    return pages
+    return [made[i] for i in range(len(tasks))]
 
 
 def make_parts(results: Path, tasks: dict[int, Task]) -> dict[int, Any]:

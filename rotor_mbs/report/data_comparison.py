@@ -25,7 +25,8 @@ from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
 from rotor_mbs.report.core.numbers import number, power, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import Series
-from rotor_mbs.runs.records import Record, write_records
+from rotor_mbs.runs.read import OpenResults
+from rotor_mbs.runs.records import Record, read_records, write_records
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.solution import need_xarray
@@ -154,6 +155,11 @@ class DataComparison:
         )
 
 
+def stored_comparison_page(place: int, opened: OpenResults) -> dict[str, object]:
+    """The content of the page of the comparison at this place of a results file."""
+    return comparison_page(read_records(opened.path, "comparison")[place])
+
+
 def comparison_page(record: Record) -> dict[str, object]:
     """The content of the page: verdict, pictures, tables."""
     verdict = verdict_of(record)
@@ -190,7 +196,7 @@ def comparison_page(record: Record) -> dict[str, object]:
         "source": Path(verdict.source).name,
         "facts": facts,
         "errors": Section(_pictures(record, verdict), legend),
-        "channels": Section(tables=[PageTable("", head, rows, range(1, len(head)))]),
+        "channels": Section(tables=[PageTable("", head, rows)]),
     }
 
 

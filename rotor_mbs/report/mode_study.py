@@ -12,7 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.campbell import LinearModes, SceneModes, floquet_sentence, linear_dataset, mode_rows, to_records
+from rotor_mbs.analysis.campbell import (
+    LinearModes,
+    SceneModes,
+    floquet_sentence,
+    linear_dataset,
+    mode_rows,
+    read_modes,
+    to_records,
+)
 from rotor_mbs.analysis.modes import GROWTH, multiblade
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
@@ -22,6 +30,8 @@ from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.core.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
 from rotor_mbs.report.core.numbers import NOTHING, number
 from rotor_mbs.report.core.svg import picture
+from rotor_mbs.report.pages.scene_tables import versions
+from rotor_mbs.runs.read import OpenResults
 from rotor_mbs.runs.records import write_records
 from rotor_mbs.scenario.catalogue import scene_of
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -30,8 +40,6 @@ from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.modes import compute_modes
 
 SPEED_AXIS = "rotor speed (rad/s)"
-# Multiples of the rotor speed drawn as lines: gravity acts once a turn, a tower or yaw error on each blade in turn.
-_HARMONICS = (1, 2, 3, 6)
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 # Growth over a turn beyond which the colours of the chart end.
 MAX_GROWTH = 1e3
@@ -125,9 +133,11 @@ class ModePlots:
         frequencies, speeds = modes.damped_frequencies, modes.speeds
         top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
         apart = float(speeds[-1]) > 0.05 * top  # else the labels would lie on each other
-        for k in _HARMONICS:
+        # Gravity acts once a turn, a tower or a yaw error on each blade in turn.
+        harmonics = sorted({1, 2, modes.blades, 2 * modes.blades})
+        for k in harmonics:
             panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")
-            if apart or k == _HARMONICS[-1]:
+            if apart or k == harmonics[-1]:
                 end = min(float(speeds[-1]), top / k)
                 panel.axes[0].text(end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
         for k, known in enumerate(frequencies.T):
@@ -195,9 +205,14 @@ def mode_look(index: int) -> Look:
     return replace(coordinate_look(index), marker=_MARKS[index % len(_MARKS)])
 
 
+def stored_modes_page(opened: OpenResults) -> dict[str, object]:
+    """The content of the page, from a results file."""
+    return modes_page(list(read_modes(opened.path).values())) | {"versions": versions(opened.attributes)}
+
+
 def modes_page(modes: Sequence[SceneModes]) -> dict[str, object]:
     """The content of the page: a part for each scene, of which each id is unique on the page."""
-    return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)]}
+    return {"scenes": [_scene_part(scene_modes, f"scene{i}") for i, scene_modes in enumerate(modes)], "versions": []}
 
 
 def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
@@ -237,7 +252,7 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
             numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
             rows.append([number(speed, 4), cell, *(_shown(float(values[i]), digits) for values, digits in numbers)])
         head = ("Speed (rad/s)", "largest multiplier", "growth rate (1/s)", "product less trace", "torque (N m)")
-        multiplier_tables = [PageTable(f"{modes.scene}: multipliers", head, rows, (0, 1, 2, 3, 4))]
+        multiplier_tables = [PageTable(f"{modes.scene}: multipliers", head, rows)]
     return {
         "id": name,
         "name": modes.scene,
@@ -272,9 +287,9 @@ def _tables(linear: LinearModes, i: int, state: str) -> list[PageTable]:
         largest = max(float(amplitudes.max()), 1e-300)
         shapes.append([name, *(_shown(float(amplitude) / largest, 3) for amplitude in amplitudes)])
     caption = f"{state}: modes by the {linear.label} ({linear.source})"
-    table = PageTable(caption, ("Mode", *columns), frequencies, range(1, 1 + len(columns))).without_empty_columns()
+    table = PageTable(caption, ("Mode", *columns), frequencies)
     head = ("Shape", "rotor", *multiblade(linear.blades)[0])
-    return [table, PageTable(f"{state}: shapes, the largest amplitude 1", head, shapes, range(1, len(head)))]
+    return [table, PageTable(f"{state}: shapes, the largest amplitude 1", head, shapes)]
 
 
 def _shown(value: float, digits: int) -> str:

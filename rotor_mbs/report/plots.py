@@ -18,7 +18,7 @@ from rotor_mbs.solution.trajectory import Array
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
 # Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double of order one.
 LOWEST = 1e-18
-_HIGHEST = 1e4
+HIGHEST = 1e4
 # Values larger than this many times the 90 % quantile are cut off.
 _RUNAWAY = 8.0
 _STILL = 10.0  # times what it is in the last samples, at most, where it has not passed
@@ -98,7 +98,7 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, *
             intervals = np.array_split(np.arange(len(time)), _BINS)
             index = [interval[np.abs(values[interval]).argmax()] for interval in intervals]
             time, values = time[index], values[index]
-        sizes = np.where(np.abs(values) > LOWEST, np.minimum(np.abs(values), np.inf if signed else _HIGHEST), np.nan)
+        sizes = np.where(np.abs(values) > LOWEST, np.minimum(np.abs(values), np.inf if signed else HIGHEST), np.nan)
         first, step = len(time) // 30, max(1, len(time) // 8)
         canvas.curve(axes, time, sizes, curve.look, 1.0 if curve.look.marker else 1.8, markevery=(first, step))
         if signed:
@@ -110,22 +110,6 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, *
     axes.set_ylabel(label)
     if series:
         mark_time(axes, float(series[0].time[-1]), horizon)
-    return panels
-
-
-def error_over_step(series: Sequence[tuple[Array, Array, Look]], target: float) -> Panels:
-    """Error (rad) over the fixed step (s), both axes logarithmic, with a line at `target`."""
-    panels = canvas.panels((2.8,), "step (s)")
-    axes, known = panels.axes[0], [1e-8, 1e-6]
-    for steps, values, look in series:
-        shown = np.clip(values, LOWEST, _HIGHEST)
-        known += [float(np.nanmin(shown)), float(np.nanmax(shown))]
-        canvas.curve(axes, steps, shown, look)
-    every_step = np.concatenate([steps for steps, _, _ in series])
-    canvas.log_axis(axes, every_step.min(), every_step.max(), "x")
-    canvas.log_axis(axes, min(known), max(known))
-    axes.axhline(target, color=GREY, linewidth=0.8, linestyle=":")
-    axes.set_ylabel("largest angle error (rad)")
     return panels
 
 

@@ -10,8 +10,8 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
-from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, coordinate_look, label_of, look_of
-from rotor_mbs.report.pages.quantities import components
+from rotor_mbs.report.core.looks import BLUE, INK, VERMILLION, Look, label_of, look_of
+from rotor_mbs.report.pages.quantities import component_panels
 from rotor_mbs.report.plots import Series
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import LOADS
@@ -52,13 +52,7 @@ class RunPlots:
         values, load = _quantity(self._run, name), next((load for load in LOADS if load.name == name), None)
         if load is None or load.plot is None:
             raise InputError(f"no load {name!r}; allowed: {', '.join(load.name for load in LOADS)}")
-        looks = {}
-        rows: dict[str, list[Series]] = {}
-        for part in components(load, values):
-            looks[part.label] = coordinate_look(part.place)
-            label = f"{part.group} {load.plot.axis}".strip()
-            rows.setdefault(label, []).append(Series(self._run.time, part.values, looks[part.label]))
-        panels = plots.lines(list(rows.items()), height=1.6)
+        panels, looks = component_panels(load, load.plot, self._run.time, values)
         canvas.legend(panels.axes[0], list(looks.items()))
         return panels
 

@@ -153,7 +153,7 @@ def members(group: Any) -> Iterator[tuple[str, Any]]:
 
 def member(group: Any, name: str) -> Any:
     """A member of a group. Raises KeyError where there is none, StoreError at a link."""
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+    if is_link(group, name):
         raise StoreError(
             f"{group.file.filename}: {group.name}/{name} is a link; allowed: groups and arrays of this file"
         )
@@ -266,13 +266,14 @@ def dimensions_of(dataset: Any) -> list[str]:
 
 
 def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
-    """A group and every one below it. Raises StoreError at a link, and at a second name of a group."""
+    """A group and every one below it, but for those below a table. Raises StoreError at a link, and at a second name of
+    a group."""
     seen = set() if seen is None else seen
     if group in seen:
         raise StoreError(f"{group.file.filename}: {group.name} is another name of a group; allowed: one name of each")
     seen.add(group)
     yield group
-    for _, item in members(group):
+    for _, item in () if "run" in group else members(group):
         if is_group(item):
             yield from groups_in(item, seen)
 
@@ -393,13 +394,6 @@ def _of_array(values: NDArray[Any]) -> Any:
     return digest
 
 
-def dataset_digest(values: NDArray[Any], attributes: Mapping[str, Any]) -> str:
-    """Over values, units, long name and further attributes."""
-    digest = _of_array(values)
-    digest.update(attributes_digest(attributes).encode())
-    return str(digest.hexdigest())
-
-
 def attributes_digest(attributes: Mapping[str, Any]) -> str:
     """Over names and values, in any order."""
     covered = {name: plain(attributes[name]) for name in attributes if name not in _NOT_COVERED}
@@ -411,15 +405,18 @@ def seal(group: Any, later: Collection[str] = ()) -> None:
     sums = {ATTRIBUTES: attributes_digest(group.attrs)}
     for name, item in group.items():
         if name in later:
-            sums[label_of(name)] = attributes_digest(item.attrs)
+            sums[f"{_COMPUTED}{name}"] = attributes_digest(item.attrs)
         elif not is_group(item) and not is_dimension_only(item):
             sums[name] = _digest_of(item)
     group.attrs[DIGESTS] = json.dumps(sums)
 
 
 def _digest_of(dataset: Any) -> str:
+    """Over values, units, long name and further attributes."""
     values = texts_of(dataset) if is_text(dataset) else values_of(dataset)
-    return dataset_digest(values, dataset.attrs)
+    digest = _of_array(values)
+    digest.update(attributes_digest(dataset.attrs).encode())
+    return str(digest.hexdigest())
 
 
 def seal_all(group: Any) -> None:
@@ -445,8 +442,8 @@ def damages_of(group: Any, *, with_columns: bool = True) -> list[str]:
         return [DIGESTS]
     sums = {ATTRIBUTES: attributes_digest(group.attrs)}
     for name in group:
-        is_computed = label_of(name) in known
-        label = label_of(name) if is_computed else name
+        is_computed = f"{_COMPUTED}{name}" in known
+        label = f"{_COMPUTED}{name}" if is_computed else name
         if is_computed and not with_columns and not is_link(group, name):
             sums[label] = known[label]
             continue
@@ -466,11 +463,6 @@ def stored_digests(attributes: Mapping[str, Any]) -> dict[str, str]:
     if not isinstance(found, dict):
         raise ValueError("no object of digests")
     return found
-
-
-def label_of(name: str) -> str:
-    """What the digest of a dataset's attributes alone is called."""
-    return f"{_COMPUTED}{name}"
 
 
 def computed_in(digests: Mapping[str, str]) -> list[str]:

@@ -20,102 +20,35 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, Column
+from rotor_mbs.runs.files import Column
 from rotor_mbs.runs.results import TableFile
-from rotor_mbs.runs.table import CHARACTER, MISSING, Place, Rows, Table, blank_rows, characters, text_of
+from rotor_mbs.runs.table import COLUMNS, MISSING, Place, Rows, Table, blank_rows, characters, known_columns, text_of
 from rotor_mbs.solution.status import STATUSES, code_of
 
 _MESSAGE_LENGTH = 300
 
 
-def _column(units: str, long_name: str, kind: str = "<f8") -> Column:
-    return Column(("run",), units, long_name, kind)
-
-
-_MESSAGE = Column(("run", CHARACTERS), "1", "why it did not end well", CHARACTER)
-_STATUS = _column("1", "how the run ended, from its state; -1 while it is missing", "i1")
-_CHECKSUM = _column("1", "CRC-32 of the row in all computed columns", "<u4")
-_ERRORS = {
-    "angle_error_max": _column("rad", "largest angle error up to the horizon"),
-    "angle_error_end": _column("rad", "angle error at the last sample"),
-    "tip_error_max": _column("m", "largest distance of a tip from the reference up to the horizon"),
-    "energy_drift_max": _column("1", "largest energy error over the run, of the energy scale"),
-}
-_FALSE = _column("1", "1 where the engine reported success and the state says otherwise", "i1")
-
 # The computed columns of each table of points.
-COLUMNS: Mapping[str, Mapping[str, Column]] = {
-    "bench": {
-        "status": _STATUS,
-        "message": _MESSAGE,
-        **_ERRORS,
-        "run_time_s": _column("s", "median run time of the integration alone"),
-        "run_time_min_s": _column("s", "shortest run time"),
-        "run_time_q1_s": _column("s", "lower quartile of the run times"),
-        "run_time_q3_s": _column("s", "upper quartile of the run times"),
-        "setup_time_s": _column("s", "building the model, everything compiled anew"),
-        "setup_again_time_s": _column("s", "building the model a second time"),
-        "output_time_s": _column("s", "reading out and computing the samples"),
-        "repeats": _column("1", "timed runs", "<i8"),
-        "steps": _column("1", "steps of one run", "<i8"),
-        "false_success": _FALSE,
-        "left_out": _column("1", "1 where the time budget left the point out", "i1"),
-        "horizon_s": _column("s", "horizon of the scene"),
-        "uncertainty_rad": _column("rad", "uncertainty of the reference up to the horizon"),
-        "samples": _column("1", "samples at which errors are taken", "<i8"),
-        "load_before": _column("1", "load of the machine before the scene was timed"),
-        "pinned_core": _column("1", "core that the runs were timed on, -1 for any", "<i8"),
-        "repeatable": _column("1", "1 where the last run of every point of the curve was bit for bit its first", "i1"),
-        "order": _column("1", "order of convergence of the curve, fitted above its round-off floor"),
-        "crc32": _CHECKSUM,
-    },
-    "stability": {
-        "status": _STATUS,
-        "message": _MESSAGE,
-        "angle_error_max": _ERRORS["angle_error_max"],
-        "energy_drift_max": _ERRORS["energy_drift_max"],
-        "false_success": _FALSE,
-        "step_for_target_s": _column("s", "step at which the ladder reaches 1e-6 rad"),
-        "crc32": _CHECKSUM,
-    },
-    "stability_limits": {
-        "status": _STATUS,
-        "message": _MESSAGE,
-        "largest_stable_step_s": _column("s", "largest stable step, by bisection"),
-        "theory_s": _column("s", "largest stable step by the stability function"),
-        "fastest_mode_per_s": _column("1/s", "largest eigenvalue of the pitches"),
-        "mode_damping_ratio": _column("1", "damping ratio of the fastest mode"),
-        "crc32": _CHECKSUM,
-    },
-    "symmetry": {
-        "status": _STATUS,
-        "message": _MESSAGE,
-        "mirror_error": _column("rad", "error of the mirrored scene's motion"),
-        "relabelling_error": _column("rad", "error of the motion with renumbered blades"),
-        "reversal_error": _column("rad", "error at the start after going there and back"),
-        "angular_momentum_drift": _column("1", "relative change of the angular momentum about the shaft"),
-        "crc32": _CHECKSUM,
-    },
+POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
+    table: {name: COLUMNS[name] for name in names.split()}
+    for table, names in {
+        "bench": "status message angle_error_max angle_error_end tip_error_max energy_drift_max defect_max "
+        "defect_median run_time_s run_time_min_s run_time_q1_s run_time_q3_s setup_time_s setup_again_time_s output_time_s repeats steps "
+        "false_success left_out horizon_s uncertainty_rad samples load_before pinned_core repeatable order crc32",
+        "stability": "status message angle_error_max energy_drift_max false_success step_for_target_s crc32",
+        "stability_limits": "status message largest_stable_step_s theory_s fastest_mode_per_s mode_damping_ratio crc32",
+        "symmetry": "status message mirror_error relabelling_error reversal_error angular_momentum_drift crc32",
+    }.items()
 }
-_KNOWN = {
-    "scene": "scene",
-    "method_name": "method, model/integrator",
-    "curve": "method with its fixed choices",
-    "setting_kind": "what varies along the curve",
-    "settings": "settings of the point, JSON",
-    "options": "of the study, JSON",
-    "versions": "versions of what computed the point, JSON",
-    "scene_hash": "SHA-256 of the scene's numbers",
-}
-_UNITS = {"step": ("s", "fixed step"), "tolerance": ("1", "tolerance"), "order_expected": ("1", "order of the method")}
+_NUMBERS = ("step", "tolerance", "order_expected")  # that the design says of a point
 
 
 @dataclass(frozen=True)
 class Record:
     """A curve of a bench, a ladder of steps, or another group of arrays that belong together.
 
-    kind: a key of `COLUMNS`, "modes" or "comparison". name: the method, "lagrange/taylor"; of a bench with its fixed
-    choices behind, where they are not the default ones. arrays: (rows,) by name; `status` as codes of
+    kind: a key of `POINT_COLUMNS`, "modes" or "comparison". name: the method, "lagrange/taylor"; of a bench with its
+    fixed choices behind, where they are not the default ones. arrays: (rows,) by name; `status` as codes of
     `solution.status.STATUSES`. columns: what the arrays are, scales first; of groups of arrays alone.
     """
 
@@ -145,16 +78,8 @@ class Record:
 
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
     """The table `group` of these points: of each the known columns by name."""
-    known: dict[str, tuple[Column, Any]] = {
-        name: (Column(("run",), "1", long_name), [str(point[name]) for point in points])
-        for name, long_name in _KNOWN.items()
-        if points and name in points[0]
-    }
-    for name, (units, long_name) in _UNITS.items():
-        if points and name in points[0]:
-            known[name] = Column(("run",), units, long_name), np.array([float(str(point[name])) for point in points])
-    scales = {CHARACTERS: (Column((CHARACTERS,), "1", ""), np.empty(_MESSAGE_LENGTH, np.int8))}
-    return Table(group, [str(point["run"]) for point in points], known, COLUMNS[group], scales)
+    runs = [str(point["run"]) for point in points]
+    return Table(group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH)
 
 
 def row_of_point(place: Place, status: str, message: str, values: Mapping[str, object]) -> Rows:
@@ -171,7 +96,7 @@ def read_records(path: Path, *kinds: str) -> list[Record]:
     """The records of these kinds, in the order of the file; no curve of which a point is missing. Raises StoreError."""
     with files.open_file(path) as file, files.reading(path):
         there = [kind for kind in kinds if kind in file]
-        tables = [kind for kind in there if kind in COLUMNS]
+        tables = [kind for kind in there if kind in POINT_COLUMNS]
         groups = [record for kind in there if kind not in tables for record in _group_records(file, kind)]
         has_points = {kind for kind in tables if "run" in file[kind]}
     if not has_points:
@@ -201,7 +126,7 @@ def _point_records(file: TableFile, kind: str) -> Iterator[Record]:
         known = points[0]
         arrays = {column: np.array([row[column] for row in values]) for column in values[0]}
         messages = [text_of(text) for text in arrays.pop("message")]
-        arrays |= {column: np.array([row[column] for row in points]) for column in _UNITS if column in known}
+        arrays |= {column: np.array([row[column] for row in points]) for column in _NUMBERS if column in known}
         setting_kind = str(known.get("setting_kind", "step"))
         if setting_kind in arrays:
             arrays["setting"] = arrays[setting_kind]

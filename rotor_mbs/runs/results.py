@@ -21,12 +21,23 @@ import numpy as np
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
 from rotor_mbs.runs import files, table
-from rotor_mbs.runs.files import CHARACTERS, KEYWORDS, Column
-from rotor_mbs.runs.table import STATUS_REPEATED, Place, Rows, StoredTable, Table, blank_rows, characters, text_of
+from rotor_mbs.runs.files import KEYWORDS, Column
+from rotor_mbs.runs.table import (
+    COLUMNS,
+    STATUS_REPEATED,
+    Place,
+    Rows,
+    StoredTable,
+    Table,
+    blank_rows,
+    characters,
+    known_columns,
+    text_of,
+)
 from rotor_mbs.runs.versions import machine, row_versions, versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.solution.quantities import LOADS, SCALES, quantities, scale_values
+from rotor_mbs.solution.quantities import LOADS, quantities
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES, code_of
 
@@ -38,58 +49,17 @@ _OF_REFERENCE = ("angle_uncertainty", "error_growth")  # stored once a scene, ov
 OF_METHODS = {"angle_uncertainty": "own_uncertainty"}
 _TEXT_LENGTH = 600  # characters of a message
 
-_COMPUTED = {
-    "status": Column(("run",), "1", "how the run ended, from its state; -1 while it is missing", "i1"),
-    "message": Column(("run", CHARACTERS), "1", "why the run did not end well", table.CHARACTER),
-    "samples": Column(("run",), "1", "finite samples", "<i8"),
-    "time_reached": Column(("run",), "s", "time of the last sample"),
-    "time_limit_s": Column(("run",), "s", "time limit that ended the run, NaN where none did"),
-    "steps": Column(("run",), "1", "integration steps, -1 where not known", "<i8"),
-    "rhs_evaluations": Column(("run",), "1", "evaluations of the right-hand side, -1 where not known", "<i8"),
-    "setup_time_s": Column(("run",), "s", "building the model"),
-    "run_time_s": Column(("run",), "s", "median run time of the integration alone"),
-    "run_time_min_s": Column(("run",), "s", "shortest run time"),
-    "output_time_s": Column(("run",), "s", "reading out and computing the samples"),
-    "repeats": Column(("run",), "1", "timed runs", "<i8"),
-    "engine_success": Column(("run",), "1", "1 where the engine reported success, -1 where there is no report", "i1"),
-    "engine_message": Column(("run", CHARACTERS), "1", "what the engine reported", table.CHARACTER),
-    "false_success": Column(("run",), "1", "1 where the engine reported success and the state says otherwise", "i1"),
-    "energy_scale_J": Column(("run",), "J", "what energy errors are relative to"),
-    "energy_drift_max": Column(("run",), "1", "largest energy error over the run, of the energy scale"),
-    "energy_gain_J": Column(("run",), "J", "largest energy gained without work"),
-    "defect_max": Column(("run",), "rad", "largest defect of an interval between samples"),
-    "defect_median": Column(("run",), "rad", "median of the intervals' defects"),
-    "defect_time": Column(("run",), "s", "end of the interval of the largest defect"),
-    "defect_mean": Column(("run",), "rad", "signed mean of the defects, of the coordinate where it is largest"),
-    "defect_drift": Column(("run",), "rad", "largest sum of the defects of 100 intervals, each carried to their end"),
-    "defect_floor": Column(("run",), "rad", "what the rounding of the samples may make of a defect"),
-    "defects_not_judged": Column(("run",), "1", "intervals in which an error may grow by more than 1e5"),
-    "angle_error_max": Column(("run",), "rad", "largest angle error up to the horizon"),
-    "angle_error_predicted": Column(
-        ("run",), "rad", "largest angle error up to the horizon, predicted from the defects"
-    ),
-    "angle_error_whole": Column(("run",), "rad", "largest angle error over the run"),
-    "angle_error_end": Column(("run",), "rad", "angle error at the last sample"),
-    "horizon_s": Column(("run",), "s", "last sample before the error growth reaches 1e5, or the end"),
-    "angular_impulse_error_max": Column(("run",), "1", "error of the angular momentum balance, of its scale"),
-    "linear_impulse_error_max": Column(("run",), "1", "error of the linear momentum balance, of its scale"),
-    "zero_pitch_max": Column(("run",), "rad", "largest angle of a pitch that is zero in the reference"),
-    "zero_pitch_left_s": Column(("run",), "s", "when such a pitch left zero"),
-    "zero_pitch_growth_per_s": Column(("run",), "1/s", "growth rate of such a pitch"),
-    "rotor_angle_min": Column(("run",), "rad", "smallest rotor angle, at the integrator's own output points"),
-    "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, at the integrator's own output points"),
-    "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate either way, at the integrator's own output points"),
-}
+_RUN_COLUMNS = (
+    "status", "message", "samples", "time_reached", "time_limit_s", "steps", "rhs_evaluations", "setup_time_s",
+    "run_time_s", "run_time_min_s", "output_time_s", "repeats", "engine_success", "engine_message", "false_success",
+    "energy_scale_J", "energy_drift_max", "energy_gain_J", "defect_max", "defect_median", "defect_time",
+    "defect_mean", "defect_drift", "defect_floor", "defects_not_judged", "angle_error_max", "angle_error_predicted",
+    "angle_error_whole", "angle_error_end", "horizon_s", "angular_impulse_error_max", "linear_impulse_error_max",
+    "zero_pitch_max", "zero_pitch_left_s", "zero_pitch_growth_per_s", "rotor_angle_min", "rotor_angle_max",
+    "rotor_rate_max",
+)  # fmt: skip
 # What a scene's table repeats of /runs, by its name there; in a row it has this name.
 REPEATED = {"status": STATUS_REPEATED, "samples": "samples_repeated"}
-_CHECKSUM = Column(("run",), "1", "CRC-32 of the row in all computed columns", "<u4")
-_TEXTS = {
-    "scene": "scene",
-    "method_name": "method, model/integrator",
-    "settings": "settings of the method, JSON",
-    "versions": "versions of what computed the run, JSON",
-    "scene_hash": "SHA-256 of the scene's numbers",
-}
 
 
 @dataclass(frozen=True)
@@ -131,7 +101,7 @@ class Asked:
 
 def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
     """The computed columns of /runs for scenes that ask for these outputs."""
-    columns = dict(_COMPUTED)
+    columns = {name: COLUMNS[name] for name in _RUN_COLUMNS}
     for quantity in quantities(outputs):
         if quantity.judgement is not None:
             unit = "1" if quantity.judgement.scale_of else quantity.units
@@ -141,21 +111,14 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
             columns[f"{quantity.name}_max_time_s"] = Column(("run",), "s", f"time of the largest {quantity.long_name}")
             if quantity.dimensions[1:2] == ("blade",):
                 columns[f"{quantity.name}_max_blade"] = Column(("run",), "1", "its blade, from 1")
-    return columns | {"crc32": _CHECKSUM}
+    return columns | {"crc32": COLUMNS["crc32"]}
 
 
 def runs_table(asked: Sequence[Asked]) -> Table:
     """The table /runs of these runs."""
-    known = [run.known for run in asked]
-    texts = {
-        name: (Column(("run",), "1", long_name), [row[name] for row in known]) for name, long_name in _TEXTS.items()
-    }
     outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
-    return Table(RUNS, [run.run for run in asked], texts, metric_columns(outputs), {CHARACTERS: _characters()})
-
-
-def _characters() -> tuple[Column, np.ndarray[Any, Any]]:
-    return Column((CHARACTERS,), "1", ""), np.empty(_TEXT_LENGTH, np.int8)
+    known = known_columns([run.known for run in asked])
+    return Table(RUNS, [run.run for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
 
 
 def arrays_of(run: Asked) -> dict[str, Column]:
@@ -182,13 +145,6 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
     computed = {
         name: column for run in runs for name, column in arrays_of(run).items() if arrays is None or name in arrays
     }
-    used = {"time"}.union(*(column.dimensions for column in computed.values()))
-    values = scale_values(scene)
-    scales = {
-        name: (Column((name,), scale.units, scale.long_name), values[name])
-        for name, scale in SCALES.items()
-        if name in used
-    }
     attributes = {
         "title": scene.title,
         "figures": ", ".join(scene.figures),
@@ -199,8 +155,8 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
         "signal": "angles",
         "axes": ["run", "time", "coordinate"],
     }
-    labels = {"coordinate": scene.coordinate_labels} if "coordinate" in used else {}
-    repeated = {name: _COMPUTED[name] for name in REPEATED}
+    scales, labels = table.scene_scales(scene, computed.values())
+    repeated = {name: COLUMNS[name] for name in REPEATED}
     return Table(scene.name, [run.method for run in runs], {}, repeated | computed, scales, labels, attributes)
 
 

@@ -24,41 +24,38 @@ from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs import files
 from rotor_mbs.runs.files import CHARACTERS, Column, writing
-from rotor_mbs.runs.table import CHARACTER, MISSING, Place, StoredTable, Table, columns_of, lay_out, stored_table
+from rotor_mbs.runs.table import (
+    COLUMNS,
+    MISSING,
+    Place,
+    StoredTable,
+    Table,
+    columns_of,
+    lay_out,
+    scene_scales,
+    stored_table,
+)
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.sweep import SPLITS, Sweep, split_rows
 from rotor_mbs.solution import quantities
-from rotor_mbs.solution.quantities import SCALES, scale_values
 from rotor_mbs.solution.status import code_of
 
 MESSAGE_LENGTH = 120  # characters
 IDENTITY = "sweep_identity"  # the attribute with a hash of all that the design says
 
 METRICS = {
-    "status": Column(("run",), "1", "how the run ended, -1 while it is missing", "i1"),
-    "steps": Column(("run",), "1", "integration steps, -1 where not known", "<i8"),
-    "rhs_evaluations": Column(("run",), "1", "evaluations of the right-hand side, -1 where not known", "<i8"),
-    "time_reached": Column(("run",), "s", "time of the last finite sample"),
-    "energy_drift_max": Column(("run",), "1", "largest energy error of the run, of its energy scale"),
-    "defect_max": Column(("run",), "rad", "largest defect of an interval between samples"),
-    "defect_median": Column(("run",), "rad", "median of the intervals' defects"),
-    "defect_time": Column(("run",), "s", "end of the interval of the largest defect"),
-    "angle_error_predicted": Column(
-        ("run",), "rad", "largest angle error up to the horizon, predicted from the defects"
-    ),
+    name: COLUMNS[name]
+    for name in (
+        "status", "steps", "rhs_evaluations", "time_reached", "energy_drift_max", "defect_max", "defect_median",
+        "defect_time", "angle_error_predicted", "rotor_angle_max", "rotor_rate_max", "pitch_max", "time_limit_s",
+        "message", "code", "crc32",
+    )
+} | {
     "rotor_angle_max": Column(("run",), "rad", "largest rotor angle, either way"),
     "rotor_rate_max": Column(("run",), "rad/s", "largest rotor rate, either way"),
-    "pitch_max": Column(("run",), "rad", "largest pitch angle of any blade, either way"),
-    "time_limit_s": Column(("run",), "s", "time limit that ended the run, NaN where none did"),
-    "message": Column(("run", CHARACTERS), "1", "why the run did not end well", CHARACTER),
-    "code": Column(("run",), "1", "CRC-32 of the versions that computed the run, as `rotor-mbs sweep` tells", "<u4"),
-    "crc32": Column(("run",), "1", "CRC-32 of the row in all computed columns", "<u4"),
-}
+}  # fmt: skip
 # Asked for by `amplification = true`: the variational equations cost a hundred times the run itself.
-AMPLIFICATION = {
-    "error_growth": Column(("run",), "1", "largest amplification of a small error of the initial state"),
-    "horizon_s": Column(("run",), "s", "last sample before the amplification reaches 1e5, or the end"),
-}
+AMPLIFICATION = {name: COLUMNS[name] for name in ("error_growth", "horizon_s")}
 
 
 def parameter_name(key: str) -> str:
@@ -75,9 +72,7 @@ def code_of_method(method: str) -> int:
     return zlib.crc32(json.dumps(row_versions(find_method(method)), sort_keys=True).encode())
 
 
-def sweep_table(
-    sweep: Sweep, methods: Sequence[str], numbers: range, attributes: Mapping[str, object] | None = None
-) -> Table:
+def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> Table:
     """The table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by method r div rows."""
     runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.table
     known: dict[str, tuple[Column, Any]] = {}
@@ -98,17 +93,9 @@ def sweep_table(
         quantity.name: Column(("run", *quantity.dimensions), quantity.units, quantity.long_name, kind)
         for quantity in asked
     }
-    used = {"time"}.union(*(quantity.dimensions for quantity in asked))
-    lengths = scale_values(sweep.base)
-    scales: dict[str, tuple[Column, NDArray[Any]]] = {
-        name: (Column((name,), scale.units, scale.long_name), lengths[name])
-        for name, scale in SCALES.items()
-        if name in used
-    }
-    scales[CHARACTERS] = Column((CHARACTERS,), "1", ""), np.empty(MESSAGE_LENGTH, np.int8)
-    labels = {"coordinate": sweep.base.coordinate_labels} if "coordinate" in used else {}
+    scales, labels = scene_scales(sweep.base, trajectories.values())
     computed = METRICS | (AMPLIFICATION if options.amplification else {}) | trajectories
-    return Table("", runs, known, computed, scales, labels, attributes or {}, flags)
+    return Table("", runs, known, computed, scales, labels, flags=flags, characters=MESSAGE_LENGTH)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from __future__ import annotations
 import errno
 import os
 import zlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,7 +30,9 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError, saving
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import Column
+from rotor_mbs.runs.files import CHARACTERS, Column
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.quantities import SCALES, scale_values
 from rotor_mbs.solution.status import STATUSES
 
 # (rows, ...) arrays by the name of their dataset.
@@ -42,6 +44,88 @@ CHARACTER = "S1"  # kind of a column of texts that are computed: (run, character
 STATUS_FLAGS = {
     "flag_values": np.arange(MISSING, len(STATUSES), dtype=np.int8),
     "flag_meanings": " ".join(("missing", *STATUSES)),
+}
+
+# What a computed column with a value a row is, whichever table has it: units, long name, type where it is no double.
+COLUMNS = {
+    name: Column(("run", CHARACTERS) if CHARACTER in kind else ("run",), units, long_name, *kind)
+    for name, (units, long_name, *kind) in {
+        "status": ("1", "how the run ended, from its state; -1 while it is missing", "i1"),
+        "message": ("1", "why the run did not end well", CHARACTER),
+        "samples": ("1", "finite samples", "<i8"),
+        "time_reached": ("s", "time of the last sample"),
+        "time_limit_s": ("s", "time limit that ended the run, NaN where none did"),
+        "steps": ("1", "integration steps, -1 where not known", "<i8"),
+        "rhs_evaluations": ("1", "evaluations of the right-hand side, -1 where not known", "<i8"),
+        "setup_time_s": ("s", "building the model"),
+        "setup_again_time_s": ("s", "building the model a second time"),
+        "run_time_s": ("s", "median run time of the integration alone"),
+        "run_time_min_s": ("s", "shortest run time"),
+        "run_time_q1_s": ("s", "lower quartile of the run times"),
+        "run_time_q3_s": ("s", "upper quartile of the run times"),
+        "output_time_s": ("s", "reading out and computing the samples"),
+        "repeats": ("1", "timed runs", "<i8"),
+        "repeatable": ("1", "1 where the last run of every point of the curve was bit for bit its first", "i1"),
+        "engine_success": ("1", "1 where the engine reported success, -1 where there is no report", "i1"),
+        "engine_message": ("1", "what the engine reported", CHARACTER),
+        "false_success": ("1", "1 where the engine reported success and the state says otherwise", "i1"),
+        "energy_scale_J": ("J", "what energy errors are relative to"),
+        "energy_drift_max": ("1", "largest energy error over the run, of the energy scale"),
+        "energy_gain_J": ("J", "largest energy gained without work"),
+        "angle_error_max": ("rad", "largest angle error up to the horizon"),
+        "angle_error_predicted": ("rad", "largest angle error up to the horizon, predicted from the defects"),
+        "defect_max": ("rad", "largest defect of an interval between samples"),
+        "defect_median": ("rad", "median of the intervals' defects"),
+        "defect_time": ("s", "end of the interval of the largest defect"),
+        "defect_mean": ("rad", "signed mean of the defects, of the coordinate where it is largest"),
+        "defect_drift": ("rad", "largest sum of the defects of 100 intervals, each carried to their end"),
+        "defect_floor": ("rad", "what the rounding of the samples may make of a defect"),
+        "defects_not_judged": ("1", "intervals in which an error may grow by more than 1e5"),
+        "angle_error_whole": ("rad", "largest angle error over the run"),
+        "angle_error_end": ("rad", "angle error at the last sample"),
+        "tip_error_max": ("m", "largest distance of a tip from the reference up to the horizon"),
+        "error_growth": ("1", "largest amplification of a small error of the initial state"),
+        "horizon_s": ("s", "last sample before the error growth reaches 1e5, or the end"),
+        "uncertainty_rad": ("rad", "uncertainty of the reference up to the horizon"),
+        "angular_impulse_error_max": ("1", "error of the angular momentum balance, of its scale"),
+        "linear_impulse_error_max": ("1", "error of the linear momentum balance, of its scale"),
+        "zero_pitch_max": ("rad", "largest angle of a pitch that is zero in the reference"),
+        "zero_pitch_left_s": ("s", "when such a pitch left zero"),
+        "zero_pitch_growth_per_s": ("1/s", "growth rate of such a pitch"),
+        "rotor_angle_min": ("rad", "smallest rotor angle, at the integrator's own output points"),
+        "rotor_angle_max": ("rad", "largest rotor angle, at the integrator's own output points"),
+        "rotor_rate_max": ("rad/s", "largest rotor rate either way, at the integrator's own output points"),
+        "pitch_max": ("rad", "largest pitch angle of any blade, either way"),
+        "left_out": ("1", "1 where the time budget left the point out", "i1"),
+        "load_before": ("1", "load of the machine before the scene was timed"),
+        "pinned_core": ("1", "core that the runs were timed on, -1 for any", "<i8"),
+        "order": ("1", "order of convergence of the curve, fitted above its round-off floor"),
+        "step_for_target_s": ("s", "step at which the ladder reaches 1e-6 rad"),
+        "largest_stable_step_s": ("s", "largest stable step, by bisection"),
+        "theory_s": ("s", "largest stable step by the stability function"),
+        "fastest_mode_per_s": ("1/s", "largest eigenvalue of the pitches"),
+        "mode_damping_ratio": ("1", "damping ratio of the fastest mode"),
+        "mirror_error": ("rad", "error of the mirrored scene's motion"),
+        "relabelling_error": ("rad", "error of the motion with renumbered blades"),
+        "reversal_error": ("rad", "error at the start after going there and back"),
+        "angular_momentum_drift": ("1", "relative change of the angular momentum about the shaft"),
+        "code": ("1", "CRC-32 of the versions that computed the run, as `rotor-mbs sweep` tells", "<u4"),
+        "crc32": ("1", "CRC-32 of the row in all computed columns", "<u4"),
+    }.items()
+}
+# What the design says of each row of a table, in this order: units, long name. What has no entry is no column.
+KNOWN = {
+    "scene": ("1", "scene"),
+    "method_name": ("1", "method, model/integrator"),
+    "curve": ("1", "method with its fixed choices"),
+    "setting_kind": ("1", "what varies along the curve"),
+    "settings": ("1", "settings of the method, JSON"),
+    "options": ("1", "of the study, JSON"),
+    "versions": ("1", "versions of what computed the row, JSON"),
+    "scene_hash": ("1", "SHA-256 of the scene's numbers"),
+    "step": ("s", "fixed step"),
+    "tolerance": ("1", "tolerance"),
+    "order_expected": ("1", "order of the method"),
 }
 _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
 _OF_REFERENCE = "columns_of_the_reference"  # the attribute with the names of those that have no value a run
@@ -62,6 +146,7 @@ class Table:
     labels : texts for the entries of a scale, by its name.
     attributes : of the group.
     flags : names that the codes of a known column stand for, by its name.
+    characters : of each computed text.
     """
 
     group: str
@@ -72,16 +157,42 @@ class Table:
     labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
     attributes: Mapping[str, object] = field(default_factory=dict)
     flags: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    characters: int = 0
 
     @property
     def row_type(self) -> np.dtype[np.void]:
         """The computed columns of one row, in the order in which its checksum covers them."""
-        lengths = {name: len(values) for name, (_, values) in self.scales.items()}
+        lengths = {name: len(values) for name, (_, values) in self.scales.items()} | {CHARACTERS: self.characters}
         shapes = {
             name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
             for name, column in self.computed.items()
         }
         return np.dtype([(name, column.kind, shapes[name]) for name, column in self.computed.items()])
+
+
+def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Column, Any]]:
+    """`known` of a table with these rows, texts and numbers by name, all with the same names."""
+    columns: dict[str, tuple[Column, Any]] = {}
+    for name, (units, long_name) in KNOWN.items():
+        if rows and name in rows[0]:
+            values: Any = [row[name] for row in rows]
+            is_text = isinstance(values[0], str)
+            columns[name] = Column(("run",), units, long_name), values if is_text else np.array(values, float)
+    return columns
+
+
+def scene_scales(
+    scene: Scene, columns: Iterable[Column]
+) -> tuple[dict[str, tuple[Column, NDArray[Any]]], dict[str, tuple[str, ...]]]:
+    """`scales` and `labels` of a table with these columns over a scene's samples."""
+    used = {"time"}.union(*(column.dimensions for column in columns))
+    values = scale_values(scene)
+    scales = {
+        name: (Column((name,), scale.units, scale.long_name), values[name])
+        for name, scale in SCALES.items()
+        if name in used
+    }
+    return scales, {"coordinate": scene.coordinate_labels} if "coordinate" in used else {}
 
 
 @dataclass(frozen=True)
@@ -238,10 +349,9 @@ def _put_table(file: Any, table: Table) -> None:
     group = files.new_group(file, table.group) if table.group else file
     files.put_attributes(group, table.attributes)
     files.put(group, "run", table.runs, Column(("run",), "1", "run"))
+    if table.characters:
+        files.put_dimension(group, CHARACTERS, table.characters)
     for name, (column, values) in table.scales.items():
-        if name == files.CHARACTERS:
-            files.put_dimension(group, name, len(values))
-            continue
         dataset = files.put(group, name, values, column)
         if name in table.labels:
             files.put_attributes(dataset, {"labels": list(table.labels[name])})
@@ -326,7 +436,7 @@ def stored_table(file: Any, group: str = "") -> StoredTable:
             if offset is None and dataset.size:
                 raise StoreError(f"{path}: {dataset.name} is not contiguous; allowed: a file as it was laid out")
             computed[name] = StoredColumn(dataset.dtype, dataset.shape, offset or 0, name not in of_reference)
-        elif name != files.CHARACTERS:
+        elif name != CHARACTERS:
             known[name] = files.texts_of(dataset) if files.is_text(dataset) else files.values_of(dataset)
             if "labels" in dataset.attrs:
                 labels[name] = files.plain(dataset.attrs["labels"])
@@ -355,14 +465,13 @@ def as_table(file: Any, group: str) -> Table:
     stored, item = stored_table(file, group), file[group] if group else file
     columns = columns_of(item)
     scales: dict[str, tuple[Column, NDArray[Any]]] = {}
-    if files.CHARACTERS in item:
-        scales[files.CHARACTERS] = Column((files.CHARACTERS,), "1", ""), np.empty(len(item[files.CHARACTERS]), np.int8)
     known: dict[str, tuple[Column, NDArray[Any]]] = {}
     for name, values in stored.known.items():
         (scales if columns[name].dimensions == (name,) else known)[name] = columns[name], values
     computed = {name: columns[name] for name in stored.computed}
     attributes = {name: value for name, value in stored.attributes.items() if group}
-    return Table(group, stored.runs.tolist(), known, computed, scales, stored.labels, attributes)
+    characters = len(item[CHARACTERS]) if CHARACTERS in item else 0
+    return Table(group, stored.runs.tolist(), known, computed, scales, stored.labels, attributes, characters=characters)
 
 
 def columns_of(group: Any) -> dict[str, Column]:
@@ -380,16 +489,4 @@ def table_groups(path: Path) -> list[str]:
     """The groups of a file that are tables. Raises StoreError where it is another program's."""
     with files.open_file(path) as file, files.reading(path):
         _refuse_changes(file, "")
-        return list(_groups_with_runs(file, "", set()))
-
-
-def _groups_with_runs(group: Any, path: str, seen: set[Any]) -> Iterator[str]:
-    if group in seen:
-        raise StoreError(f"{group.file.filename}: {path} is another name of a group; allowed: one name of each")
-    seen.add(group)
-    if "run" in group:
-        yield path
-        return
-    for name, item in files.members(group):
-        if files.is_group(item):
-            yield from _groups_with_runs(item, f"{path}/{name}" if path else name, seen)
+        return [str(group.name).strip("/") for group in files.groups_in(file) if "run" in group]

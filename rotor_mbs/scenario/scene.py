@@ -3,6 +3,7 @@ the scene file is one field, from which reading, hash, keys of sweeps, units and
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import hashlib
@@ -530,19 +531,13 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     """What stands at `path`, as one entry per blade where the scene file allows one for all."""
     count = tables.get("blades", 0)
     if path == ("blade",) and isinstance(value, dict):
-        return [copied(value) for _ in range(count)]
+        return [copy.deepcopy(value) for _ in range(count)]
     declared = _BY_PATH.get(_names(path))
     is_per_blade = declared is not None and declared["kind"].per_blade and isinstance(path[-1], str)
     if is_per_blade and (not isinstance(value, list) or is_one_table(value)):
-        return [copied(0.0 if value is None else value) for _ in range(count)]
+        return [copy.deepcopy(0.0 if value is None else value) for _ in range(count)]
     # Whether a list that is missing could be there is for the readers of the keys to say.
     return [0.0] * (last + 1) if value is None else value
-
-
-def copied(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: copied(entry) for name, entry in value.items()}
-    return [copied(entry) for entry in value] if isinstance(value, list) else value
 
 
 def _plain(value: object) -> object:

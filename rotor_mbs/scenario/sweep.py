@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,6 @@ from rotor_mbs.scenario.keys import Kind, file_key, list_of, table_of, where, wr
 from rotor_mbs.scenario.scene import (
     OUTPUT_NAMES,
     Scene,
-    copied,
     put_value,
     scene_fields,
     scene_from_tables,
@@ -32,6 +32,7 @@ from rotor_mbs.scenario.toml_file import (
     KeyPath,
     KeyProblem,
     TableError,
+    at_key,
     find_lines,
     line_of,
     parse_key,
@@ -308,7 +309,7 @@ class Variants:
         return scene
 
     def _read(self, values: Sequence[float]) -> Scene:
-        tables = copied(self._tables)
+        tables = copy.deepcopy(self._tables)
         for path, value in zip(self._paths, values, strict=True):
             put_value(tables, path, value)
         return scene_from_tables(tables, self._name)
@@ -344,10 +345,6 @@ class Sweep:
     def outputs(self) -> tuple[str, ...]:
         """What is stored of each run's samples; () for metrics alone."""
         return self.base.outputs if self.table.outputs is None else tuple(self.table.outputs)
-
-    def problem(self, key: KeyPath, message: str) -> str:
-        """A line about what the file says at `key`, for an InputError: for errors that only a caller can find."""
-        return f"{shown_path(self.path)}:{line_of(find_lines(self.text), key)}: {message}"
 
     def variants(self) -> Variants:
         """From rows to scenes. They always ask for the energy: every run's balance is checked."""
@@ -386,39 +383,33 @@ def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Swe
 
 def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | None = None) -> Sweep:
     """The sweep in the tables of a file; its base is the scene that it names, where none is given."""
+    source = shown_path(path)
     try:
         table: SweepTable = table_of(SweepTable).read(tables)
     except TableError as error:
-        raise error.in_file(text, shown_path(path)) from error
-
-    def at(key: str, messages: Iterable[str]) -> InputError:
-        where = f"{shown_path(path)}:{line_of(find_lines(text), (key,))}: {key}"
-        return InputError(f"{where}: {message}" for message in messages)
-
+        raise error.in_file(text, source) from error
     if base is None:
         is_shipped = (scenarios_folder() / f"{table.scene}.toml").is_file()
         is_beside = table.scene.endswith(".toml") and not is_shipped
-        try:
+        with at_key(source, text, "scene"):
             base = only_scene(str(path.parent / table.scene) if is_beside else table.scene)
-        except InputError as error:
-            raise at("scene", [str(error)]) from error
     changes: dict[str, object] = dict(table.change)
     if table.samples is not None:
         changes["samples"] = table.samples
     if table.outputs:
         changes["outputs"] = table.outputs
-    try:
-        base = base.replace(**changes) if changes else base
-    except InputError as error:
-        first = next(key for key in ("change", "samples", "outputs") if getattr(table, key))
-        raise at(first, error.problems) from error
+    if changes:
+        with at_key(source, text, next(key for key in ("change", "samples", "outputs") if getattr(table, key))):
+            base = base.replace(**changes)
     axes = tuple(axis.axis(table.draws or 0) for axis in table.axis)
     if table.combine == "zip" and len({axis.count for axis in axes}) > 1:
         counts = ", ".join(f"{axis.key} has {axis.count}" for axis in axes)
-        raise at("combine", [f"{counts}; allowed with zip: as many values in every axis"])
+        with at_key(source, text, "combine"):
+            raise InputError(f"{counts}; allowed with zip: as many values in every axis")
     design = Design(axes, table.combine, table.seed)
     if design.count > MAX_ROWS:
-        raise at("axis", [f"{design.count:,} runs; allowed: at most {MAX_ROWS:,}"])
+        with at_key(source, text, "axis"):
+            raise InputError(f"{design.count:,} runs; allowed: at most {MAX_ROWS:,}")
     sweep = Sweep(table, base, design, text, path)
     problems: dict[str, None] = {}
     for i, variants, row in _rows_to_check(sweep):
@@ -428,7 +419,8 @@ def _sweep(path: Path, text: str, tables: Mapping[str, object], base: Scene | No
             values = ", ".join(f"{key} = {value:g}" for key, value in zip(variants.keys, row, strict=True))
             start = "" if all(problem.is_of_key for problem in error.problems) else f"{values}: "
             for problem in error.problems:
-                problems.setdefault(sweep.problem(("axis", i, "key"), f"{start}{problem.message}"))
+                line = line_of(find_lines(text), ("axis", i, "key"))
+                problems.setdefault(f"{source}:{line}: {start}{problem.message}")
             if len(problems) >= _MAX_ROW_ERRORS:
                 break
     if problems:

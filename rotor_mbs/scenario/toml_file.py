@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from rotor_mbs.errors import InputError
 
-T = TypeVar("T")
 KeyPath = tuple[str | int, ...]
 
 MAX_BYTES = 1 << 20
@@ -233,10 +233,11 @@ def line_of(lines: Mapping[KeyPath, int], path: KeyPath) -> int:
     return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), 1)
 
 
-def of_file(source: str, text: str, key: str, read: Callable[..., T], *values: object) -> T:
-    """What `read` makes of values that stand at `key` of a file; its InputError names source, line and key."""
+@contextmanager
+def at_key(source: str, text: str, key: str) -> Iterator[None]:
+    """An InputError of the block names the file, the line of the key, and the key."""
     try:
-        return read(*values)
+        yield
     except InputError as exc:
-        line = line_of(find_lines(text), (key,))
-        raise InputError(f"{source}:{line}: {key}: {problem}" for problem in exc.problems) from exc
+        place = f"{source}:{line_of(find_lines(text), (key,))}: {key}"
+        raise InputError(f"{place}: {problem}" for problem in exc.problems) from exc

@@ -15,7 +15,7 @@ from pathlib import Path
 import rotor_mbs
 from rotor_mbs.analysis.claim_study import claim_study
 from rotor_mbs.analysis.claims import claims, finding
-from rotor_mbs.analysis.run_tables import finding_lines, method_table
+from rotor_mbs.analysis.run_tables import method_table
 from rotor_mbs.errors import OF_THE_MACHINE, RotorError, one_line
 from rotor_mbs.methods.catalogue import REFERENCE, default_methods, errata_methods, ladders
 from rotor_mbs.runs.files import writing
@@ -27,6 +27,7 @@ from rotor_mbs.runs.table import Rows
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes, reference_folder, scenarios_folder
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.studies.bench import (
     BENCH,
     Curve,
@@ -60,9 +61,9 @@ _LONGEST_S = 0.25  # a run longer than this is the last of its curve: the next o
 
 @dataclass(frozen=True, kw_only=True)
 class CurveTask(Task):
-    """A short curve on its way to a worker process: consecutive rows of the table /bench."""
+    """A short curve on its way to a worker process, which looks its ladder up: consecutive rows of the table /bench."""
 
-    curve: Curve
+    scene: Scene
 
 
 def reproduce(
@@ -88,7 +89,7 @@ def reproduce(
                 reference=file.place(reference),
                 kill_after_s=1.2 * timeout_s + 10.0,
                 work=work_of(benched, curve.ladder.method),
-                curve=curve,
+                scene=benched,
             )
             for curve in curves
             if is_new or not is_measured(file, curve)
@@ -113,9 +114,9 @@ def summary_of(path: Path) -> str:
     """Numbers and claims of the paper, and a line for each method over all its scenes."""
     with open_results(path) as results:
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
-        facts = finding(results.scenes, claims(results.scenes))
-        lines = finding_lines(facts, claim_study().shares)
-        return "\n".join([*lines, "", str(method_table(runs)), ""])
+        rows = finding(results.scenes, claims(results.scenes), claim_study().shares)
+        table = TextTable(("result", "as printed", "corrected model"), [*rows])
+        return f"{table}\n\n{method_table(runs)}\n"
 
 
 def perform(task: RunTask | CurveTask) -> Rows:
@@ -125,15 +126,18 @@ def perform(task: RunTask | CurveTask) -> Rows:
 
 def short_curves(scene: Scene) -> list[Curve]:
     """A short curve of each method on `scene`."""
-    chosen = [ladder.short for ladder in ladders() if not ladder.variant]
-    able, _ = able_methods(scene, [ladder.method for ladder in chosen])
+    able, _ = able_methods(scene, list(dict.fromkeys(ladder.method for ladder in ladders())))
+    return [curve for name in able for curve in curves_of(scene, name)]
+
+
+def curves_of(scene: Scene, method: str) -> list[Curve]:
     options = {"budget_s": _LONGEST_S, "is_short": True}
-    return [Curve(scene, ladder, options) for ladder in chosen if ladder.method in able]
+    return [Curve(scene, ladder.short, options) for ladder in ladders([method]) if not ladder.variant]
 
 
 def perform_curve(task: CurveTask) -> Rows:
     """Run and judge the points of one curve, in a worker process; their rows."""
-    curve = task.curve
+    (curve,) = curves_of(task.scene, task.method)
     assert task.reference is not None  # every curve has one
     short, reference = prepared(curve.scene, read_reference(task.reference, curve.scene))
     points = points_of(curve.ladder, short.duration / (short.samples - 1))

@@ -31,7 +31,7 @@ from rotor_mbs.runs.runner import Task, compute
 from rotor_mbs.runs.table import Rows, text_of
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
-from rotor_mbs.scenario.toml_file import of_file
+from rotor_mbs.scenario.toml_file import at_key
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Trajectory
@@ -293,9 +293,8 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
     """Those of the scene's settings that the method has. Raises InputError for one that no method at all has."""
     if not scene.settings:
         return {}
-    return of_file(scene.name, scene.text, "settings", settings_for, method_names(), dict(scene.settings)).get(
-        method, {}
-    )
+    with at_key(scene.name, scene.text, "settings"):
+        return settings_for(method_names(), dict(scene.settings)).get(method, {})
 
 
 def perform_run(task: RunTask) -> Rows:
@@ -360,7 +359,9 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
     reasons: list[str] = []
     for scene in scenes:
         if scene.methods:
-            methods |= asked_methods([scene], of_file(scene.name, scene.text, "methods", check_names, scene.methods))
+            with at_key(scene.name, scene.text, "methods"):
+                names = check_names(scene.methods)
+            methods |= asked_methods([scene], names)
             continue
         try:
             chosen, reason = choose(scene, default_methods())

@@ -29,7 +29,7 @@ from rotor_mbs.runs.table import MISSING, Place, Rows, Table, blank_rows, charac
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.sweep import Sweep, Variants
-from rotor_mbs.scenario.toml_file import TableError, of_file, shown_path
+from rotor_mbs.scenario.toml_file import TableError, at_key, shown_path
 from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_drifts, horizon, largest, running_growth
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.solution import Solution
@@ -87,7 +87,7 @@ def prepare() -> None:
 
 
 def perform(chunk: Chunk) -> Rows:
-    """(runs, ...) of all runs of a chunk; a run's own failure is in its row. Raises InputError, MethodRefusal."""
+    """(runs, ...) columns of all runs of a chunk, failures of runs included. Raises InputError, MethodRefusal."""
     rows = rows_of(chunk)
     rows["time_limit_s"][rows["status"] == code_of("timed_out")] = chunk.time_limit_s
     rows["code"][:] = chunk.code
@@ -342,8 +342,12 @@ def plan_sweep(
     """The runs of part k of n by `methods`, else by those of the file. Raises InputError for a method or a setting that
     is not there, MethodRefusal where a method cannot do them."""
     file = shown_path(sweep.path), sweep.text
-    chosen = check_names(methods) if methods else of_file(*file, "methods", check_names, sweep.table.methods)
-    settings = of_file(*file, "settings", settings_for, chosen, sweep.table.settings)
+    chosen = check_names(methods)
+    if not methods:
+        with at_key(*file, "methods"):
+            chosen = check_names(sweep.table.methods)
+    with at_key(*file, "settings"):
+        settings = settings_for(chosen, sweep.table.settings)
     for method in chosen:
         find_method(method).items(sweep.base)
     total = sweep.design.count * len(chosen)

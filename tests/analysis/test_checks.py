@@ -14,6 +14,7 @@ from support.scenes import general, paper
 from support.stored import Arrays, Made, damage, rotor, store
 
 from rotor_mbs.analysis import checks
+from rotor_mbs.analysis.judgement import energy_slack, start_slack
 from rotor_mbs.analysis.rehydrate import Rehydrated
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
@@ -21,7 +22,6 @@ from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import reference_folder
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import energy_slack, start_slack
 from rotor_mbs.solution.metrics import energy_scale, metrics_of
 from rotor_mbs.solution.quantities import Quantity, QuantityMetric
 from rotor_mbs.solution.solution import Solution

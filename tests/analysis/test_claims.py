@@ -13,7 +13,7 @@ from support.scenes import paper
 from support.stored import Arrays, Made, rotor, store
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.claims import STATISTICS, claims, finding, measure, rounds_to
+from rotor_mbs.analysis.claims import STATISTICS, Claim, ClaimResult, agreement, claims, finding, measure, rounds_to
 from rotor_mbs.analysis.exact import escape_rate
 from rotor_mbs.analysis.published import Condition, Published, TrajectoryNumber
 from rotor_mbs.runs.read import open_results
@@ -34,24 +34,6 @@ def claim(*tests: Condition) -> Published:
 
 def of(statistic: str, coordinate: int = 0, scene: str = "paper/fig11", quantity: str = "angle") -> TrajectoryNumber:
     return TrajectoryNumber(scene, quantity, coordinate, statistic)
-
-
-@pytest.mark.parametrize(
-    ("statistic", "exact"),
-    [
-        # x = t sin(2π t) over 0..10: the extremes lie near t = n + 1/4 and n + 3/4 and are about t high.
-        ("range", 9.25 + 9.75),
-        ("reversals", 19.0),  # zero at every half second, both ends left out
-        ("net_change", 0.0),
-        ("growth", 9.75 / 4.75),  # largest |x| in either half: near t = 9.75 and 4.75
-    ],
-)
-def test_statistics_of_a_growing_oscillation(tmp_path: Path, statistic: str, exact: float) -> None:
-    made = Made(FIG11, PRINTED, rotor(lambda t: t * np.sin(2.0 * np.pi * t)))
-    with open_results(store(tmp_path / "r.h5", [made])) as results:
-        value = measure(results.scenes["paper/fig11"].methods[PRINTED], of(statistic))
-    # 50 samples a period: an extreme is missed by at most (2π/50)²/8 = 2e-3 of the amplitude of 10.
-    assert value == pytest.approx(exact, abs=0.05)
 
 
 SERIES = {
@@ -93,18 +75,6 @@ def test_one_sample_has_no_growth_and_none_no_number() -> None:
     assert measure(none, of("max")) is None
     timeless: Any = Arrays(PRINTED, angles=np.ones((1, 1)))
     assert measure(timeless, of("max")) is None
-
-
-def test_swings_are_counted_from_turning_point_to_turning_point(tmp_path: Path) -> None:
-    # Corners at 0, 2, -1, 3 s-wise: ways of 2, 3, 4; the last, unfinished one (to 0) is no swing.
-    def corners(t: np.ndarray) -> np.ndarray:
-        return np.interp(t, [0.0, 2.0, 4.0, 6.0, 10.0], [0.0, 2.0, -1.0, 3.0, 0.0])
-
-    with open_results(store(tmp_path / "r.h5", [Made(FIG11, PRINTED, rotor(corners))])) as results:
-        run = results.scenes["paper/fig11"].methods[PRINTED]
-        assert measure(run, of("swing_ratio")) == pytest.approx(4.0 / 2.0)
-        assert measure(run, of("swing_ratio", coordinate=1)) is None  # at rest: no swing
-        assert measure(run, of("growth", coordinate=1)) is None
 
 
 @pytest.mark.parametrize(
@@ -203,15 +173,24 @@ def test_the_finding_counts_what_was_put_in(tmp_path: Path) -> None:
         Made(fig12, TAYLOR, rotor(lambda t: np.full_like(t, 1.0)), attributes={"status": "inaccurate"}),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as results:
-        facts = finding(results.scenes, [])
-    assert facts.energy is not None
-    assert (facts.energy.rises.count, facts.energy.rises.of) == (2, 2)
+        rows = finding(results.scenes, [])
+        printed, corrected = agreement(run for scene in results.scenes.values() for run in scene.methods.values())
     # The run that broke off made more, but what a runaway reaches is no measure.
-    assert facts.energy.gain == pytest.approx(3e5)
-    (agreement,) = facts.agreement
-    assert agreement.angle_error == pytest.approx(1e-9)
-    assert (agreement.runs.count, agreement.runs.of) == (1, 2)
-    assert facts.numbers is None
+    assert [(row.printed, row.corrected) for row in rows] == [("2 of 2", ""), ("0.3 MJ", "")]
+    assert corrected.angle_error == pytest.approx(1e-9)
+    assert (printed.runs, corrected.runs) == ("1 of 2 completed", "1 of 2 ok")
+
+
+def test_the_finding_counts_numbers_and_claims_that_are_decided() -> None:
+    def decided(item: Published, printed: bool | None, corrected: bool | None) -> Claim:
+        return Claim(item, ClaimResult(printed), ClaimResult(corrected))
+
+    item, words = number("max", 1.0), claim(Condition(of("max"), ">", bound=0.0))
+    evaluated = [decided(item, True, False), decided(item, None, False), decided(words, True, None)]
+    assert finding({}, evaluated) == [
+        ("Published numbers reproduced", "1 of 1", "0 of 2"),
+        ("Published claims that hold", "1 of 1", ""),
+    ]
 
 
 def test_escape_rate_of_a_pendulum_upside_down() -> None:

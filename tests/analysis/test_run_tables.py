@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from support.stored import Made, rotor, store
 
-from rotor_mbs.analysis.claims import Finding, Tally
-from rotor_mbs.analysis.run_tables import bench_table, finding_lines, method_table, run_table
+from rotor_mbs.analysis.run_tables import bench_table, method_table, run_table
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.records import Record
 from rotor_mbs.scenario.catalogue import find_scenes
@@ -59,11 +58,3 @@ def test_a_bench_curve_has_its_smallest_error_and_the_times_to_given_ones() -> N
     assert row[:4] == ("paper/fig05", GOOD, "2 of 3", "1.0e-04")
     assert float(row[4]) == np.round(10**0.5, 2)  # halfway between the two, in logarithms
     assert row[5:] == ("", "")
-
-
-def test_the_finding_says_how_many_numbers_and_claims() -> None:
-    facts = Finding(Tally(4, 4), Tally(0, 4), Tally(8, 14), None, ())
-    assert finding_lines(facts, None) == [
-        "published numbers: 4 of 4 come out of the printed equations; the corrected ones give none",
-        "claims in words: 8 of 14 hold in the printed equations",
-    ]

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from rotor_mbs.analysis import kinematics
+from rotor_mbs.analysis.judgement import judge, rotor_inertia_shares
 from rotor_mbs.methods.catalogue import is_corrected, method_names
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.analysis.judgement import judge, rotor_inertia_shares
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, metrics_of
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory

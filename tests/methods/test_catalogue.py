@@ -7,39 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.scenes import paper
 
-from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.catalogue import find_method, methods
-from rotor_mbs.methods.solve import solve
 
-MADE_UP = """
-from dataclasses import dataclass
-import numpy as np
-from rotor_mbs.methods.base import Method, Settings
-from rotor_mbs.methods.settings import number
-from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.methods.base import BuiltItem
-
-@dataclass(frozen=True)
-class OwnSettings(Settings):
-    rate: float = number(1.0, unit="rad/s", doc="rate of every angle")
-
-class OwnSolver:
-    def __init__(self, scene, settings):
-        self.scene, self.rate = scene, settings.rate
-    def integrate(self):
-        return Integration(True, steps=1)
-    def observe(self):
-        time = np.linspace(0.0, self.scene.duration, self.scene.samples)
-        rates = np.full((len(time), 1 + len(self.scene.blades)), self.rate)
-        return Trajectory(time, rates * time[:, None] + self.scene.initial_angles, rates)
-
-METHOD = Method(name="made_up/turning", label="made up, turning",
-                build=OwnSolver, items=lambda scene: [BuiltItem("term", "turning")], settings=OwnSettings)
-TAKEN = Method(name="lagrange/taylor", label="x", build=OwnSolver, items=METHOD.items)
+MADE_UP = (Path(__file__).parents[1] / "extension" / "rotor_rk4.py").read_text()
+MADE_UP += """
+TAKEN = Method(name="lagrange/taylor", label="x", build=Solver, items=items)
 """
 
 
@@ -103,22 +78,13 @@ def test_facts_of_the_built_in_methods_agree_with_each_other() -> None:
     ]  # fmt: skip
 
 
-def test_a_method_of_another_package_is_found_listed_and_run(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    install(site, "made_up", {"own": "made_up:METHOD"}, MADE_UP)
-    assert main(["show", "paper/fig03"]) == 0
-    assert "made_up/turning" in capsys.readouterr().out
-    run = solve("made_up/turning", paper("fig03"), {"rate": 2.0})
-    assert run.settings == {"rate": 2.0}
-    assert run.rates[-1, 0] == 2.0
-    assert find_method("made_up/turning").distributions == ("made_up",)
-
-
 def test_plug_ins_that_cannot_be_used_are_left_out_with_one_line_each(
     site: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     entry_points = {"a": "no_such_module:METHOD", "b": "made_up:MISSING", "c": "made_up:np", "d": "made_up:TAKEN"}
     install(site, "made_up", {**entry_points, "e": "made_up:METHOD"}, MADE_UP)
-    assert "made_up/turning" in {method.name for method in methods()}
+    assert "outside/rk4" in {method.name for method in methods()}
+    assert find_method("outside/rk4").distributions == ("made_up",)
     assert [record.getMessage().partition(" left out")[0] for record in caplog.records] == [
         "plug-in a of no_such_module:METHOD", "plug-in b of made_up:MISSING", "plug-in c of made_up:np",
         "plug-in d of made_up:TAKEN: method lagrange/taylor",

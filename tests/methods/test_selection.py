@@ -9,6 +9,7 @@ import pytest
 from support.references import reference, scene
 from support.scenes import PAPER, paper
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.cli import main
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.catalogue import is_corrected, methods
@@ -16,7 +17,6 @@ from rotor_mbs.methods.selection import choose, singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import judge
 
 DEFAULT_METHODS = tuple(method.name for method in methods() if method.is_default)
 

@@ -11,10 +11,10 @@ from support import references
 from support.scenes import PAPER, paper
 
 from rotor_mbs.analysis.exact import exact_rotor_angle
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.metrics import angle_error, horizon_samples, metrics_of, running_growth
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Trajectory

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from support.scenes import ARM, MASS, OFFSET, general, paper
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.trajectory import Trajectory
 
 heyoka = pytest.importorskip("heyoka")

@@ -9,26 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import references
-from support.rotors import (
-    FIG11,
-    MIXED,
-    SLIM,
-    STOUT,
-    blade_points,
-    closed_form,
-    energies,
-    make_scene,
-)
-from support.rotors import (
-    PAPER as PAPER_BLADE,
-)
+from support.rotors import FIG11, MIXED, SLIM, STOUT, blade_points, closed_form, energies, make_scene
+from support.rotors import PAPER as PAPER_BLADE
 from support.scenes import paper
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.trajectory import Trajectory
 
@@ -100,15 +89,13 @@ def test_order_of_convergence(name: str, integrator: str, order: int, steps: lis
 
 def test_torque_ramp_on_a_balanced_rotor() -> None:
     """J q'' = a + b t, with a jump: cubic pieces, which the fourth order integrates without error."""
-    jump, inertia = 0.3137, 3 * (PAPER_BLADE.mass * (PAPER_BLADE.centre_of_mass[0] ** 2 + 15.42**2)) + 2e6
+    # Blades on the axis cannot pitch: the rotor is one rigid body.
+    jump, axial = 0.3137, replace(PAPER_BLADE, centre_of_mass=(0.0, 0.0, 15.42))
+    inertia = 3 * axial.mass * 15.42**2 + 2e6
     scene = make_scene(
-        [0.1, 0.3, 0, 0], [0.2, 0, 0, 0], gravity=0.0, hub_inertia=2e6,
+        [0.1, 0.3, 0, 0], [0.2, 0, 0, 0], (axial,) * 3, gravity=0.0, hub_inertia=2e6,
         bearing_stiffness=(1e12,) * 3, rotor_torque=((0.0, 1e5), (jump, 4e5), (jump, -2e5)),
     )  # fmt: skip
-    # Blades on the axis cannot pitch: the rotor is one rigid body.
-    axial = replace(PAPER_BLADE, centre_of_mass=(0.0, 0.0, 15.42))
-    inertia = 3 * axial.mass * 15.42**2 + 2e6
-    scene = replace(scene, blades=(axial,) * 3)
     result = run(scene, step=5e-3)
     t = result.time
     slope = 3e5 / jump

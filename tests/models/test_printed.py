@@ -119,23 +119,6 @@ def test_a_fault_left_in_breaks_lagranges_equations(errata):
     assert np.abs(forces).max() > 0.1
 
 
-def test_third_erratum_alone_changes_nothing():
-    # The coefficient of the term it stands in comes from E2.
-    rng = np.random.default_rng(3)
-    alone, none = (
-        DerivedRotor(*constants(np.random.default_rng(4)), THIRDS, e) for e in (Errata(False, False), CORRECTED)
-    )
-    for _ in range(10):
-        angles, rates = random_motion(rng, 3)
-        torques = rng.normal(0.0, 10.0, 4).tolist()
-        np.testing.assert_allclose(
-            alone.accelerations(torques, angles, rates),
-            none.accelerations(torques, angles, rates),
-            rtol=1e-10,
-            atol=1e-10,
-        )
-
-
 def test_one_blade_has_the_square_and_three_have_not():
     # (30) against (53): at a pitch rate of 2 the last term differs by a factor of two, of one blade by none.
     angles, rates = [0.4, 0.6], [0.0, 2.0]

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from support.scenes import general, paper
 
+from rotor_mbs.analysis.judgement import clearly_ok, judge
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange.ensemble import lanes, solve_many
 from rotor_mbs.runs.sweeps import sweep_table
 from rotor_mbs.runs.table import Place
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.sweep import Variants, sweep_of
-from rotor_mbs.analysis.judgement import clearly_ok, judge
 from rotor_mbs.solution.metrics import energy_drifts
 from rotor_mbs.solution.quantities import energy_balance
 from rotor_mbs.solution.solution import Solution

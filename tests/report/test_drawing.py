@@ -262,7 +262,8 @@ def test_powers_of_ten_are_labelled_within_the_axes_alone() -> None:
         (numbers.prefixed(1.1234e6, "J"), "1.12 MJ"),
         (numbers.prefixed(999.9, "J"), "1.00 kJ"),
         (numbers.prefixed(150.0, "J", 2), "150 J"),
-        (numbers.prefixed(3e-12, "J"), "3.0×10⁻¹² J"),
+        (numbers.prefixed(3e-12, "J"), "3.00 pJ"),
+        (numbers.prefixed(3e-13, "J"), "3.0×10⁻¹³ J"),
         (
             numbers.typeset("off by 8.1e+00 rad, 1e-06 of it, in stiff/torque-1e9"),
             "off by 8.1 rad, 10⁻⁶ of it, in stiff/torque-1e9",

@@ -46,8 +46,7 @@ def _table() -> Table:
         "crc32": Column(("run",), "1", "checksum", "<u4"),
     }
     known = {"stiffness": (Column(("run",), "N m/rad", "stiffness"), np.arange(ROWS, dtype=float))}
-    scales = {"time": time, CHARACTERS: (Column((CHARACTERS,), "1", ""), np.empty(40, np.int8))}
-    return Table("", np.arange(ROWS), known, computed, scales)
+    return Table("", np.arange(ROWS), known, computed, {"time": time}, characters=40)
 
 
 def _stored(path: Path) -> StoredTable:

@@ -312,12 +312,3 @@ def test_no_damage_to_a_file_gives_a_traceback(tmp_path: Path, damages: list[tup
         problems = error.problems
     assert all(problem.isprintable() for problem in problems)
     assert all(re.match(rf"{re.escape(str(path))}(:\d+)?: ", problem) for problem in problems)
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100, deadline=None)
-@given(st.binary(max_size=200))
-def test_no_bytes_give_a_traceback(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "bytes.toml"
-    path.write_bytes(content)
-    with pytest.raises(InputError):
-        load_scene(path, "bytes")

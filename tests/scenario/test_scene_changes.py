@@ -14,11 +14,8 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import (
     BLADE_KEYS,
-    ENTRY_POINT_GROUP,
-    OUTPUTS,
     SCENE_KEYS,
     Scene,
-    known_outputs,
     load_scene,
     new_scene_text,
     parse_scene,
@@ -142,19 +139,3 @@ def test_the_template_is_a_scene_with_every_key(tmp_path: Path) -> None:
         here = tables
         for name in key["key"].split("."):
             here = here[name]
-
-
-def test_an_installed_package_adds_an_output(general: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package = tmp_path / "more-1.0.dist-info"
-    package.mkdir()
-    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: more\nVersion: 1.0\n")
-    (package / "entry_points.txt").write_text(f"[{ENTRY_POINT_GROUP}]\nhub_moment = more_that_is_not_there:QUANTITY\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    known_outputs.cache_clear()
-    try:
-        assert known_outputs() == (*OUTPUTS, "hub_moment")
-        assert general.replace(outputs=["hub_moment", "angles"]).outputs == ("angles", "hub_moment")
-        with pytest.raises(InputError, match="perhaps hub_moment"):
-            general.replace(outputs=["hub_momen"])
-    finally:
-        known_outputs.cache_clear()

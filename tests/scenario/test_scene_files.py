@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import subprocess
-import sys
 import tomllib
 from dataclasses import Field, fields, replace
 from math import hypot, pi
@@ -276,15 +274,6 @@ def test_arguments_keep_their_order_and_name_a_scene_once(tmp_path: Path) -> Non
     names = [scene.name for scene in scenes]
     assert names[:3] == ["paper/fig08", "paper/fig05", "own"]
     assert names[3:] == [name for name in PAPER if name not in names[:3]]
-
-
-def test_list_needs_neither_pydantic_nor_numpy() -> None:
-    # Either takes longer than `rotor-mbs list` may.
-    code = (
-        "import sys; from rotor_mbs.scenario.catalogue import list_scenes; assert list_scenes(); "
-        "assert not {'pydantic', 'numpy'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
 def test_a_broken_shipped_file_does_not_stop_the_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

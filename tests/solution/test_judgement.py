@@ -14,6 +14,7 @@ import pytest
 from support.references import reference, run, scene
 from support.scenes import paper
 
+from rotor_mbs.analysis.judgement import Judgement, energy_conditioning, judge
 from rotor_mbs.methods.catalogue import find_method, method_names
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, is_over, polled, time_limit
@@ -22,7 +23,6 @@ from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.models.exudyn.schemes import Scheme
 from rotor_mbs.models.exudyn.solvers import MultibodySolver
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.analysis.judgement import Judgement, energy_conditioning, judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 

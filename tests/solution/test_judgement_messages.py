@@ -9,10 +9,10 @@ import pytest
 from support.rotors import FIG08
 from support.scenes import paper
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.models.exudyn import tree
 from rotor_mbs.models.exudyn.moments import Loads
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory
 

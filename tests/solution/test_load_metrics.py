@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import rotor_mbs as rm
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.solution import Solution

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from support.scenes import paper
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution import quantities
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.quantities import BUILT_IN, Quantity
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory

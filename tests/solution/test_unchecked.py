@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from support.scenes import paper
 
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.accuracy_bounds import Bound
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Integration, Trajectory

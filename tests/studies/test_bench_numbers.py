@@ -28,7 +28,7 @@ from rotor_mbs.report.pages.bench import (
     overview_table,
     reach_table,
 )
-from rotor_mbs.runs.records import COLUMNS, Record, points_table, read_records, row_of_point
+from rotor_mbs.runs.records import POINT_COLUMNS, Record, points_table, read_records, row_of_point
 from rotor_mbs.runs.results import TableFile, extend_file
 from rotor_mbs.solution.status import STATUSES
 
@@ -144,7 +144,7 @@ def test_the_diagram_draws_what_was_measured() -> None:
     drawn = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
     assert drawn == [[[1e-2, 1e-3], [1e-6, 2e-3], [1e-10, 4e-3]]]
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert axes.get_xlim()[0] > axes.get_xlim()[1]  # falling to the right
+    assert axes.get_xlim()[0] < axes.get_xlim()[1]  # errors fall to the left
     with_setup = diagram([FAST], with_setup=True).axes[0]
     drawn = [line.get_ydata().tolist() for line in with_setup.lines if line.get_marker() == "o"]
     assert drawn == [[1.001, 1.002, 1.004]]
@@ -191,7 +191,7 @@ def stored(path: Path, *curves: Record) -> Path:
     points = [point for curve in curves for point in known_points(curve)]
     file = extend_file(path, [points_table("bench", points)])
     for curve in curves:
-        facts = {name: value for name, value in curve.attributes.items() if name in COLUMNS["bench"]}
+        facts = {name: value for name, value in curve.attributes.items() if name in POINT_COLUMNS["bench"]}
         for i, point in enumerate(known_points(curve)):
             place = file.place(str(point["run"]), "bench")
             values = {name: array[i] for name, array in curve.arrays.items() if name not in ("setting", "status")}

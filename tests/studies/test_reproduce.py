@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 import pytest
 from support.commands import rotor_mbs
 from support.scenes import PAPER
 
-from rotor_mbs.analysis.published import checked_entries
 from rotor_mbs.methods.catalogue import is_corrected
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.scenario.catalogue import reference_folder
 
 
 @pytest.mark.full
@@ -36,12 +33,3 @@ def test_every_scene_by_every_model_and_all_right_ones_ok(tmp_path: Path) -> Non
     assert 'Published numbers reproduced</th><td class="n">4 of 4</td>' in index
     assert len(list((tmp_path / "report").glob("*.html"))) == len(PAPER) + 5
     assert rotor_mbs("check", tmp_path / "results.h5").status == 0
-
-
-def test_the_errata_are_those_that_the_paper_is_charged_with() -> None:
-    charged = tomllib.loads((reference_folder() / "errata.toml").read_text())["erratum"]
-    checks = checked_entries()
-    assert {check.equation for check in checks if not check.agrees} == {
-        equation for erratum in charged for equation in (*erratum["stands_in"], *erratum["reaches"])
-    }
-    assert all(check.explained_by for check in checks if not check.agrees)

@@ -22,8 +22,7 @@ from rotor_mbs.runs.results import TableFile
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.table import MISSING, Rows
 from rotor_mbs.runs.versions import code_digest
-from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.scenario.sweep import load_sweep, sweep_of
+from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import Chunk, perform, plan_sweep, run_sweep
 
 _SWEEP = """
@@ -295,26 +294,3 @@ def test_a_dry_run_tells_runs_time_and_size_and_writes_nothing(tmp_path: Path) -
     assert 0.0 < facts["seconds"] < 60.0
     assert facts["bytes"] >= 8 * 21 * 4 * 8
     assert not list(tmp_path.glob("o.h5*"))
-
-
-_PLUG_IN = """
-from rotor_mbs.solution.quantities import Quantity
-SQUARES = Quantity("pitch_squares", ("time", "blade"), "rad2", "squares of the pitches", output="squares",
-                   producer=lambda scene, samples: samples.angles[:, 1:] ** 2)
-"""
-
-
-@pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853"])
-def test_a_quantity_of_another_package_is_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
-    folder = tmp_path / "site"
-    (folder / "pitch_squares-1.dist-info").mkdir(parents=True)
-    (folder / "pitch_squares.py").write_text(_PLUG_IN)
-    description = folder / "pitch_squares-1.dist-info"
-    (description / "METADATA").write_text("Metadata-Version: 2.1\nName: pitch_squares\nVersion: 1\n")
-    (description / "entry_points.txt").write_text("[rotor_mbs.quantities]\nsquares = pitch_squares:SQUARES\n")
-    monkeypatch.syspath_prepend(folder)
-    scene = find_scenes(["paper/fig11"])[0].replace(duration=0.2)
-    sweep = sweep_of(scene, {"gravity": [9.0, 10.0]}, samples=5, outputs=["angles", "squares"], methods=[method])
-    run_local(sweep, tmp_path / "o.h5", workers=0)
-    stored = StoredSweep(tmp_path / "o.h5")
-    np.testing.assert_array_equal(stored.column("pitch_squares"), stored.column("angles")[:, :, 1:] ** 2)

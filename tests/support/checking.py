@@ -10,6 +10,7 @@ from unittest import mock
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.checks import Check
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.exudyn import chain
@@ -17,7 +18,6 @@ from rotor_mbs.runs.results import Asked, extend_file, results_tables, row_of_ru
 from rotor_mbs.scenario.accuracy_bounds import Bounds, load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Blade, Scene
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.solution import Solution
 from rotor_mbs.studies import check
 from rotor_mbs.studies.run import run_scenes

@@ -24,6 +24,7 @@ import numpy as np
 
 from rotor_mbs.analysis.claim_study import ClaimShare, Conditions, NumberTrial
 from rotor_mbs.analysis.claims import NumberValues, claim_holds, measure, rounds_to
+from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.analysis.published import Published, TrajectoryNumber, published
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
@@ -31,7 +32,6 @@ from rotor_mbs.models.printed import literal
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.solution.status import COMPLETE
 from support.gravity_rows import DEFAULT_ROW, GRAVITY_ROWS
 

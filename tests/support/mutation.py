@@ -2,10 +2,9 @@
 
     python tests/support/mutation.py [GROUP...] [--only PATTERN] [--every N] [--jobs N]
 
-Each mutant lives in a process of its own, forked from one that has loaded the engines, the package and the tests: there
-one function gets its changed code, a small set of scenes is computed and judged as `check` does it, and the first
-check that fails is printed. Where a constant is changed, or a function that was called while all that was loaded, the
-package is imported anew. A mutant that raises, or does not end in time, leaves a run that failed: `check` fails for
+Each mutant lives in a process of its own, forked from one that has loaded the engines: there the package is imported
+with the changed text of one module, a small set of scenes is computed and judged as `check` does it, and the first
+check that fails is printed. A mutant that raises, or does not end in time, leaves a run that failed: `check` fails for
 that, too. What no run that is judged here can show (a turn missed between rows, the place of a quadrature's window) is
 put to a unit test of its own; the answer then begins with "test:".
 """
@@ -22,7 +21,6 @@ import gc
 import importlib
 import importlib.machinery
 import importlib.util
-import inspect
 import io
 import json
 import os
@@ -32,9 +30,8 @@ import shutil
 import sys
 import tempfile
 import time
-import types
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,12 +40,6 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 _CPU_LIMIT_S, _RUN_LIMIT_S = 20, 120.0  # of a mutant, whatever else the machine does; of each run by the clock
-# What is not imported anew for a mutant: what knows neither its module nor anything that does.
-_KEPT_ELSE = ("rotor_mbs.errors", "rotor_mbs.scenario", "rotor_mbs.solution")
-_KEPT = {
-    "rules": _KEPT_ELSE[:2],
-    "analysis": (*_KEPT_ELSE, "rotor_mbs.methods", "rotor_mbs.models", "rotor_mbs.runs"),
-}
 # Here whole numbers count, arguments of calls, and conditions; elsewhere the terms of equations.
 _PROGRAMS = ("ode45", "schemes", "adapter", "integration", "reference", "analysis")
 
@@ -72,7 +63,6 @@ class Mutant:
     scope: str
     what: str
     make: Callable[[], str]
-    line: int = 0  # the first of the function that is changed
 
     @property
     def name(self) -> str:
@@ -257,14 +247,12 @@ def mutants(target: Target) -> list[Mutant]:
     tree = ast.parse(_source(target.module))
     found = []
     for name, scope in _scopes(tree):
-        first = min(node.lineno for node in (scope, *getattr(scope, "decorator_list", ())))
-        line = first if isinstance(scope, ast.FunctionDef) else 0
         if target.names == "*" or name in target.names.split():
             for number, (node, parents) in enumerate(_walk(scope)):
                 for what, change in _changes(node, parents, scope, target):
                     where = f"line {getattr(node, 'lineno', 0)}:{getattr(node, 'col_offset', 0)}: {what}"
                     source = functools.partial(_changed, tree, scope, number, change)
-                    found.append(Mutant(target.group, target.module, name, where, source, line))
+                    found.append(Mutant(target.group, target.module, name, where, source))
     return found
 
 
@@ -460,7 +448,7 @@ STATUS_WORDS = ("ok", "inaccurate", "diverged", "singular", "solver_failed", "ti
 
 
 def _checks_of(group: str) -> Iterator[list[Any]]:
-    """What `check` says, the cheap parts first. Imported here: after the mutant's text was put in place."""
+    """What `check` says, the cheap parts first."""
     batches = {
         "lagrange": [(("check/held",), "lagrange/dop853"), (("check/general",), "lagrange/dop853"),
                      (("check/pitch-loads",), "lagrange/dop853")],
@@ -533,53 +521,9 @@ class _Finder:
         return importlib.util.spec_from_file_location(name, place, loader=_Changed(name, place, self._mutant.make()))
 
 
-def _forget(mutant: Mutant) -> None:
-    kept = _KEPT.get(mutant.group, _KEPT_ELSE)
-    kept = _KEPT_ELSE[:1] if mutant.module.startswith(kept) else kept
-    for name in [name for name in sys.modules if name.startswith(("rotor_mbs", "support.", "test_"))]:
-        if not name.startswith(kept):
-            del sys.modules[name]
-
-
-def _put_in_place(mutant: Mutant) -> None:
-    """The changed code into the function that is loaded, if nothing was made with it yet; else all is imported anew."""
-    function = _loaded_function(mutant)
-    if function is None:
-        _forget(mutant)
-        sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
-        return
-    old = function.__code__
-    code = compile(mutant.make(), old.co_filename, "exec")
-    (new,) = (one for one in _codes(code) if one.co_qualname == old.co_qualname)
-    function.__code__ = new
-
-
-def _loaded_function(mutant: Mutant) -> types.FunctionType | None:
-    """None for a constant, and for a function that may have left its results in what is loaded."""
-    own = vars(importlib.import_module(mutant.module))
-    classes = [value for value in own.values() if isinstance(value, type)]
-    members = [*own.values(), *(one for value in classes for one in vars(value).values())]
-    for member in members:
-        for name in ("fget", "__func__", "func"):
-            member = getattr(member, name, member)
-        found = inspect.unwrap(member) if callable(member) else None
-        if isinstance(found, types.FunctionType) and (found.__module__, found.__code__.co_firstlineno) == (
-            mutant.module, mutant.line,
-        ):  # fmt: skip
-            return None if found.__code__ in _RUN_ALREADY else found
-    return None
-
-
-def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
-    yield code
-    for one in code.co_consts:
-        if isinstance(one, types.CodeType):
-            yield from _codes(one)
-
-
 def _outcome(mutant: Mutant) -> str:
     """Which check failed first, or which test; "" where none did. Of the checks themselves the tests are quicker."""
-    _put_in_place(mutant)
+    sys.meta_path.insert(0, _Finder(mutant))  # type: ignore[arg-type]
     try:
         with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
             judges = (lambda: _check_that_fails(mutant.group)), (lambda: _test_that_fails(mutant.module))
@@ -610,10 +554,17 @@ class _FirstFailure:
 _PYTEST = ("-q", "-x", "-p", "no:cacheprovider")
 
 
+def _run_tests(tests: Iterable[str], *options: str) -> str:
+    """Which test failed first; "" where none did."""
+    first = _FirstFailure()
+    with contextlib.redirect_stdout(io.StringIO()):
+        failed = pytest.main([*_PYTEST, *options, *(str(ROOT / "tests" / test) for test in tests)], [first])
+    return first.name or "interrupted" if failed else ""
+
+
 def _test_that_fails(module: str) -> str:
-    tests, first = [str(ROOT / "tests" / test) for test in _TESTS.get(module, ())], _FirstFailure()
-    failed = tests and pytest.main([*_PYTEST, *tests], [first])
-    return f"test: {first.name or 'interrupted'}" if failed else ""
+    failed = module in _TESTS and _run_tests(_TESTS[module])
+    return f"test: {failed}" if failed else ""
 
 
 def _in_a_child(mutant: Mutant) -> tuple[int, int]:
@@ -636,15 +587,12 @@ def _in_a_child(mutant: Mutant) -> tuple[int, int]:
 _NOT_TRIED = "could not be put in place"
 
 
-def prove_control(group: str, mutants: Sequence[Mutant]) -> None:
-    """Raises SystemExit where the group, unchanged, fails: as it is loaded, and imported anew where a mutant is."""
+def prove_control(group: str) -> None:
+    """Raises SystemExit where the group, unchanged, fails."""
     if group == "analysis" and (not _good_file() or not _in_order(_make_good_file)):
         raise SystemExit("no file to judge")
-    module = mutants[0].module
-    unchanged = Mutant(group, module, "*", "unchanged", lambda: _source(module))
-    for is_anew in {_loaded_function(mutant) is None for mutant in mutants}:
-        if not _in_order(lambda is_anew=is_anew: (is_anew and _put_in_place(unchanged), _check_that_fails(group))[1]):
-            raise SystemExit(f"{group}, unchanged, does not pass")
+    if not _in_order(lambda: _check_that_fails(group)):
+        raise SystemExit(f"{group}, unchanged, does not pass")
 
 
 def _in_order(act: Callable[[], Any]) -> bool:
@@ -681,36 +629,17 @@ def all_mutants(groups: Sequence[str] = (), every: int = 1, only: str = "") -> l
     return [mutant for mutant in found if re.search(only, mutant.name)][::every]
 
 
-_RUN_ALREADY: set[types.CodeType] = set()
-
-
 def warm_up(modules: Sequence[str]) -> None:
-    """Loads what mutants are judged with, and notes which functions that has called."""
+    """Loads the engines; raises SystemExit where a test that mutants of these modules are judged by is not there."""
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
     os.environ["XDG_CACHE_HOME"] = str(ROOT / ".pytest_cache" / "compiled")  # as in conftest.py
     for name in ("exudyn", "mujoco", "heyoka", "scipy.integrate", "scipy.special", "h5py"):
         if importlib.util.find_spec(name):
             importlib.import_module(name)
-    sys.setprofile(lambda frame, event, _: _RUN_ALREADY.add(frame.f_code) if event == "call" else None)
-    for name in ("support.checking", *dict.fromkeys(target.module for target in TARGETS)):
-        importlib.import_module(name)
-    sys.modules["rotor_mbs.runs.versions"].versions()
-    sys.modules["rotor_mbs.studies.stored_references"].shipped_reference("")
-    tests = [str(ROOT / "tests" / test) for module in modules for test in _TESTS.get(module, ())]
-    with contextlib.redirect_stdout(io.StringIO()):
-        if tests and pytest.main([*_PYTEST, "--collect-only", *tests]):
-            raise SystemExit("a test that mutants are judged by is not there")
-    sys.setprofile(None)
+    tests = {test for module in modules for test in _TESTS.get(module, ())}
+    if tests and not _in_order(lambda: _run_tests(tests, "--collect-only")):
+        raise SystemExit("a test that mutants are judged by is not there")
     gc.freeze()  # else every child's collections go through all of it
-
-
-def _fail_without_a_mutant(tests: set[str]) -> bool:
-    first = _FirstFailure()
-    with contextlib.redirect_stdout(io.StringIO()):
-        failed = bool(pytest.main([*_PYTEST, *tests], [first]))
-    if failed:
-        print(first.name or "interrupted", file=sys.stderr)
-    return failed
 
 
 def main() -> None:
@@ -726,14 +655,14 @@ def main() -> None:
     chosen = all_mutants(arguments.groups, arguments.every, arguments.only)
     warm_up(list(dict.fromkeys(mutant.module for mutant in chosen)))
     for group in dict.fromkeys(mutant.group for mutant in chosen):
-        prove_control(group, [mutant for mutant in chosen if mutant.group == group])
+        prove_control(group)
     ways: Counter[str] = Counter()
     tests = set()
     for mutant, noticed in run(chosen, arguments.jobs):
         print(json.dumps({"mutant": mutant.name, "group": mutant.group, "noticed": noticed}), flush=True)
         ways[noticed.split(":")[0].split()[0]] += 1
-        tests |= {str(ROOT / noticed[6:])} if noticed.startswith("test: tests/") else set()
-    if tests and not _in_order(lambda: _fail_without_a_mutant(tests)):
+        tests |= {noticed.removeprefix("test: tests/")} if noticed.startswith("test: tests/") else set()
+    if tests and not _in_order(lambda: _run_tests(tests)):
         raise SystemExit("a test that noticed a mutant fails without one")
     by_check = len(chosen) - sum(ways[way] for way in ("test", "survived", "raised", "did"))
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime

@@ -31,16 +31,14 @@ _FIT_ROUNDS = 4
 _DIFFERENCE = 1e-6  # rad and rate units: cube root of the rounding, for central differences
 
 
-def interval_defects(
-    scene: Scene, time: Array, angles: Array, rates: Array, rounding: Array | None = None
-) -> Defects:
+def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rounding: Array | None = None) -> Defects:
     """The defects of a run's samples, or of anybody's.
 
     Parameters
     ----------
     time : (n,) s, increasing, within the scene's duration.
     angles, rates : (n, 1 + blades) rad and rad/s.
-    rounding : (2 + 2 blades,), or of each row, half a unit of the last digit of angles, then rates, where they are no doubles.
+    rounding : (2 + 2 blades,), or of each row: half a unit of the last digit of angles, then rates; of doubles if left out.
 
     Returns
     -------

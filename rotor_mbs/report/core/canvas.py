@@ -139,15 +139,22 @@ def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any
     )  # fmt: skip
 
 
-def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: float) -> bool:
-    """Powers of ten of the growth over `x` and `y` as colour, from 1 to `largest`, with a scale on the right."""
-    axes, levels = panels.axes[0], np.log10(np.maximum(growth, np.finfo(float).tiny))
-    shown, top = np.clip(levels, 0.0, np.log10(largest)), np.log10(largest)
-    mesh = axes.pcolormesh(x, y, shown, cmap="cividis", shading="nearest", vmin=0.0, vmax=top, rasterized=True)
+def colour_map(
+    panels: Panels, x: Any, y: Any, values: Any, label: str, lowest: float | None = None, highest: float | None = None
+) -> None:
+    """`values` (y, x) as colour over `x` and `y`, with a scale on the right; its range is theirs by default."""
+    axes = panels.axes[0]
+    mesh = axes.pcolormesh(x, y, values, cmap="cividis", shading="nearest", vmin=lowest, vmax=highest, rasterized=True)
     axes.grid(visible=False)
     with style():
         panels.figure.colorbar(mesh, ax=axes).set_label(label)
+
+
+def growth_map(panels: Panels, x: Any, y: Any, growth: Any, largest: float, label: str, boundary: float) -> bool:
+    """Powers of ten of the growth as colour, from 1 to `largest`, and whether there is a line at `boundary`."""
+    levels, top = np.log10(np.maximum(growth, np.finfo(float).tiny)), np.log10(largest)
+    colour_map(panels, x, y, np.clip(levels, 0.0, top), label, 0.0, top)
     has_line = min(levels.shape) > 1 and bool(np.nanmin(levels) < np.log10(boundary) < np.nanmax(levels))
     if has_line:
-        axes.contour(x, y, levels, levels=[np.log10(boundary)], colors=[VERMILLION], linewidths=1.0)
+        panels.axes[0].contour(x, y, levels, levels=[np.log10(boundary)], colors=[VERMILLION], linewidths=1.0)
     return has_line

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from markupsafe import Markup
 
 from rotor_mbs.report.core.looks import GREY, Look
+from rotor_mbs.report.core.numbers import NOTHING
+
+# A number as pages show it, also a range of two, with a unit of two words at most.
+_NUMBER = re.compile(r"−?\d[\d.]*(×?10)?[⁻⁰¹²³⁴-⁹]*( (to|of) −?\d[\d.]*)?(\s[^\s\d]\S*){0,2}")
 
 DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
 # Paths of markers around a point, in relative steps: several can stand in one path.
@@ -42,22 +48,31 @@ class TableCell:
 Row = Sequence[TableCell | str]
 
 
+class ShownColumn(NamedTuple):
+    """A column that is shown: its place in the rows, its heading, whether it has numbers, aligned to the right."""
+
+    place: int
+    heading: str
+    is_numeric: bool
+
+
 @dataclass(frozen=True)
 class PageTable:
-    """A table; numeric: indices of the columns aligned to the right. The first cell of a row is its heading."""
+    """A table. The first cell of a row is its heading; a column in which no row has anything is left out."""
 
     caption: str
     head: Sequence[str]
     rows: Sequence[Row]
-    numeric: Sequence[int] = ()
 
-    def without_empty_columns(self) -> PageTable:
-        """The columns that have a value in any row, and the first one."""
-        empty = ("", "–", TableCell(""), TableCell("–"))
-        kept = [i for i in range(len(self.head)) if not i or any(row[i] not in empty for row in self.rows)]
-        rows = [[row[i] for i in kept] for row in self.rows]
-        numeric = [place for place, i in enumerate(kept) if i in self.numeric]
-        return PageTable(self.caption, [self.head[i] for i in kept], rows, numeric)
+    def columns(self) -> list[ShownColumn]:
+        shown = []
+        for place, heading in enumerate(self.head):
+            texts = [cell if isinstance(cell, str) else cell.text for cell in (row[place] for row in self.rows)]
+            known = [text for text in texts if text not in ("", NOTHING)]
+            count = sum(_NUMBER.fullmatch(text) is not None for text in known)
+            if known or not place:
+                shown.append(ShownColumn(place, heading, place > 0 and 2 * count > len(known)))
+        return shown
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,9 @@ Site = Sequence[tuple[str, str]]  # (file, label) of the main pages of a report,
 _TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
 _OTHERS = ("bench-", "data--")  # beginnings of the names of other pages than those of scenes
+_CONTENTS = "<!-- contents -->"  # its place in a template
+_SECTION = re.compile(r'<section id="([^"]+)"[^>]*>\s*(?:<details><summary>)?<h2>(.*?)</h2>')
+_MANY_SECTIONS = 4
 # Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages come from any file.
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
 
@@ -76,9 +79,16 @@ def _is_ours(path: Path) -> bool:
 
 
 def render(template: str, page: Mapping[str, object], site: Site = (), here: str = "") -> str:
-    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have."""
+    """The HTML of `page` by templates/`template`.html.j2, which says what `page` must have; with a table of contents
+    where the page has many sections."""
     links = [(file, label, file == here) for file, label in site] if {file for file, _ in site} - {here} else []
-    return _environment().get_template(f"{template}.html.j2").render(page=page, site=links)
+    html = _environment().get_template(f"{template}.html.j2").render(page=page, site=links)
+    sections = _SECTION.findall(html)
+    contents = ""
+    if len(sections) >= _MANY_SECTIONS:
+        entries = "".join(f'<a href="#{name}">{heading}</a>' for name, heading in sections)
+        contents = f'<nav class="contents" aria-label="Contents">{entries}</nav>'
+    return html.replace(_CONTENTS, contents, 1)
 
 
 def write_page(folder: str | PathLike[str], template: str, page: Mapping[str, object]) -> Path:

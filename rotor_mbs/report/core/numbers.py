@@ -7,7 +7,10 @@ import re
 
 NOTHING = "–"  # a number that does not exist
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_PREFIXES = (
+    (1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"),
+    (1e-12, "p"),
+)  # fmt: skip
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(\d+(?:\.\d+)?)e([+-]?\d+)\b")
 
@@ -45,11 +48,11 @@ def with_unit(value: float | None, unit: str, digits: int = 2) -> str:
 
 
 def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
-    """With an SI prefix: 1.12 MJ, 687 J, 4.1 mJ; powers of ten beyond tera and below nano."""
+    """With an SI prefix: 1.12 MJ, 687 J, 4.1 mJ; powers of ten beyond tera and below pico."""
     if value is None or not math.isfinite(value) or value == 0.0:
         return with_unit(value, unit, digits)
     rounded = float(f"{value:.{digits - 1}e}")
-    if not 1e-9 <= abs(rounded) < 1e15:
+    if not 1e-12 <= abs(rounded) < 1e15:
         return with_unit(value, unit, min(digits, 2))
     scale, prefix = next((s, p) for s, p in _PREFIXES if abs(rounded) >= s)
     scaled = rounded / scale

@@ -22,7 +22,7 @@ from rotor_mbs.report.core.files import Site, page_names, render
 from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import method_cell, status_text, versions
+from rotor_mbs.report.pages.scene_tables import method_cell, versions, words_of
 from rotor_mbs.runs.read import OpenResults, StoredScene
 from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.scenario.catalogue import natural_order
@@ -30,7 +30,7 @@ from rotor_mbs.scenario.catalogue import natural_order
 _TARGETS = [f"{power(round(math.log10(target)))} rad" for target in work_precision.TARGETS_RAD]
 _FRONT_COLOUR = "#c8c8c8"
 _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
-_FAILED_LEFT, _FAILED, _FAILED_RIGHT = 120.0, 20.0, 3.0  # rad: the band of failed runs on the axis of errors
+_FAILED_LEFT, _FAILED, _FAILED_RIGHT = 3.0, 20.0, 120.0  # rad: the band of failed runs on the axis of errors
 
 
 def bench_pages(main: str, site: Site, results: OpenResults) -> dict[str, str]:
@@ -68,7 +68,7 @@ def bench_pages(main: str, site: Site, results: OpenResults) -> dict[str, str]:
             "facts": curves[0].attributes,
             "diagram": Section(pictures, cost_legend(curves)),
             "reach": Section(tables=[reach_table(curves)]),
-            "order": Section(tables=[PageTable(caption, ["method", "order", "expected"], orders, numeric=(1, 2))]),
+            "order": Section(tables=[PageTable(caption, ["method", "order", "expected"], orders)]),
             "failures": Section(tables=[failure_table(curves, results.scenes.get(name))]),
             "points": Section(tables=[_point_table(curves)]),
             "csv": csv_file,
@@ -94,11 +94,14 @@ def cost_picture(curves: Sequence[Record], caption: str, legend: Sequence[Legend
     """The diagram; None where no point stands on it."""
     if not any(work_precision.succeeded(curve).any() for curve in curves):
         return None
-    return picture(diagram(curves, height=3.4), "cost", f"{caption}: the lower right corner is best", legend=legend)
+    return picture(diagram(curves, height=3.4), "cost", f"{caption}: lower left is best", legend=legend)
 
 
 def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float = 3.9, small: bool = False) -> Panels:
-    """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the left."""
+    """All curves of a scene, Pareto front, quartiles, and failed runs on a strip at the right.
+
+    As work-precision diagrams are drawn in the field: the error falls to the left, the time downwards.
+    """
     panels = canvas.panels((height,), "largest angle error up to the horizon (rad)")
     axes = panels.axes[0]
     points = [work_precision.points(curve, with_setup=with_setup) for curve in curves]
@@ -122,22 +125,31 @@ def diagram(curves: Sequence[Record], *, with_setup: bool = False, height: float
         times.append(failed)
         if with_setup:
             failed = failed + np.nan_to_num(curve.arrays["setup_time_s"][is_failed])
-        at_left = np.full(len(failed), _FAILED)
-        axes.plot(at_left, failed, linestyle="none", marker="x", markersize=4.0, color=look.colour)
+        axes.plot(
+            np.full(len(failed), _FAILED), failed, linestyle="none", marker="x", markersize=4.0, color=look.colour
+        )
     if _uncertainty(curves) > _LOWEST_ERROR:
         axes.axvspan(_LOWEST_ERROR / 10.0, _uncertainty(curves), color=GREY, alpha=0.2, linewidth=0)
-    axes.axvspan(_FAILED_RIGHT, _FAILED_LEFT, color="#f2e3de", linewidth=0, zorder=0)
-    axes.set_xscale("log")
-    axes.set_xlim(_FAILED_LEFT, _LOWEST_ERROR / 2.0)
-    exponents = range(-3, -17, -3)
-    axes.set_xticks([_FAILED, *(10.0**e for e in exponents)], ["failed", *(power(e) for e in exponents)])
-    axes.set_xticks([], minor=True)
+    smallest = max(errors.min(initial=1e-3), _LOWEST_ERROR)
+    lowest = math.floor(math.log10(smallest) + 1e-9)
+    labels = {10.0**e: power(e) for e in range(0, lowest - 1, -2 if lowest > -12 else -3)}
+    largest = 3.0
+    if _has_failed(curves):
+        axes.axvspan(_FAILED_LEFT, _FAILED_RIGHT, color="#f2e3de", linewidth=0, zorder=0)
+        labels[_FAILED] = "failed"
+        largest = _FAILED_RIGHT
+    axes.set(xscale="log", xlim=(10.0**lowest / 2.0, largest))
+    canvas.ticks(axes.xaxis, labels)
     known = np.concatenate(times)
     known = known[np.isfinite(known) & (known > 0.0)]
     shortest, longest = (known.min(), known.max()) if len(known) else (1e-3, 1.0)
     canvas.log_axis(axes, 10.0 ** math.floor(math.log10(shortest)), longest)
     axes.set_ylabel("set-up, run and read-out (s)" if with_setup else "run time (s)")
     return panels
+
+
+def _has_failed(curves: Sequence[Record]) -> bool:
+    return any(work_precision.failed(curve).any() for curve in curves)
 
 
 def _uncertainty(curves: Sequence[Record]) -> float:
@@ -147,9 +159,16 @@ def _uncertainty(curves: Sequence[Record]) -> float:
 
 def cost_legend(curves: Sequence[Record]) -> list[LegendEntry]:
     """Methods, front, failed points and uncertainty, as far as they are in the diagram."""
-    entries = [LegendEntry(label_of(curve.name), look_of(curve.name)) for curve in curves]
-    entries.append(line_entry("best of all (Pareto front)", _FRONT_COLOUR, width=6.0))
-    if any(not work_precision.succeeded(curve).all() for curve in curves):
+    entries = []
+    for curve in curves:
+        look, count = look_of(curve.name), int(work_precision.succeeded(curve).sum())
+        if count < 2:  # a point alone, or none but failed ones
+            look = replace(look, line="", marker=look.marker if count else "x")
+        entries.append(LegendEntry(label_of(curve.name), look))
+    points = [work_precision.points(curve) for curve in curves]
+    if points and len(work_precision.pareto(*np.concatenate(points, axis=1))) > 1:
+        entries.append(line_entry("best of all (Pareto front)", _FRONT_COLOUR, width=6.0))
+    if _has_failed(curves):
         entries.append(LegendEntry("failed: drawn at its time", Look(GREY, "", "x")))
     if _uncertainty(curves) > _LOWEST_ERROR:
         entries.append(line_entry("uncertainty of the reference", width=8.0))
@@ -216,7 +235,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
                 row.append(missing)
         rows.append(row)
     head = ["method", *_TARGETS]
-    return PageTable("Run time to an angle error, and its ratio to the fastest", head, rows, range(1, len(head)))
+    return PageTable("Run time to an angle error, and its ratio to the fastest", head, rows)
 
 
 def _point_table(curves: Sequence[Record]) -> PageTable:
@@ -242,9 +261,9 @@ def _point_table(curves: Sequence[Record]) -> PageTable:
                 row += ["", ""]
             row += [seconds[name] for name in ("setup_time_s", "setup_again_time_s", "output_time_s")]
             row += [str(curve.arrays[name][i]) for name in ("repeats", "steps")]
-            row.append(TableCell(status_text(status), tone="" if status == "ok" else "bad"))
+            row.append(TableCell(words_of(status), tone="" if status == "ok" else "bad"))
             rows.append(row)
-    return PageTable("Every setting measured.", head, rows, numeric=range(1, 14)).without_empty_columns()
+    return PageTable("Every setting measured.", head, rows)
 
 
 def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -> PageTable:
@@ -260,7 +279,7 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
                 setting += f" and {len(left_out) - 1} finer"
             claimed = "yes" if curve.arrays["false_success"][i] else ""
             seconds = prefixed(_finite(curve.arrays["run_time_s"][i]), "s")
-            rows.append([method_cell(curve.name), setting, seconds, status_text(status), claimed, message])
+            rows.append([method_cell(curve.name), setting, seconds, words_of(status), claimed, message])
     scene = None if stored is None else scene_of(stored)
     if scene is not None:
         for name in dict.fromkeys(ladder.method for ladder in ladders()):
@@ -270,7 +289,7 @@ def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -
                 rows.append([method_cell(name), "", "", "cannot represent the scene", "", str(exc)])
     head = ["method", "setting", "run time", "status", "engine reported ok", "reason"]
     caption = "Runs that failed, found from their state, and settings that the budget left out."
-    return PageTable(caption, head, rows, numeric=(1, 2)).without_empty_columns()
+    return PageTable(caption, head, rows)
 
 
 def _setting(curve: Record, i: int) -> str:

@@ -6,13 +6,13 @@ import json
 import math
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from xml.etree import ElementTree
 
 from rotor_mbs.analysis.checks import Check
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
 from rotor_mbs.report.core.numbers import NOTHING, number, with_unit
 from rotor_mbs.report.pages.scene_tables import method_cell
+from rotor_mbs.runs.read import OpenResults
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.studies.check import judge_file
 
@@ -114,9 +114,9 @@ def printable(text: str) -> str:
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
 
 
-def check_page(results: Path) -> dict[str, object]:
+def check_page(opened: OpenResults) -> dict[str, object]:
     """What `rotor-mbs check` finds in the results file. Raises StoreError, InputError."""
-    checks = judge_file(results, load_bounds(None))
+    checks = judge_file(opened.path, load_bounds(None))
     failed = [check for check in checks if not check.passed]
     count = f"{len(failed)} of {len(checks)} checks fail" if failed else f"All {len(checks)} checks pass"
     # A count of faults has no distance to its bound: zero is all there is.
@@ -140,7 +140,7 @@ def check_page(results: Path) -> dict[str, object]:
                 TableCell("pass", "good") if check.passed else TableCell("fail", "bad", note=printable(check.hint)),
             ])  # fmt: skip
         head = ("Check", "Method", "Where", "Seen", "Bound", "Margin", "Outcome")
-        return Section(tables=[PageTable(caption, head, rows, numeric=(3, 4, 5))])
+        return Section(tables=[PageTable(caption, head, rows)])
 
     return {
         "lead": [f"{count}: numbers computed again from the stored samples, each against its bound."],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 from rotor_mbs.analysis.claim_study import FAILS, HOLDS, RULE, UNDECIDED, ClaimShares, Conditions, NumberTrials
 from rotor_mbs.analysis.claims import STATISTICS, Claim
-from rotor_mbs.analysis.published import TrajectoryNumber, published
+from rotor_mbs.analysis.published import Published, published
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.numbers import NOTHING, SPACE, fixed, number, power, with_unit
 
@@ -16,25 +16,19 @@ _UNITS = {"angle": "rad", "rate": "rad/s"}
 _TONES = {HOLDS: "good", FAILS: "bad", UNDECIDED: ""}
 
 
-def unit_of(asked: TrajectoryNumber) -> str:
-    """The unit of the number, "" where it has none."""
-    return _UNITS[asked.quantity] if STATISTICS[asked.statistic].has_unit else ""
-
-
 def number_table(claims: Iterable[Claim]) -> PageTable:
     """The published numbers, a row each."""
-    head = ("Figure", "In the paper", "Printed", "As printed", "Verdict", "Corrected model", "Corrected model agrees?")
+    head = ("Figure", "Quantity", "Published", "As printed", "Reproduced?", "Corrected model", "Same number?")
     rows: list[Row] = []
     for claim in claims:
         item, printed, corrected = claim.published, claim.printed, claim.corrected
-        if not item.is_number:
+        if item.of is None:
             continue
-        assert item.of is not None  # every number has it
-        verdict = _verdict(printed.holds, "reproduced", "not reproduced")
+        verdict = _verdict(printed.holds, "yes", "no")
         if item.rounding and printed.holds:
             verdict = replace(verdict, note=ROUNDING)
         body = "rotor" if item.of.coordinate == 0 else f"pitch {item.of.coordinate}"
-        description = f"{STATISTICS[item.of.statistic].text} {body} {item.of.quantity} ({unit_of(item.of)})"
+        description = f"{STATISTICS[item.of.statistic].text} {body} {item.of.quantity} ({_unit(item)})"
         rows.append([
             item.figure,
             TableCell(description, note=f"«{item.quote}»", note_language="es"),
@@ -44,13 +38,18 @@ def number_table(claims: Iterable[Claim]) -> PageTable:
             fixed(corrected.value, item.decimals + 2),
             _verdict(corrected.holds, "yes", "no"),
         ])  # fmt: skip
-    return PageTable("Published numbers", head, rows, numeric=(2, 3, 5))
+    return PageTable("Published numbers", head, rows)
+
+
+def _unit(item: Published) -> str:
+    """Of a number; "" where it has none."""
+    return _UNITS[item.of.quantity] if item.of is not None and STATISTICS[item.of.statistic].has_unit else ""
 
 
 def claim_table(claims: Iterable[Claim], shares: ClaimShares | None = None) -> PageTable:
     """The claims in words, a row each: verdicts by the shares of many runs, if there are any, else by stored runs."""
     durations = [] if shares is None else shares.durations
-    head = ["Figure", "In the paper"]
+    head = ["Figure", "Claim"]
     for side in ("As printed", "Corrected model"):
         head += [side, *(f"over {duration:g}{SPACE}s" for duration in durations)]
     rows: list[Row] = []
@@ -91,41 +90,33 @@ def study_note(shares: ClaimShares) -> str:
 def trial_tables(trials: NumberTrials) -> list[PageTable]:
     """The published numbers for other durations, other tolerances and other ways of writing the first row of (56)."""
     items = {item.id: item for item in published() if item.id in trials.numbers}
-    heads = [
-        f"Fig. {item.figure}: {fixed(item.value, item.decimals)} {unit_of(item.of)}"
-        for item in items.values()
-        if item.of is not None  # every number has it
-    ]
+    heads = [f"Fig. {item.figure}: {fixed(item.value, item.decimals)} {_unit(item)}" for item in items.values()]
     usual = trials.usual
-    over = f", over {with_unit(usual.duration, 's')}"
 
-    def table(caption: str, head: Sequence[str], labels: Mapping[Conditions, Row], first: int = 1) -> PageTable:
-        rows: list[Row] = []
-        for conditions, texts in labels.items():
-            tried = trials.under(conditions)
-            cells = [
-                TableCell(fixed(tried[name].value, item.decimals), tone="good" if tried[name].reproduced else "")
-                for name, item in items.items()
-            ]
-            rows.append([*texts, *cells])
-        return PageTable(caption, (*head, *heads), rows, numeric=range(first, len(head) + len(heads)))
+    def values(conditions: Conditions) -> list[TableCell]:
+        tried = trials.under(conditions)
+        return [
+            TableCell(fixed(tried[name].value, item.decimals), tone="good" if tried[name].reproduced else "")
+            for name, item in items.items()
+        ]
 
-    durations: dict[Conditions, Row] = {
-        conditions: [with_unit(conditions.duration, "s")] for conditions in trials.of_row(usual.gravity_row)
-    }
-    tolerances: dict[Conditions, Row] = {
-        conditions: [_power(conditions.relative_tolerance), _power(conditions.absolute_tolerance)]
+    durations: list[Row] = [
+        [with_unit(conditions.duration, "s"), *values(conditions)] for conditions in trials.of_row(usual.gravity_row)
+    ]
+    tolerances: list[Row] = [
+        [_power(conditions.relative_tolerance), _power(conditions.absolute_tolerance), *values(conditions)]
         for conditions in trials.with_tolerances()
-    }
-    rows: dict[Conditions, Row] = {}
-    for row in trials.rows:
+    ]
+    rows: list[Row] = []
+    for row, formula in trials.rows.items():
         conditions = replace(usual, gravity_row=row)
-        for trial in list(trials.under(conditions).values())[:1]:
-            rows[conditions] = [TableCell(trials.rows[row]), number(trial.remainder)]
+        remainder = next(iter(trials.under(conditions).values())).remainder
+        rows.append([formula, number(remainder), *values(conditions)])
+    over = f", over {with_unit(usual.duration, 's')}"
     return [
-        table("The published numbers by the duration of the run", ("Duration",), durations),
-        table(f"The published numbers by the tolerances of ode45{over}", ("RelTol", "AbsTol"), tolerances, 2),
-        table(f"By the way of writing the first row of (56){over}", ("Row", "At the start (N m)"), rows),
+        PageTable("The published numbers by the duration of the run", ("Duration", *heads), durations),
+        PageTable(f"The published numbers by the tolerances of ode45{over}", ("RelTol", "AbsTol", *heads), tolerances),
+        PageTable(f"By the way of writing the first row of (56){over}", ("Row", "At the start (N m)", *heads), rows),
     ]
 
 

@@ -37,7 +37,6 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
             (e.equation, e.entry, e.printed, e.right, number(e.difference), e.explained_by or "nothing")
             for e in differing
         ],
-        numeric=(4,),
     )
     # What each erratum alone does.
     effects_head = ["Scene"]
@@ -52,18 +51,18 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
             if run is None:
                 row += ["", "", ""]
                 continue
-            status = "" if run.status in GOOD else status_text(run.status)
+            status = "" if run.status in GOOD else status_text(run)
             row.append(TableCell(number(metric(run, "angle_error_max")), note=status))
             row += [number(metric(run, "angle_error_whole")), prefixed(metric(run, "energy_gain_J"), "J")]
         if any(run is not None for run in runs):
             effects.append(row)
-    effects_table = PageTable("", effects_head, effects, numeric=range(1, len(effects_head)))
+    effects_table = PageTable("", effects_head, effects)
     agreeing_rows = [(e.equation, e.entry, e.printed, number(e.difference)) for e in agreeing]
     return {
         "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in context.errata],
         "differing": Section(tables=[differing_table]),
-        "effects": Section(tables=[effects_table.without_empty_columns()]),
-        "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows, numeric=(3,)),
+        "effects": Section(tables=[effects_table]),
+        "agreeing": PageTable("", ("Equation", "Entry", "Printed", "Relative difference"), agreeing_rows),
         "largest_agreeing": max((entry.difference for entry in agreeing), default=0.0),
     }
 

@@ -200,6 +200,10 @@ def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> d
     is_torques = figure.kind == TORQUES  # all in one picture per model
     panels = []
     for letter, name in [("", figure.panels[0][1])] if is_torques else figure.panels:
+        first = next(other.number for other in FIGURES if name in [scene for _, scene in other.panels])
+        conditions = f"The run of Figure {first}:"
+        if first == figure.number:
+            conditions = _conditions(scenes[name], with_torque=not is_torques)
         pictures = []
         for key, runs in runs_of_panels.get(letter, {}).items():
             drawn = canvas.panels((4.1,) if figure.kind == PATHS else (1.7, 1.7), "")
@@ -213,7 +217,7 @@ def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> d
             "letter": letter,
             "scene": name,
             "href": context.files[name],
-            "conditions": _conditions(scenes[name], with_torque=not is_torques),
+            "conditions": conditions,
             "pictures": pictures,
         })  # fmt: skip
     return {
@@ -256,7 +260,7 @@ def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
                 rotor = run.array("angles")[:, 0]
                 row[place] = number(float(rotor[-1] - rotor[0]), 3)
         rows.append(row)
-    return PageTable("", head, rows, numeric=range(1, len(head))).without_empty_columns()
+    return PageTable("", head, rows)
 
 
 def _largest_pitch(run: StoredRun) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,8 +11,9 @@ import numpy as np
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.report import plots
+from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
-from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of, with_capital
+from rotor_mbs.report.core.looks import Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import LOWEST, Series
@@ -28,7 +29,7 @@ VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
 class Component(NamedTuple):
     """A component of a quantity over time."""
 
-    group: str  # the picture it is drawn in
+    group: str  # the panel it is drawn in
     label: str  # its line there
     place: int  # index of the line's look
     values: Array  # (n,)
@@ -50,7 +51,8 @@ def quantity_sections(scene: StoredScene, runs: Runs, horizon: float | None) -> 
             continue
         name = f"quantity-{quantity.name}"
         if plot.logarithmic:
-            curves = magnitudes(quantity, own)
+            sizes_of_runs = {method: _over_components(np.abs(run.array(quantity.name))) for method, run in own.items()}
+            curves = over_time(own, sizes_of_runs)
             shown = error_picture(curves, plot.axis, name, plot.title, horizon) if visible(curves) else None
             section = Section([] if shown is None else [shown], run_legend(visible(curves)))
         elif len(quantity.dimensions) == 1:
@@ -71,17 +73,15 @@ def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, h
     rule = quantity.judgement
     is_compared = rule is not None and rule.with_reference and REFERENCE in runs
     pictures: list[Picture] = []
-    legend: dict[str, LegendEntry] = {}
+    legend: list[LegendEntry] = []
     for i, run in enumerate([runs[REFERENCE]] if is_compared else runs.values()):
-        parts = components(quantity, run.array(quantity.name), run.labels)
-        for k, group in enumerate(dict.fromkeys(part.group for part in parts)):
-            lines = [part for part in parts if part.group == group]
-            series = [Series(run.array("time"), part.values, coordinate_look(part.place)) for part in lines]
-            caption = with_capital(label_of(run.method)) + (f", {group} axis" if group else "")
-            pictures.append(picture(plots.lines([(plot.axis, series)], horizon), f"{name}-{i}-{k}", caption))
-            legend |= {part.label: LegendEntry(part.label, coordinate_look(part.place)) for part in lines}
+        values = run.array(quantity.name)
+        panels, looks = component_panels(quantity, plot, run.array("time"), values, run.labels, horizon)
+        caption = f"{with_capital(label_of(run.method))}: {quantity.long_name}"
+        pictures.append(picture(panels, f"{name}-{i}", caption))
+        legend = [LegendEntry(label, look) for label, look in looks.items()]
     if not is_compared:
-        return Section(pictures, list(legend.values()))
+        return Section(pictures, legend)
     exact = runs[REFERENCE].array(quantity.name)
 
     def difference(run: StoredRun) -> Array:
@@ -91,7 +91,7 @@ def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, h
         return _over_components(sizes(quantity, values[:n] - exact[:n]))
 
     others = {method: run for method, run in runs.items() if method != REFERENCE}
-    errors = _curves(others, quantity.name, difference)
+    errors = over_time(others, {method: difference(run) for method, run in others.items()})
     shown = error_picture(
         errors, f"difference ({quantity.units})", f"{name}-error", "Largest difference from the reference", horizon,
         legend=run_legend(visible(errors)),
@@ -106,18 +106,24 @@ def _components_section(quantity: Quantity, plot: Plot, runs: Runs, name: str, h
             row += [prefixed(float(part.values[k]), quantity.units), number(float(time[k]), 4)]
         rows.append(row)
     head = ("Component", "Smallest", "at (s)", "Largest", "at (s)")
-    table = PageTable("Extremes in the reference", head, rows, numeric=(1, 2, 3, 4))
-    return Section(pictures, list(legend.values()), [table])
+    return Section(pictures, legend, [PageTable("Extremes in the reference", head, rows)])
 
 
-def magnitudes(quantity: Quantity, runs: Runs) -> Curves:
-    """The largest magnitude of the quantity over its components, of each run that has it."""
-    return _curves(runs, quantity.name, lambda run: _over_components(np.abs(run.array(quantity.name))))
+def component_panels(
+    quantity: Quantity, plot: Plot, time: Array, values: Array, labels: Sequence[str] = (), horizon: float | None = None
+) -> tuple[Panels, dict[str, Look]]:
+    """A panel per axis with a line per blade, or one panel with a line per component; the looks of the lines."""
+    rows: dict[str, list[Series]] = {}
+    looks: dict[str, Look] = {}
+    for part in components(quantity, values, labels):
+        looks[part.label] = coordinate_look(part.place)
+        axis = f"{part.group} {plot.axis}".strip()
+        rows.setdefault(axis, []).append(Series(time, part.values, looks[part.label]))
+    return plots.lines(list(rows.items()), horizon, height=2.3 if len(rows) == 1 else 1.3), looks
 
 
-def _curves(runs: Runs, name: str, measure: Callable[[StoredRun], Array]) -> Curves:
-    """What `measure` makes of each run that has the array `name`, over the run's first samples."""
-    values = {method: measure(run) for method, run in runs.items() if name in run}
+def over_time(runs: Runs, values: Mapping[str, Array]) -> Curves:
+    """The values (n,) of runs, by method, over their first samples."""
     return {method: Series(runs[method].array("time")[: len(x)], x, look_of(method)) for method, x in values.items()}
 
 
@@ -128,7 +134,7 @@ def _over_components(values: Array) -> Array:
 
 
 def components(quantity: Quantity, values: Array, labels: Sequence[str] = ()) -> list[Component]:
-    """One by one: with blades and axes, a picture per axis and a line per blade; else one picture."""
+    """One by one: with blades and axes, a panel per axis and a line per blade; else one panel."""
     names = {"coordinate": labels, "axis": ["x", "y", "z"]}
     shown = names.get(quantity.dimensions[1], [f"blade {i + 1}" for i in range(values.shape[1])])[: values.shape[1]]
     first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
@@ -169,7 +175,8 @@ def differences(runs: Runs, reference: StoredRun | None) -> Curves:
     """Largest angle difference (rad) from the reference over the coordinates, at the samples that both have."""
     if reference is None or "angles" not in reference or not len(reference.array("time")):
         return {}
-    return _curves(runs, "angles", lambda run: angle_difference(run, reference))
+    values = {method: angle_difference(run, reference) for method, run in runs.items() if "angles" in run}
+    return over_time(runs, values)
 
 
 def angle_difference(first: StoredRun, second: StoredRun) -> Array:
@@ -184,11 +191,3 @@ def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, flo
     gap = angle_difference(printed, corrected)
     apart = np.flatnonzero(gap > VISIBLE)
     return (float(printed.array("time")[apart[0]]) if len(apart) else None), float(gap.max(initial=0.0))
-
-
-def energy_picture(runs: Runs, horizon: float | None = None) -> tuple[Picture | None, list[str]]:
-    """Total energy less work, from its start (J), of each run that has it; None without. The methods that are drawn."""
-    curves = _curves(runs, "energy_error", lambda run: run.array("energy_error"))
-    caption = "Total energy less work, from its start: filled marks gained, open ones lost"
-    shown = error_picture(curves, "|energy error| (J)", "energy", caption, horizon, signed=True)
-    return shown, list(visible(curves))

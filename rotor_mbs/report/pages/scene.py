@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import TIME_AXIS, Panels
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section, line_entry
+from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, line_entry
 from rotor_mbs.report.core.looks import GREY, VERMILLION, Look, coordinate_look, label_of, look_of, with_capital
 from rotor_mbs.report.core.numbers import fixed, number, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
@@ -22,11 +23,14 @@ from rotor_mbs.report.pages import Context, claim_tables, quantities, scene_tabl
 from rotor_mbs.report.pages.bench import cost_section
 from rotor_mbs.report.pages.quantities import VISIBLE, Runs, parting
 from rotor_mbs.report.pages.scene_tables import method_cell, metric
+from rotor_mbs.report.pages.stability import outcome_section, step_section
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Table, value_at
+from rotor_mbs.solution.status import GOOD
+from rotor_mbs.solution.text_table import listed
 from rotor_mbs.solution.trajectory import Array
 
 MAX_PUBLISHED = 2  # published values on one picture
@@ -40,7 +44,8 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
     horizon = scene_tables.horizon(scene)
     # The printed run and the one that stands for the corrected model, then the others of corrected models.
     sides = run_selection.sides(scene)
-    drawn = {run.method: run for run in sides.values()}
+    runs = list(sides.values())
+    drawn = {run.method: run for run in runs}
     for method, run in run_selection.corrected_runs(scene).items():
         if run_selection.has_samples(run):
             drawn[method] = run
@@ -56,6 +61,7 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
     notes = [condition] if condition else []
     if study is not None and any(not claim.published.is_number for claim in claims):
         notes.append(claim_tables.study_note(study.shares))
+    suite_runs = [run for run in context.suite_runs if run.scene == name]
     figures = str(scene.attributes.get("figures", ""))
     parsed = scene_of(scene)
     has_zero_pitch = any("zero_pitch_max" in run.attributes for run in scene.runs.values())
@@ -65,20 +71,22 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
         "figures": figures and f"{'Figures' if ',' in figures else 'Figure'} {figures} of the paper",
         "toml": str(scene.attributes.get("scene_toml", "")),
         "source": opening_comment(scene),
-        "failures": Section(tables=[scene_tables.failure_table(scene)]),
+        "failures": Section(tables=[] if suite_runs else [scene_tables.failure_table(scene)]),
+        "outcomes": outcome_section(scene, suite_runs),
         "claims": Section(tables=[table for table in tables if table.rows], notes=notes),
-        "viewer": viewer(scene, {label_of(run.method): run for run in sides.values()}),
-        "key": key_picture(list(sides.values()), claims, horizon),
-        "paths": _tips_section(parsed, list(sides.values()), horizon),
-        "motion": _motion_section(list(sides.values()), horizon),
+        "viewer": viewer(scene, {label_of(run.method): run for run in runs}),
+        "key": key_picture(runs, claims, horizon),
+        "paths": _tips_section(parsed, runs, horizon),
+        "motion": _motion_section(runs, horizon),
         "difference": _difference_section(scene, sides, drawn, horizon),
         "energy": _energy_section(sides, drawn, horizon),
         "drive": _drive_section(parsed, sides.get("corrected")),
         "cost": cost_section(scene, context.curves.get(name, ())),
+        "steps": step_section(name, context.ladders),
         "quantities": quantities.quantity_sections(scene, drawn, horizon),
         "metrics": Section(tables=[scene_tables.metrics_table(scene)]),
         "has_horizon": horizon is not None,
-        "has_printed": any(run.status == "completed" and not is_corrected(run.method) for run in scene.runs.values()),
+        "has_printed": any(run.status in GOOD and not is_corrected(run.method) for run in scene.runs.values()),
         "has_zero_pitch": has_zero_pitch,
         "escape_rate": escape_rate(parsed) if has_zero_pitch and parsed is not None else None,
         "previous": pages[place - 1],
@@ -100,24 +108,32 @@ def opening_comment(scene: StoredScene) -> str:
 def key_picture(
     sides: Sequence[StoredRun], claims: Sequence[Claim], horizon: float | None, name: str = "key"
 ) -> Picture | None:
-    """The rotor's angle and the pitch that differs most, printed and corrected, with published values; None without."""
+    """The rotor's angle and the pitch that differs most, printed and corrected, with published values.
+
+    Of one model alone all its angles. None where no run has angles.
+    """
     runs = [run for run in sides if "angles" in run]
     if not runs:
         return None
     labels = runs[0].labels
+    if len(runs) == 1:
+        panels = plots.motion(runs[0].array("time"), runs[0].array("angles"), None, horizon)
+        legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(labels)]
+        caption = f"{with_capital(label_of(runs[0].method))}: angles over time"
+        return picture(panels, name, caption, legend=[*legend, *horizon_entry(horizon, runs)])
     # Beside the rotor the pitch that differs most, or moves most.
     shown = [0]
-    angles = [run.array("angles") for run in runs]
-    count = min(map(len, angles))
-    for values in ([angles[0][:count] - angles[1][:count]] if len(runs) > 1 else []) + [angles[-1]]:
+    printed, corrected = (run.array("angles") for run in runs)
+    count = min(len(printed), len(corrected))
+    for values in (printed[:count] - corrected[:count], corrected):
         largest = np.abs(values[:, 1:]).max(axis=0, initial=0.0)
         if largest.size and largest.max() > 1e-6:
             shown.append(1 + int(largest.argmax()))
             break
-    looks = {}
-    for run in runs:  # the printed model is dashed upon the corrected one
-        line = "-" if run.method == REFERENCE or is_corrected(run.method) else "--"
-        looks[run.method] = Look(look_of(run.method).colour, line, "")
+    # The printed model is dashed upon the corrected one.
+    looks = {
+        run.method: Look(look_of(run.method).colour, line, "") for run, line in zip(runs, ("--", "-"), strict=True)
+    }
     panels_of = []
     for i in shown:
         series = [Series(run.array("time"), run.array("angles")[:, i], looks[run.method]) for run in reversed(runs)]
@@ -128,15 +144,10 @@ def key_picture(
         if item.is_number and of is not None and of.quantity == "angle" and of.coordinate in shown:
             text = f"published {fixed(item.value, item.decimals)} rad"
             marks.append((shown.index(of.coordinate), item.value, text))
-    parted = None
-    caption = f"{with_capital(label_of(runs[0].method))}: angles over time"
-    if len(runs) > 1:
-        parted, largest = parting(runs[0], runs[1])
-        caption = f"Rotor and pitch angles of both models, which differ by up to {with_unit(largest, 'rad')}"
-    legend = [
-        LegendEntry(label_of(run.method), looks[run.method], 2.4 if looks[run.method].line == "-" else 1.3)
-        for run in runs
-    ]
+    parted, difference = parting(*runs)
+    caption = f"Rotor and pitch angles of both models, which differ by up to {with_unit(difference, 'rad')}"
+    widths = {"-": 2.4, "--": 1.3}
+    legend = [LegendEntry(label_of(method), look, widths[look.line]) for method, look in looks.items()]
     legend += horizon_entry(horizon, runs)
     if marks:
         legend.append(line_entry("published", line=":"))
@@ -171,8 +182,10 @@ def departure(
             axes.axvline(parted, color=GREY, linewidth=1.0, linestyle="-")
             if not place:
                 text = f"{VISIBLE:g} rad apart at {parted:.2g} s"
-                top = axes.get_ylim()[1]
-                axes.text(parted + 0.01 * end, top, text, color=GREY, ha="left", va="top", fontsize=8.5)
+                low, high = axes.get_ylim()
+                then = float(np.interp(parted, series[0].time, series[0].values))
+                side, height = ("bottom", low) if then > 0.5 * (low + high) else ("top", high)  # away from the curves
+                axes.text(parted + 0.01 * end, height, text, color=GREY, ha="left", va=side, fontsize=8.5)
     return panels
 
 
@@ -194,10 +207,22 @@ def _motion_section(sides: Sequence[StoredRun], horizon: float | None) -> Sectio
         notes = []
         if any(values is not None and plots.is_cut(values) for values in (angles, rates)):
             notes.append("Values beyond the axes are cut off.")
+        unresolved = _unresolved(run)
+        if unresolved:
+            notes.append(f"Only the range is meaningful, samples are too far apart: {listed(unresolved)}.")
         panels = plots.motion(run.array("time"), angles, rates, horizon)
         pictures.append(picture(panels, f"motion-{i}", with_capital(label_of(run.method)), notes))
     legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(runs[0].labels)]
     return Section(pictures, [*legend, *horizon_entry(horizon, runs)], [range_table(runs)])
+
+
+def _unresolved(run: StoredRun) -> list[str]:
+    """Coordinates that at their largest rate would cross their whole range between two samples."""
+    if "angles" not in run or "rates" not in run or len(run.array("time")) < 2:
+        return []
+    interval = float(run.array("time")[1] - run.array("time")[0])
+    ranges, fastest = np.ptp(run.array("angles"), axis=0), np.abs(run.array("rates")).max(axis=0)
+    return [label for label, a, w in zip(run.labels, ranges, fastest, strict=True) if w * interval > a > 0.0]
 
 
 def range_table(runs: Sequence[StoredRun]) -> PageTable:
@@ -221,7 +246,7 @@ def range_table(runs: Sequence[StoredRun]) -> PageTable:
             largest[0] = largest[0] if fastest is None else fastest
             for row, rate in zip(rows, largest, strict=True):
                 row.append(number(rate, 3))
-    return PageTable("Extremes", head, rows, numeric=range(1, len(head)))
+    return PageTable("Extremes", head, rows)
 
 
 def _tips_section(scene: Scene | None, sides: Sequence[StoredRun], horizon: float | None) -> Section:
@@ -259,7 +284,7 @@ def _tips_section(scene: Scene | None, sides: Sequence[StoredRun], horizon: floa
         lengths = np.linalg.norm(np.diff(tip, axis=0), axis=2).sum(axis=0)
         for row, length, off in zip(rows, lengths, np.abs(tip[:, :, 1]).max(axis=0), strict=True):
             row += [prefixed(length, "m"), prefixed(off, "m")]
-    return Section(pictures, [*lines, *ends], [PageTable("Paths of the tips", head, rows, range(1, len(head)))])
+    return Section(pictures, [*lines, *ends], [PageTable("Paths of the tips", head, rows)])
 
 
 def offsets_over_azimuth(angles: Array, tip: Array, phases: Sequence[float]) -> Panels:
@@ -307,7 +332,7 @@ def _difference_section(scene: StoredScene, sides: Runs, drawn: Runs, horizon: f
     legend += horizon_entry(horizon, sides.values())
     table = PageTable(
         "Uncertainty of the angles, by the method's own estimate (rad)",
-        ("Method", "up to the horizon", "whole run"), rows, numeric=(1, 2),
+        ("Method", "up to the horizon", "whole run"), rows,
     )  # fmt: skip
     return Section([shown] if shown else [], legend, [table] if rows else [])
 
@@ -315,18 +340,23 @@ def _difference_section(scene: StoredScene, sides: Runs, drawn: Runs, horizon: f
 def _energy_section(sides: Runs, drawn: Runs, horizon: float | None) -> Section:
     """Energy less work from its start, of every run; what each run has and how well it conserves it."""
     runs = {name: run for name, run in drawn.items() if "energy_error" in run}
-    shown, methods = quantities.energy_picture(runs, horizon)
+    curves = quantities.over_time(runs, {name: run.array("energy_error") for name, run in runs.items()})
+    caption = "Energy error: change of total energy less work"
+    shown = quantities.error_picture(curves, "|energy error| (J)", "energy", caption, horizon, signed=True)
     if shown is None:
         return Section()
-    legend = [*quantities.run_legend(methods), *horizon_entry(horizon, sides.values())]
-    head = ("Method", "Largest kinetic energy", "Work at the end", "Largest gain", "Drift (relative)")
-    rows = []
+    shown = replace(shown, notes=["Filled marks: gained. Open marks: lost.", *shown.notes])
+    legend = [*quantities.run_legend(quantities.visible(curves)), *horizon_entry(horizon, sides.values())]
+    head = (
+        "Method", "Largest kinetic energy (J)", "Work at the end (J)", "Largest gain (J)", "Drift (relative)",
+    )  # fmt: skip
+    rows: list[Row] = []
     for name, run in runs.items():
         kinetic = float(run.array("kinetic_energy").max()) if "kinetic_energy" in run else None
         work = float(run.array("work")[-1]) if "work" in run and run.array("work").any() else None
-        joules = [prefixed(value, "J") for value in (kinetic, work, metric(run, "energy_gain_J"))]
-        rows.append([method_cell(name), *joules, number(metric(run, "energy_drift_max"))])
-    return Section([shown], legend, [PageTable("", head, rows, numeric=(1, 2, 3, 4)).without_empty_columns()])
+        gain, drift = metric(run, "energy_gain_J"), metric(run, "energy_drift_max")
+        rows.append([method_cell(name), number(kinetic, 3), number(work, 3), number(gain, 3), number(drift)])
+    return Section([shown], legend, [PageTable("", head, rows)])
 
 
 def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
@@ -383,5 +413,5 @@ def _drive_section(scene: Scene | None, run: StoredRun | None) -> Section:
         legend += [LegendEntry(f"pitch {i + 1}", coordinate_look(1 + i)) for i in range(len(scene.blades))]
         if any(scene.bearing_rest):
             legend.append(LegendEntry("command", COMMAND))
-    table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows, numeric=(1, 2, 3))
+    table = PageTable("", ("Quantity", "Largest", "At the end", "Work"), rows)
     return Section(pictures, legend, [table] if rows else [])

@@ -2,31 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.methods.catalogue import REFERENCE, look_up
+from rotor_mbs.analysis.judgement import OK_ERROR
+from rotor_mbs.methods.catalogue import REFERENCE, is_corrected, look_up
 from rotor_mbs.report.core.elements import PageTable, Row, TableCell
 from rotor_mbs.report.core.looks import label_of
-from rotor_mbs.report.core.numbers import number, prefixed, with_unit
+from rotor_mbs.report.core.numbers import SPACE, number, prefixed, with_unit
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.solution.status import GOOD
 
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_whole", "tip_error_max")  # against the reference
 # Attributes of a results file that say what made it.
-_VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu", "created")
+_VERSIONS = ("rotor_mbs", "python", "exudyn", "heyoka", "numpy", "scipy", "h5py", "platform", "cpu")
 
 
-def status_text(status: str) -> str:
-    """A stored status as text: "solver failed" of "solver_failed"."""
+def status_text(run: StoredRun) -> str:
+    """ "solver failed" of "solver_failed"; of equations that are not claimed to be correct never "ok"."""
+    status = run.status
+    if status == "ok" and not is_corrected(run.method):
+        status = "completed"
+    return words_of(status)
+
+
+def words_of(status: str) -> str:
     return status.replace("_", " ")
 
 
-def status_cell(run: StoredRun) -> TableCell | str:
-    """The status; nothing good or bad is said of a completed run, of which nothing is claimed."""
-    if run.status in GOOD:
-        return TableCell("ok", tone="good") if run.status == "ok" else run.status
-    return TableCell(status_text(run.status), tone="bad")
+def status_cell(run: StoredRun) -> TableCell:
+    text = status_text(run)
+    return TableCell(text, tone="good" if text == "ok" else "" if run.status in GOOD else "bad")
+
+
+def error_cell(run: StoredRun) -> TableCell:
+    """The largest angle error up to the horizon; marked where it is beyond what is claimed."""
+    return bounded_cell(metric(run, "angle_error_max"), is_corrected(run.method))
+
+
+def bounded_cell(error: float | None, is_claimed: bool = True) -> TableCell:
+    is_over = is_claimed and error is not None and not error <= OK_ERROR
+    return TableCell(number(error), tone="bad" if is_over else "")
 
 
 def method_cell(name: str) -> TableCell | str:
@@ -56,10 +72,25 @@ def horizon(scene: StoredScene) -> float | None:
     return next((value for value in known if value is not None), None)
 
 
+def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
+    """s: how much of the scenes' time lies before their horizons, and how much they have in all."""
+    compared = whole = 0.0
+    for scene in scenes:
+        if scene.reference is not None and run_selection.has_samples(scene.reference):
+            end = float(scene.reference.array("time")[-1])
+            whole += end
+            compared += min(horizon(scene) or 0.0, end)
+    return compared, whole
+
+
 def metrics_table(scene: StoredScene) -> PageTable:
     """Every run of the scene."""
     head = {
-        "angle_error_max": "Angle error to the horizon (rad)",
+        "defect_max": "Largest defect of an interval (rad)",
+        "defect_median": "Median defect (rad)",
+        "defect_time_s": "Largest defect at (s)",
+        "angle_error_max": f"Angle error to the horizon (rad), at most {OK_ERROR:g}",
+        "error_predicted_end": "Predicted error at the end (rad)",
         "angle_error_whole": "Angle error, whole run (rad)",
         "tip_error_max": "Tip error to the horizon (m)",
         "energy_drift_max": "Energy drift (relative)",
@@ -70,8 +101,10 @@ def metrics_table(scene: StoredScene) -> PageTable:
     for run in run_selection.in_order(scene).values():
         row = [run_cell(run), status_cell(run)]
         for name in head:
-            is_own_error = run.method == REFERENCE and name in _ERRORS_OF_RUNS
-            row.append("" if is_own_error else number(metric(run, name)))
+            if run.method == REFERENCE and name in _ERRORS_OF_RUNS:
+                row.append("")
+            else:
+                row.append(error_cell(run) if name == "angle_error_max" else number(metric(run, name)))
         # Whether pitches that are exactly zero in the reference stayed so, and until when.
         left, rate = metric(run, "zero_pitch_left_s"), metric(run, "zero_pitch_growth_per_s")
         if "zero_pitch_max" not in run.attributes:
@@ -86,21 +119,24 @@ def metrics_table(scene: StoredScene) -> PageTable:
             row.append("" if count is None else f"{count:.0f}")
         row += [prefixed(metric(run, name), "s") for name in ("setup_time_s", "run_time_s")]
         rows.append(row)
-    columns = ("Method", "Status", *head.values(), "Zero pitch", "Steps", "Evaluations", "Set-up", "Run")
-    return PageTable("", columns, rows, numeric=(2, 3, 4, 5, 6, 7, 9, 10, 11, 12)).without_empty_columns()
+    return PageTable(
+        "", ("Method", "Status", *head.values(), "Zero pitch", "Steps", "Evaluations", "Set-up", "Run"), rows
+    )
 
 
 def failure_table(scene: StoredScene) -> PageTable:
-    """The runs that are not ok."""
+    """The runs that did not do what is expected of their method."""
     rows = []
     for run in run_selection.in_order(scene).values():
-        if run.status != "ok":
+        if run.status not in GOOD:
             reached = float(run.array("time")[-1]) if run_selection.has_samples(run) else 0.0
             message = str(run.attributes.get("message", ""))
             rows.append([run_cell(run), status_cell(run), message, with_unit(reached, "s", 4)])
-    return PageTable("", ("Method", "Status", "Message", "Samples up to"), rows, numeric=(3,))
+    return PageTable("", ("Method", "Status", "Message", "Samples up to"), rows)
 
 
 def versions(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
-    """(what, version) of the programs and the computer that made a file."""
-    return [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
+    """(what, version) of the programs and the computer that made a file, and when."""
+    made = [(name, str(attributes[name])) for name in _VERSIONS if attributes.get(name)]
+    created = str(attributes.get("created", ""))
+    return [*made, ("created", f"{created[:16].replace('T', SPACE)}{SPACE}UTC")] if created else made

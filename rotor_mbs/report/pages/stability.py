@@ -1,26 +1,27 @@
-"""Pages of the stability suite: the map of all scenes and methods, and a page per scene."""
+"""The stability suite: the map of all scenes and methods, and what the pages of its scenes have more than others."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from rotor_mbs.analysis import run_selection
-from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, reached_by, suite_runs
-from rotor_mbs.report import plots
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Row, Section, TableCell
-from rotor_mbs.report.core.files import Site, page_names, render
-from rotor_mbs.report.core.looks import coordinate_look, label_of, look_of
+from rotor_mbs.analysis.stability import OUTCOMES, TARGET, SuiteRun, advice_lines, reached_by
+from rotor_mbs.report.core import canvas
+from rotor_mbs.report.core.canvas import Panels
+from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
+from rotor_mbs.report.core.looks import GREY, Look, label_of, look_of
 from rotor_mbs.report.core.numbers import number, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import quantities
-from rotor_mbs.report.pages.scene import opening_comment
+from rotor_mbs.report.pages import Context
+from rotor_mbs.report.pages.quantities import run_legend
 from rotor_mbs.report.pages.scene_tables import horizon, method_cell, run_cell
-from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene
+from rotor_mbs.report.plots import HIGHEST, LOWEST
+from rotor_mbs.runs.read import OpenResults, StoredScene
 from rotor_mbs.runs.records import Record, read_records
-from rotor_mbs.solution.text_table import listed
+from rotor_mbs.solution.trajectory import Array
 
 _FOLDERS = ("stiff", "extreme")
 _SUITE = ("stability", "stability_limits", "symmetry")
@@ -41,51 +42,12 @@ def is_stability_suite(results: OpenResults) -> bool:
     return bool(read_records(results.path, *_SUITE)) or (bool(folders) and folders <= set(_FOLDERS))
 
 
-def stability_pages(opened: OpenResults, main: str, site: Site) -> dict[str, str]:
-    """By file name, the map, in the file `main`, and a page per scene."""
-    runs, records = suite_runs(opened.path), read_records(opened.path, *_SUITE)
-    names = list(dict.fromkeys(run.scene for run in runs))
-    files = page_names(names)
-    pages = {main: render("stability", _map(runs, records, files, opened.scenes), site, main)}
-    for name, previous, following in zip(names, ["", *names], [*names[1:], ""], strict=False):
-        scene = opened.scenes[name]
-        ladders = {}
-        for record in records:
-            is_ladder = record.kind == "stability" and record.scene == name
-            if is_ladder and np.isfinite(record.arrays["angle_error_max"]).any():
-                ladders[record.method] = record.arrays
-        steps = Section()
-        if ladders:
-            curves = [
-                (arrays["step"], arrays["angle_error_max"], look_of(method)) for method, arrays in ladders.items()
-            ]
-            caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
-            shown = picture(plots.error_over_step(curves, TARGET), "steps", caption)
-            steps = Section([shown], quantities.run_legend(ladders))
-        page = {
-            "name": name,
-            "title": scene.title,
-            "figures": "",
-            "failures": Section(),
-            "source": opening_comment(scene),
-            "toml": str(scene.attributes["scene_toml"]),
-            "outcomes": _outcomes(scene, [run for run in runs if run.scene == name]),
-            "motion": _motion(run_selection.reference_or_corrected_run(scene)),
-            "errors": _errors(scene),
-            "steps": steps,
-            "previous": files.get(previous, ""),
-            "next": files.get(following, ""),
-        }
-        pages[files[name]] = render("stability_scene", page, site)
-    return pages
-
-
-def _map(
-    runs: Sequence[SuiteRun], records: Sequence[Record], files: Mapping[str, str], scenes: Mapping[str, StoredScene]
-) -> dict[str, object]:
+def stability_page(context: Context, opened: OpenResults) -> dict[str, object]:
+    """The content of the map, which is the index of the suite."""
+    runs, records, scenes = context.suite_runs, read_records(opened.path, *_SUITE), opened.scenes
     methods = list(dict.fromkeys(run.method for run in runs))
     families: dict[str, list[dict[str, object]]] = {}
-    for scene, file in files.items():
+    for scene, file in context.files.items():
         own = {run.method: run for run in runs if run.scene == scene}
         marks: list[tuple[str, str, str] | None] = []
         for method in methods:
@@ -135,13 +97,15 @@ def _map(
         "key": [(outcome, symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used],
         "summary": advice_lines(runs, label_of, lambda family: f"“{_FAMILIES.get(family, family)}”"),
         "false_successes": sum(run.false_success for run in runs),
-        "limits": Section(tables=[PageTable("", limits_head, limits, range(2, 7))]),
-        "conservation": Section(tables=[PageTable("", conserved_head, conserved, range(2, len(conserved_head)))]),
+        "limits": Section(tables=[PageTable("", limits_head, limits)]),
+        "conservation": Section(tables=[PageTable("", conserved_head, conserved)]),
     }
 
 
-def _outcomes(scene: StoredScene, own: Sequence[SuiteRun]) -> Section:
+def outcome_section(scene: StoredScene, own: Sequence[SuiteRun]) -> Section:
     """The outcome of each method; what limits the accuracy of any: rounding of the initial state times its growth."""
+    if not own:
+        return Section()
     rows: list[Row] = []
     for run in own:
         symbol, text = OUTCOMES[run.outcome]
@@ -161,44 +125,30 @@ def _outcomes(scene: StoredScene, own: Sequence[SuiteRun]) -> Section:
         names = ("angle_uncertainty", "error_growth")
         limits.append([with_unit(horizon(scene), "s", 4), *(number(float(reference.array(n).max())) for n in names)])
     limits_head = ("Horizon", "largest uncertainty of the angles (rad)", "error growth by the end")
-    return Section(
-        tables=[PageTable("", head, rows, (2, 3, 4, 5, 6)), PageTable("The reference", limits_head, limits, (0, 1, 2))]
-    )
+    return Section(tables=[PageTable("", head, rows), PageTable("The reference", limits_head, limits)])
 
 
-def _motion(run: StoredRun | None) -> Section:
-    if run is None or len(run.array("time")) < 2:
+def step_section(scene: str, ladders: Sequence[Record]) -> Section:
+    """The error over the fixed step, where it was measured."""
+    own = {record.method: record.arrays for record in ladders if record.scene == scene}
+    if not own:
         return Section()
-    # Coordinates that at their largest rate would cross their whole range between two samples.
-    interval = float(run.array("time")[1] - run.array("time")[0])
-    ranges, fastest = np.ptp(run.array("angles"), axis=0), np.abs(run.array("rates")).max(axis=0)
-    unresolved = [label for label, a, w in zip(run.labels, ranges, fastest, strict=True) if w * interval > a > 0.0]
-    notes = []
-    if unresolved:
-        notes.append(f"Only the range is meaningful, samples are too far apart: {listed(unresolved)}.")
-    legend = [LegendEntry(label, coordinate_look(i)) for i, label in enumerate(run.labels)]
-    panels = plots.motion(run.array("time"), run.get("angles"), run.get("rates"))
-    return Section([picture(panels, "motion", f"Angles and rates of {label_of(run.method)}", notes)], legend)
+    curves = [(arrays["step"], arrays["angle_error_max"], look_of(method)) for method, arrays in own.items()]
+    caption = "Largest angle error up to the horizon over the fixed step; no mark where the run failed"
+    return Section([picture(error_over_step(curves, TARGET), "steps", caption)], run_legend(own))
 
 
-def _errors(scene: StoredScene) -> Section:
-    runs = {}
-    for name, run in run_selection.corrected_runs(scene).items():
-        if run_selection.has_samples(run) and len(run.array("time")) > 1:
-            runs[name] = run
-    pictures = []
-    methods: set[str] = set()
-    differences = quantities.differences(runs, scene.reference)
-    if quantities.visible(differences):
-        caption = "Largest angle difference from the reference"
-        axis = "largest angle difference (rad)"
-        pictures.append(quantities.error_picture(differences, axis, "difference", caption, horizon(scene)))
-        methods |= quantities.visible(differences).keys()
-    for quantity, plot in quantities.plotted_quantities(scene):
-        sizes = quantities.magnitudes(quantity, runs) if plot.logarithmic else {}
-        if quantities.visible(sizes):
-            pictures.append(quantities.error_picture(sizes, plot.axis, quantity.name, plot.title))
-            methods |= quantities.visible(sizes).keys()
-    energy, drawn = quantities.energy_picture(runs)
-    legend = quantities.run_legend(name for name in runs if name in {*methods, *drawn})
-    return Section([shown for shown in (*pictures, energy) if shown is not None], legend)
+def error_over_step(series: Sequence[tuple[Array, Array, Look]], target: float) -> Panels:
+    """Error (rad) over the fixed step (s), both axes logarithmic, with a line at `target`."""
+    panels = canvas.panels((2.8,), "step (s)")
+    axes, known = panels.axes[0], [1e-8, 1e-6]
+    for steps, values, look in series:
+        shown = np.clip(values, LOWEST, HIGHEST)
+        known += [float(np.nanmin(shown)), float(np.nanmax(shown))]
+        canvas.curve(axes, steps, shown, look)
+    every_step = np.concatenate([steps for steps, _, _ in series])
+    canvas.log_axis(axes, every_step.min(), every_step.max(), "x")
+    canvas.log_axis(axes, min(known), max(known))
+    axes.axhline(target, color=GREY, linewidth=0.8, linestyle=":")
+    axes.set_ylabel("largest angle error (rad)")
+    return panels

@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.analysis.sweep_numbers import GROWN, Spread, StabilityMap, spread_of, stability_map
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.report.core import canvas
-from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, curve, growth_map, log_axis, panels
+from rotor_mbs.report.core.canvas import TIME_AXIS, Panels, colour_map, curve, growth_map, log_axis, panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
 from rotor_mbs.report.core.looks import BLUE, VERMILLION, Look, with_capital
 from rotor_mbs.report.core.numbers import SPACE, apart
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages.scene_tables import status_text, versions
+from rotor_mbs.report.pages.scene_tables import versions, words_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.scenario.scene import parse_scene
-from rotor_mbs.solution.status import STATUSES
+from rotor_mbs.solution.status import GOOD, STATUSES
 from rotor_mbs.solution.trajectory import Array
 
 _SPAN = 50.0  # between the smallest and the largest value, beyond which a distribution has a logarithmic axis
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
-_RESPONSE, _MAX_RESPONSES = "pitch_max", 3
+# What is drawn over the parameters: the first of these that differs from run to run.
+_RESPONSES = ("pitch_max", "rotor_rate_max", "rotor_angle_max")
+_MAX_RESPONSES = 3
 _MAX_POINTS = 200  # of a distribution
 _MAX_RUNS = 1000  # that have a point
 _MAX_GROWTH = 1e4  # the colours end there: the pitch has turned many times
@@ -35,7 +40,7 @@ _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 def sweep_page(sweep: StoredSweep) -> dict[str, object]:
     """The content of the page."""
     statuses = np.asarray(sweep.column("status"))
-    ok = statuses == STATUSES.index("ok")
+    ok = np.isin(statuses, [code for code, status in enumerate(STATUSES) if status in GOOD])
     lines = [with_capital(sweep.attributes["summary"].rstrip(".")) + "."]
     plots = _responses(sweep, ok)
     if _picture_kind(sweep):
@@ -55,13 +60,13 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         if len(values) < 2 or not np.ptp(values):
             continue
         low, middle, high = apart(*map(float, np.quantile(values, (0.05, 0.5, 0.95))))
-        what = f"median {middle}, 5 to 95 % from {low} to {high}"
-        caption = _axis(f"{with_capital(column.long_name)}: {what}", column.units)
+        caption = _axis(with_capital(column.long_name), column.units)
+        note = f"Median {middle}, 5 to 95 % from {low} to {high}."
         panels = distribution(values, _axis(name.replace("_", " "), column.units), logarithmic=_is_wide(values))
-        distributions.append(picture(panels, f"of-{name}", caption))
+        distributions.append(picture(panels, f"of-{name}", caption, [note]))
     codes, counts = np.unique(statuses, return_counts=True)
     status_rows = [
-        (status_text(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / len(statuses):.1f} %")
+        (words_of(STATUSES[code]) if code >= 0 else "missing", str(count), f"{100.0 * count / len(statuses):.1f} %")
         for code, count in sorted(zip(codes.tolist(), counts.tolist(), strict=True), key=lambda pair: -pair[1])
     ]
     parameter_rows = []
@@ -75,8 +80,8 @@ def sweep_page(sweep: StoredSweep) -> dict[str, object]:
         "title": sweep.attributes["title"],
         "summary": lines,
         "plots": Section(plots),
-        "statuses": Section(tables=[PageTable("", ("Status", "Runs", "Share"), status_rows, (1, 2))]),
-        "parameters": Section(tables=[PageTable("", head, parameter_rows, (2, 3, 4))]),
+        "statuses": Section(tables=[PageTable("", ("Status", "Runs", "Share"), status_rows)]),
+        "parameters": Section(tables=[PageTable("", head, parameter_rows)]),
         "distributions": Section(distributions),
         "toml": str(sweep.attributes.get("sweep_toml", "")),
         "versions": versions(sweep.attributes),
@@ -134,22 +139,45 @@ def _asked_picture(sweep: StoredSweep) -> tuple[Panels, str, str, list[LegendEnt
     return panels, caption, line, [LegendEntry(f"{GROWN:g} times its start", BOUNDARY)] if has_line else []
 
 
-def _responses(sweep: StoredSweep, ok: Array) -> list[Picture]:
-    """The largest pitch of each run that ended well, over each of the first parameters that were varied."""
-    values = sweep.column(_RESPONSE)[ok] if _RESPONSE in sweep.columns else np.empty(0)
-    if len(values) < 2 or not np.isfinite(values).all():
+def _responses(sweep: StoredSweep, ok: NDArray[np.bool_]) -> list[Picture]:
+    """A number of each run that ended well over what was varied: a map of a grid of two axes, else points."""
+    for name in _RESPONSES:
+        values = np.where(ok, sweep.column(name), np.nan) if name in sweep.columns else np.empty(0)
+        if np.isfinite(values).sum() > 1 and np.nanmax(values) > np.nanmin(values):
+            break
+    else:
         return []
+    quantity = sweep.columns[name].long_name
+    label = _axis(quantity, sweep.columns[name].units)
+    axes = {key: sweep.column(parameter_name(key)) for key in sweep.keys}
+    labels = {key: _axis(field_name(key), sweep.columns[parameter_name(key)].units) for key in sweep.keys}
+    shape = json.loads(sweep.attributes.get("shape", "[]"))  # of a grid: values along every axis, slowest first
+    if len(shape) == len(axes) == 2 and min(shape) > 1:
+        rows, columns = shape
+        grids = [x[: rows * columns].reshape(rows, columns) for x in (*axes.values(), values)]
+        panels = grid_map(grids[1][0], grids[0][:, 0], grids[2], [*reversed(labels.values())], label)
+        return [picture(panels, "grid", with_capital(quantity))]
     pictures = []
+    known = np.isfinite(values)
     for key in sweep.keys[:_MAX_RESPONSES]:
-        name = parameter_name(key)
-        parameter = sweep.column(name)[ok]
+        parameter = axes[key][known]
         if np.ptp(parameter):
-            label = _axis(field_name(key), sweep.columns[name].units)
-            panels = response(parameter, values, label, "largest pitch (rad)", logarithmic=_is_wide(parameter))
-            pictures.append(
-                picture(panels, f"over-{name}", f"The largest pitch of each run over the {field_name(key)}")
-            )
+            panels = response(parameter, values[known], labels[key], label, logarithmic=_is_wide(parameter))
+            caption = f"{with_capital(quantity)} of each run over the {field_name(key)}"
+            pictures.append(picture(panels, f"over-{parameter_name(key)}", caption))
     return pictures
+
+
+def grid_map(x: Array, y: Array, values: Array, labels: Sequence[str], label: str) -> Panels:
+    """`values` (y, x) as colour over both axes; labels: of x, of y; label: of the colours."""
+    panel = panels((3.8,), labels[0])
+    colour_map(panel, x, y, values, label)
+    panel.axes[0].set_ylabel(labels[1])
+    for values_of_axis, which in ((x, "x"), (y, "y")):
+        if _is_wide(values_of_axis):
+            panel.axes[0].set(**{f"{which}scale": "log"})
+    panel.figure.subplots_adjust(left=0.18)
+    return panel
 
 
 def _axis(label: str, unit: str) -> str:
@@ -196,6 +224,7 @@ def response(parameter: Array, values: Array, x_label: str, y_label: str, *, log
     curve(panel.axes[0], parameter[shown], values[shown], Look(BLUE, "", "o"), markersize=3.5, markerfacecolor=BLUE)
     if logarithmic:
         log_axis(panel.axes[0], float(parameter.min()), float(parameter.max()), "x")
+    panel.axes[0].margins(0.03)
     panel.axes[0].set_ylabel(y_label)
     return panel
 
