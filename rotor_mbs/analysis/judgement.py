@@ -107,7 +107,7 @@ def clearly_ok(
 
     Parameters
     ----------
-    metrics : of each run its energy_drift_max, and those of its defects.
+    metrics : of each run its energy_drift_max, and those of its defects where they were computed.
     angles : (k,) rad, the largest of each run.
     """
     bounds = shipped_bounds().with_entries(own)
@@ -117,8 +117,8 @@ def clearly_ok(
     shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
     within = [
         run["energy_drift_max"] <= energy
-        and run.get("defect_max", np.inf) <= defect
-        and run.get("angle_error_predicted", np.inf) <= OK_ERROR
+        and run.get("defect_max", 0.0) <= defect
+        and run.get("angle_error_predicted", 0.0) <= OK_ERROR
         for run in metrics
     ]
     return np.asarray(complete & np.array(within) & (np.array(shares) > _CLEAR_SHARE))

@@ -33,7 +33,8 @@ POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
     table: {name: COLUMNS[name] for name in names.split()}
     for table, names in {
         "bench": "status message angle_error_max angle_error_end tip_error_max energy_drift_max defect_max "
-        "defect_median run_time_s run_time_min_s run_time_q1_s run_time_q3_s setup_time_s setup_again_time_s output_time_s repeats steps "
+        "defect_median run_time_s run_time_min_s run_time_q1_s run_time_q3_s setup_time_s setup_again_time_s "
+        "output_time_s repeats steps "
         "false_success left_out horizon_s uncertainty_rad samples load_before pinned_core repeatable order crc32",
         "stability": "status message angle_error_max energy_drift_max false_success step_for_target_s crc32",
         "stability_limits": "status message largest_stable_step_s theory_s fastest_mode_per_s mode_damping_ratio crc32",

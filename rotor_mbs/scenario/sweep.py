@@ -236,6 +236,7 @@ class SweepTable:
     outputs: Sequence[str] | None = file_key("outputs", OUTPUT_NAMES, note=", or none: metrics alone", default=None)
     precision: str = file_key("precision", keys.choice(("float64", "float32")), default="float64")
     amplification: bool = file_key("amplification", keys.FLAG, note=": error growth of every run", default=False)
+    defects: bool = file_key("defects", keys.FLAG, note=": of runs by lagrange/taylor, too", default=False)
     combine: str = file_key("combine", keys.choice(("grid", "zip")), default="grid")
     draws: int | None = file_key("draws", _DRAWS, default=None)
     seed: int = file_key("seed", keys.whole(0, 2**63 - 1, "a whole number from 0 up"), default=0)

@@ -38,7 +38,7 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rou
     ----------
     time : (n,) s, increasing, within the scene's duration.
     angles, rates : (n, 1 + blades) rad and rad/s.
-    rounding : (2 + 2 blades,), or of each row: half a unit of the last digit of angles, then rates; of doubles if left out.
+    rounding : (2 + 2 blades,), or of each row: half a unit of the last digit of angles, then rates; else that of doubles.
 
     Returns
     -------

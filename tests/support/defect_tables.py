@@ -1,0 +1,118 @@
+"""The tables of docs/reading.md, from a file of `rotor-mbs reproduce`: python tests/support/defect_tables.py results.h5
+
+Defects of every default method, the smallest relative faults that they would show, and predicted against true errors.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from math import cos, sin
+from pathlib import Path
+
+import numpy as np
+
+from rotor_mbs.analysis.judgement import FLOOR_SAFETY
+from rotor_mbs.analysis.rehydrate import reference_of, rehydrate
+from rotor_mbs.methods.catalogue import is_corrected
+from rotor_mbs.models.lagrange import closed_form
+from rotor_mbs.models.lagrange.parameters import rate_units, rotor_form
+from rotor_mbs.models.lagrange.samples import loads_at
+from rotor_mbs.runs.read import open_results
+from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.metrics import HORIZON_GROWTH
+from rotor_mbs.solution.trajectory import Array, Trajectory
+
+FAULTS = ("c", "gravity", "Coriolis term", "torque", "phase")
+_SMALL = 1e-7  # relative (of the phase rad): far above rounding, and the defects are linear in it
+
+
+def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
+    """(n,) rad for each of `FAULTS`: the size of the defect of every interval for a relative fault of 1 (a phase: 1 rad).
+
+    To first order in the interval h: a wrong acceleration Δa is a defect of h Δa in the rates.
+    """
+    moving = scene.moving_coordinates
+    angles, rates = motion.angles[:, moving].T, motion.rates[:, moving].T
+    form, loads = rotor_form(scene), loads_at(scene, motion.time)
+    interval = scene.duration / (scene.samples - 1)
+    units = np.maximum(rate_units(scene), 1.0 / interval)[:, None]
+
+    def accelerations(form: object = form, loads: object = loads, rates: Array = rates) -> Array:
+        rows = closed_form.accelerations(list(angles), list(rates), form, loads, np.sin, np.cos)
+        return np.array([np.broadcast_to(row, angles[0].shape) for row in rows])
+
+    def size(difference: Array) -> Array:
+        return np.abs(difference * interval / units).max(axis=0)
+
+    right = accelerations()
+    further = 1.0 + _SMALL
+    blades = [
+        replace(blade, centre_of_mass=(blade.centre_of_mass[0] * further, *blade.centre_of_mass[1:]))
+        for blade in scene.blades
+    ]
+    phases = [(Fraction(cos(angle)), Fraction(sin(angle))) for angle in (_SMALL, *scene.phases[1:])]
+    rotor_alone, pitches_alone = rates.copy(), rates.copy()
+    rotor_alone[1:], pitches_alone[0] = 0.0, 0.0
+    products = right - accelerations(rates=rotor_alone) - accelerations(rates=pitches_alone)
+    return {
+        "c": size(accelerations(rotor_form(replace(scene, blades=tuple(blades)))) - right) / _SMALL,
+        "gravity": size(accelerations(rotor_form(replace(scene, gravity=scene.gravity * further))) - right) / _SMALL,
+        "Coriolis term": size(products + accelerations(rates=0.0 * rates)),
+        "torque": size(accelerations(loads=replace(loads, rotor=np.asarray(loads.rotor) * further)) - right) / _SMALL,
+        "phase": size(accelerations(rotor_form(scene, phases=phases)) - right) / _SMALL,
+    }
+
+
+def main(path: Path) -> None:
+    methods: dict[str, list[str]] = {}
+    predictions, bounds = [], shipped_bounds()
+    with open_results(path) as results:
+        for name, stored in results.scenes.items():
+            reference = reference_of(stored)
+            assert reference is not None
+            of_fault: dict[str, Array] = {}
+            for run in stored.runs.values():
+                solution = rehydrate(stored, run, reference).run
+                if solution is None or run.method == "reference":
+                    continue
+                of_fault = of_fault or signatures(solution.scene, reference)
+                facts = run.attributes
+                largest, median = facts["defect_max"], facts["defect_median"]
+                cells = [f"{largest:.0e}", f"{median:.0e}"]
+                if is_corrected(run.method):
+                    # A wrong number is in every interval: it shows where its largest defect is above the bound on the
+                    # largest, or their median above the bound on the median.
+                    own = bounds.for_scene(name)
+                    slack = FLOOR_SAFETY * facts["defect_floor"]
+                    limits = [(own.of("defect", run.method).value + slack, np.max)]
+                    if (of_median := own.find("defect median", run.method)) is not None:
+                        limits.append((of_median.value, np.median))
+                    for sizes in of_fault.values():
+                        seen = min(
+                            (limit / float(size(sizes)) for limit, size in limits if size(sizes) > 1e-12), default=1.0
+                        )
+                        cells.append(f"{seen:.0e}" if seen < 1.0 else "-")
+                    true, predicted = facts["angle_error_max"], facts.get("angle_error_predicted", np.nan)
+                    # Rounding is random from interval to interval: it adds up as the root of their number.
+                    growth = min(float(np.nanmax(reference.error_growth)), HORIZON_GROWTH)
+                    floor = facts["defect_floor"] * growth * np.sqrt(len(reference.time))
+                    judged = "" if not 10.0 * floor <= true <= 0.1 else f"{predicted / true:.2f}"
+                    predictions.append(
+                        f"| {name} | {run.method} | {facts['horizon_s']:.2f} | {true:.1e} | {predicted:.1e} | {judged} |"
+                    )
+                methods.setdefault(run.method, []).append(f"| {name} | " + " | ".join(cells) + " |")
+    for method, rows in methods.items():
+        heads = ["scene", "largest (rad)", "median (rad)", *(FAULTS if is_corrected(method) else ())]
+        print(f"\n**{method}**\n\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
+        print(*rows, sep="\n")
+    print(
+        "\n| scene | method | horizon (s) | error (rad) | predicted (rad) | predicted / error |\n|---|---|---|---|---|---|"
+    )
+    print(*predictions, sep="\n")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
