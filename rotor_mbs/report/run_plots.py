@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
@@ -56,6 +57,10 @@ class RunPlots:
         canvas.legend(panels.axes[0], list(looks.items()))
         return panels
 
+    def defects(self) -> Panels:
+        """The size (rad) of every interval's defect over time. Raises InputError for fewer than two samples."""
+        return ComparisonPlots({self._run.method: self._run}, self._reference).defects()
+
     def error(self) -> Panels:
         """Largest angle error (rad) against the reference over time. Raises InputError where there is none."""
         return ComparisonPlots({self._run.method: self._run}, self._reference).error()
@@ -82,6 +87,16 @@ class ComparisonPlots:
             raise InputError("no reference to compare with; allowed: run(..., reference=True) computes one")
         series = self._series([angle_error(run.trajectory, self._reference) for run in self._runs])
         return self._with_legend(plots.errors(series, "largest angle error (rad)", horizon(self._reference)))
+
+    def defects(self) -> Panels:
+        """The size (rad) of each run's interval defects over time. Raises InputError for fewer than two samples."""
+        series = []
+        for run in self._runs:
+            if len(run.time) < 2:
+                raise InputError("the run left fewer than two samples; there is no interval to draw")
+            sizes = interval_defects(run.scene, run.time, run.angles, run.rates).sizes
+            series.append(Series(run.time[1:], sizes, look_of(run.method)))
+        return self._with_legend(plots.errors(series, "defect (rad)"))
 
     def rotor(self) -> Panels:
         """The rotor's angle (rad) by each method over time."""

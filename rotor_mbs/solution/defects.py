@@ -8,6 +8,7 @@ intervals, predicts the error of the whole run without a reference. `models.lagr
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,7 @@ class Defects:
     time : (n,) s, of the samples.
     angles, rates : (n - 1, 1 + blades) rad and rad/s, closed form less run; NaN where the closed form has no end.
     rate_units : (1 + blades,) rad/s, what counts as 1 rad: the defect of a rate times the interval is an angle.
-    transitions : (n - 1, m, m) of the angles, then rates, of the coordinates that move; None where they are not known.
+    find_transitions : computes `transitions`.
     moving : the coordinates that move.
     resting : pitches that stay at zero by symmetry: there the error is the state itself.
     own_loads : the loads of the closed form at the run's own states, as samples; without arrays where not asked for.
@@ -44,7 +45,7 @@ class Defects:
     angles: Array
     rates: Array
     rate_units: Array
-    transitions: Array | None
+    find_transitions: Callable[[], Array | None]
     moving: tuple[int, ...]
     resting: tuple[int, ...]
     states: Array
@@ -52,6 +53,11 @@ class Defects:
     start: Array
     growth_units: Array
     own_loads: Trajectory
+
+    @functools.cached_property
+    def transitions(self) -> Array | None:
+        """(n - 1, m, m) of the angles, then rates, of the coordinates that move; None where they are not known."""
+        return self.find_transitions()
 
     @functools.cached_property
     def sizes(self) -> Array:

@@ -206,8 +206,8 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
 
 
 def _metrics(chunk: Chunk, scene: Scene, run: Trajectory, drift: float) -> Metrics:
-    """What decides whether a run is clearly ok. Without defects its energy: runs side by side are the closed form's own,
-    and their defects would cost ten times as much as they do."""
+    """What decides whether a run is clearly ok. Without defects it is the energy: runs side by side are the closed form
+    itself, and their defects cost ten times as much as they do."""
     defects = defects_of(scene, run) if chunk.with_defects else None
     return {"energy_drift_max": float(drift)} | ({} if defects is None else defect_metrics(defects, None))
 

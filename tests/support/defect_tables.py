@@ -30,7 +30,7 @@ _SMALL = 1e-7  # relative (of the phase rad): far above rounding, and the defect
 
 
 def signatures(scene: Scene, motion: Trajectory) -> dict[str, Array]:
-    """(n,) rad for each of `FAULTS`: the size of the defect of every interval for a relative fault of 1 (a phase: 1 rad).
+    """(n,) rad for each of `FAULTS`: the size of every interval's defect for a relative fault of 1 (of a phase 1 rad).
 
     To first order in the interval h: a wrong acceleration Δa is a defect of h Δa in the rates.
     """
@@ -100,18 +100,15 @@ def main(path: Path) -> None:
                     growth = min(float(np.nanmax(reference.error_growth)), HORIZON_GROWTH)
                     floor = facts["defect_floor"] * growth * np.sqrt(len(reference.time))
                     judged = "" if not 10.0 * floor <= true <= 0.1 else f"{predicted / true:.2f}"
-                    predictions.append(
-                        f"| {name} | {run.method} | {facts['horizon_s']:.2f} | {true:.1e} | {predicted:.1e} | {judged} |"
-                    )
+                    numbers = f"{facts['horizon_s']:.2f} | {true:.1e} | {predicted:.1e} | {judged}"
+                    predictions.append(f"| {name} | {run.method} | {numbers} |")
                 methods.setdefault(run.method, []).append(f"| {name} | " + " | ".join(cells) + " |")
     for method, rows in methods.items():
         heads = ["scene", "largest (rad)", "median (rad)", *(FAULTS if is_corrected(method) else ())]
         print(f"\n**{method}**\n\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
         print(*rows, sep="\n")
-    print(
-        "\n| scene | method | horizon (s) | error (rad) | predicted (rad) | predicted / error |\n|---|---|---|---|---|---|"
-    )
-    print(*predictions, sep="\n")
+    print("\n| scene | method | horizon (s) | error (rad) | predicted (rad) | predicted / error |")
+    print("|---|---|---|---|---|---|", *predictions, sep="\n")
 
 
 if __name__ == "__main__":

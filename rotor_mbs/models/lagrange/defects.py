@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -38,7 +39,8 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rou
     ----------
     time : (n,) s, increasing, within the scene's duration.
     angles, rates : (n, 1 + blades) rad and rad/s.
-    rounding : (2 + 2 blades,), or of each row: half a unit of the last digit of angles, then rates; else that of doubles.
+    rounding : (2 + 2 blades,), or for each row: half a unit in the last digit of angles, then rates; that of doubles
+        where left out.
 
     Returns
     -------
@@ -67,7 +69,7 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rou
         angles=angle_defects,
         rates=rate_defects,
         rate_units=units,
-        transitions=_transitions(scene, time, states),
+        find_transitions=functools.partial(_transitions, scene, time, states),
         moving=tuple(moving),
         resting=resting_pitches(scene),
         states=states,

@@ -9,6 +9,7 @@ from dataclasses import replace
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import agreement, finding
 from rotor_mbs.analysis.judgement import OK_ERROR
+from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
@@ -16,7 +17,7 @@ from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row,
 from rotor_mbs.report.core.looks import Look, label_of, look_of
 from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
-from rotor_mbs.report.pages import Context, claim_tables
+from rotor_mbs.report.pages import Context, claim_tables, quantities
 from rotor_mbs.report.pages.bench import cost_legend, cost_picture
 from rotor_mbs.report.pages.scene import key_picture
 from rotor_mbs.report.pages.scene_tables import (
@@ -109,6 +110,7 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
         "still": still,
         "crest": key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
+        "defects": _defects(scenes, shown),
         "energy": _energy(scenes),
         "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
         "methods": Section(tables=[PageTable("", agreement_head, agreement_rows)], notes=notes),
@@ -131,6 +133,22 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
+
+
+def _defects(scenes: Scenes, name: str) -> Picture | None:
+    """Interval defects of the printed and the corrected models over the whole of one scene."""
+    scene, stored = scene_of(scenes[name]), scenes[name]
+    if scene is None:
+        return None
+    runs = run_selection.corrected_runs(stored)
+    if (printed := run_selection.printed_run(stored)) is not None:
+        runs = {printed.method: printed} | runs
+    curves = quantities.defects(scene, runs)
+    caption = f"{name}: what the closed form makes of each sample by the next, less what each run has there"
+    return quantities.error_picture(
+        curves, "defect of an interval (rad)", "defects", caption,
+        legend=quantities.run_legend(quantities.visible(curves)),
+    )  # fmt: skip
 
 
 def _energy(scenes: Scenes) -> Picture | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rotor_mbs.analysis.rehydrate import scene_of
 from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.report import plots
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Section
@@ -18,6 +19,7 @@ from rotor_mbs.report.core.numbers import number, prefixed
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import LOWEST, Series
 from rotor_mbs.runs.read import StoredRun, StoredScene
+from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import Plot, Quantity, known_quantities, sizes
 from rotor_mbs.solution.trajectory import Array
 
@@ -169,6 +171,18 @@ def visible(curves: Curves) -> Curves:
 def run_legend(methods: Iterable[str]) -> list[LegendEntry]:
     """An entry per method, as its error curves are drawn."""
     return [LegendEntry(label_of(method), look_of(method)) for method in methods]
+
+
+def defects(scene: Scene, runs: Runs) -> Curves:
+    """The size (rad) of the defect of every interval, at its end; a fault in time stands out in its own intervals."""
+    curves = {}
+    for method, run in runs.items():
+        time = run.array("time") if "angles" in run and "rates" in run else np.empty(0)
+        if len(time) < 2:
+            continue
+        sizes = interval_defects(scene, time, run.array("angles"), run.array("rates")).sizes
+        curves[method] = Series(time[1:], sizes, look_of(method))
+    return curves
 
 
 def differences(runs: Runs, reference: StoredRun | None) -> Curves:

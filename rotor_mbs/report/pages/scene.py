@@ -79,6 +79,7 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
         "paths": _tips_section(parsed, runs, horizon),
         "motion": _motion_section(runs, horizon),
         "difference": _difference_section(scene, sides, drawn, horizon),
+        "defects": _defect_section(parsed, drawn),
         "energy": _energy_section(sides, drawn, horizon),
         "drive": _drive_section(parsed, sides.get("corrected")),
         "cost": cost_section(scene, context.curves.get(name, ())),
@@ -335,6 +336,16 @@ def _difference_section(scene: StoredScene, sides: Runs, drawn: Runs, horizon: f
         ("Method", "up to the horizon", "whole run"), rows,
     )  # fmt: skip
     return Section([shown] if shown else [], legend, [table] if rows else [])
+
+
+def _defect_section(scene: Scene | None, drawn: Runs) -> Section:
+    """The size of every interval's defect, of each run with angles and rates."""
+    if scene is None:
+        return Section()
+    curves = quantities.defects(scene, drawn)
+    shown = quantities.error_picture(curves, "defect (rad)", "defects", "Interval defects, over all of every run")
+    legend = quantities.run_legend(quantities.visible(curves))
+    return Section([shown] if shown else [], legend)
 
 
 def _energy_section(sides: Runs, drawn: Runs, horizon: float | None) -> Section:
