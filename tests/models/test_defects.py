@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from support.defects import made_defects
 from support.references import reference
 from support.references import scene as shipped
 from support.scenes import PAPER, paper
@@ -181,7 +181,7 @@ def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:
 # ---- The sum of the defects is the error
 
 QUICK = {("fig11", "exudyn_tree/rk67"), ("fig09", "lagrange/ode45")}
-# At its default step the tree's error is next to round-off: seven times longer ones leave 1e5 times as much.
+# At its default step the tree's error is next to round-off.
 COARSE: dict[str, dict[str, float]] = {"exudyn_tree/rk67": {"step": 5e-3}}
 
 
@@ -243,27 +243,11 @@ def test_pitches_at_rest_by_symmetry_are_those_that_stay_exactly_zero(name: str)
 # ---- What cannot be judged
 
 
-def _with(**changes: Any) -> Defects:
-    """Three intervals of one coordinate, of defects 1e-9, 3e-9 and 2e-9 rad, and no growth."""
-    columns = np.array([[1e-9], [3e-9], [2e-9]])
-    plain = Defects(
-        time=np.arange(4.0),
-        angles=columns,
-        rates=np.zeros((3, 1)),
-        rate_units=np.ones(1),
-        transitions=np.tile(np.eye(2), (3, 1, 1)),
-        moving=(0,),
-        resting=(),
-        states=np.zeros((4, 2)),
-        start=np.zeros(2),
-        growth_units=np.ones(2),
-        own_loads=fig11_run(),
-    )
-    return replace(plain, **changes)
+SIZES = (1e-9, 3e-9, 2e-9)
 
 
 def test_numbers_of_defects() -> None:
-    metrics = defect_metrics(_with(), None)
+    metrics = defect_metrics(made_defects(SIZES), None)
     assert (metrics["defect_max"], metrics["defect_median"], metrics["defect_time"]) == (3e-9, 2e-9, 2.0)
     assert (metrics["defect_mean"], metrics["angle_error_predicted"]) == pytest.approx((2e-9, 6e-9))
     assert metrics["defects_not_judged"] == 0
@@ -273,7 +257,7 @@ def test_numbers_of_defects() -> None:
 def test_an_interval_of_huge_growth_is_counted_and_not_judged(growth: float, left_out: int) -> None:
     transitions = np.tile(np.eye(2), (3, 1, 1))
     transitions[1, 0, 1] = growth
-    metrics = defect_metrics(_with(transitions=transitions), None)
+    metrics = defect_metrics(made_defects(SIZES, transitions=transitions), None)
     assert metrics["defects_not_judged"] == left_out
     assert metrics["defect_max"] == (2e-9 if left_out else 3e-9)
 
@@ -282,8 +266,8 @@ def test_an_interval_of_huge_growth_is_counted_and_not_judged(growth: float, lef
 def test_an_interval_without_an_end_fails_however_much_grows_there(growth: float) -> None:
     transitions = np.tile(np.eye(2), (3, 1, 1))
     transitions[1, 0, 1] = growth
-    angles = np.array([[1e-9], [np.nan], [2e-9]])
-    assert defect_metrics(_with(transitions=transitions, angles=angles), None)["defect_max"] == np.inf
+    metrics = defect_metrics(made_defects((1e-9, np.nan, 2e-9), transitions=transitions), None)
+    assert metrics["defect_max"] == np.inf
 
 
 @pytest.mark.parametrize("rate", [1e200, 1e20, 1e4])
