@@ -90,8 +90,8 @@ class Defects:
 
     @property
     def is_judged(self) -> NDArray[np.bool_]:
-        """(n - 1,) not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval; a defect that is not
-        finite is judged in any case, and fails."""
+        """(n - 1,) not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval; what is not finite
+        is judged in any case, and fails."""
         return np.asarray(~(self.growth > MAX_INTERVAL_GROWTH) | ~np.isfinite(self.sizes))
 
     @functools.cached_property
