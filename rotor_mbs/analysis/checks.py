@@ -206,18 +206,18 @@ def _changed_metric(run: StoredRun, metrics: Metrics, trajectory: Trajectory) ->
         "defect_drift": floor * DRIFT_ROWS * growth,
         "angle_error_predicted": floor * HORIZON_GROWTH,
     }
+    if not is_corrected(run.method) and len(trajectory.time) > 1:
+        # Over the integrator's own points, which are others than the samples: as much as the rotor does in between.
+        interval = float(np.diff(trajectory.time).max())
+        turned = interval * float(np.abs(trajectory.rates[:, 0]).max())
+        allowances |= {"rotor_angle_min": turned, "rotor_angle_max": turned}
+        allowances["rotor_rate_max"] = float(np.abs(np.diff(trajectory.rates[:, 0])).max())
     for name, value in metrics.items():
         if name == "defect_time" and metrics["defect_max"] <= floor:
             continue
         stored = float(run.attributes.get(name, np.nan))
         allowance = allowances.get(name, 0.0)
         off = abs(stored - value)
-        if name in ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max") and not is_corrected(run.method):
-            # Over the integrator's own points, four in a step: at least as large as here, but for what may lie
-            # between two of them.
-            column = trajectory.rates[:, 0] if name == "rotor_rate_max" else trajectory.angles[:, 0]
-            allowance = float(np.abs(np.diff(column, 2)).max(initial=0.0))
-            off = max(stored - value if name == "rotor_angle_min" else value - stored, 0.0)
         if not (off <= allowance or stored == value):
             share = off / max(abs(value), abs(stored)) if math.isfinite(off) else math.nan
             if not share <= worst:

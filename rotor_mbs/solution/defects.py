@@ -96,8 +96,9 @@ class Defects:
 
     @property
     def is_judged(self) -> NDArray[np.bool_]:
-        """(n - 1,) not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval."""
-        return np.asarray(~(self.growth > MAX_INTERVAL_GROWTH))
+        """(n - 1,) not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval; what is not finite
+        is judged in any case, and fails."""
+        return np.asarray(~(self.growth > MAX_INTERVAL_GROWTH) | ~np.isfinite(self.sizes))
 
     @functools.cached_property
     def predicted(self) -> Array | None:

@@ -1,0 +1,283 @@
+"""Interval defects: round-off for a right run, a known pattern for every known fault, and a sum that is the error."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.defects import made_defects
+from support.references import reference
+from support.references import scene as shipped
+from support.scenes import PAPER, paper
+
+from rotor_mbs.analysis.judgement import FLOOR_SAFETY, judge
+from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import defects as defects_module
+from rotor_mbs.models.lagrange.defects import interval_defects
+from rotor_mbs.models.lagrange.parameters import rate_units, resting_pitches
+from rotor_mbs.models.lagrange.reference import _variational_matrices
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import MAX_INTERVAL_GROWTH, Defects
+from rotor_mbs.solution.metrics import defect_metrics, horizon_samples, running_growth
+from rotor_mbs.solution.trajectory import Array, Trajectory
+
+TAYLOR, DOP853 = "lagrange/taylor", "lagrange/dop853"
+ULP = float(np.finfo(float).eps)
+# rad: what dop853, at 3e-14 a step, leaves in an interval of fig11; a fault is looked for above it.
+NOISE = 1e-12
+FIG11 = paper("fig11", duration=1.0, samples=101, outputs=("angles", "rates"))
+
+
+def defects_of(scene: Scene, run: Trajectory) -> Defects:
+    return interval_defects(scene, run.time, run.angles, run.rates)
+
+
+@functools.cache
+def fig11_run() -> Trajectory:
+    return solve(DOP853, FIG11, {}).trajectory
+
+
+def states(run: Trajectory) -> Array:
+    return np.hstack([run.angles, run.rates])
+
+
+def signed(defects: Defects) -> Array:
+    return np.hstack([defects.angles, defects.rates])
+
+
+def intervals(defects: Defects) -> list[int]:
+    """Those whose defect is no error of dop853."""
+    return np.flatnonzero(defects.sizes > NOISE).tolist()
+
+
+# ---- Of a right run
+
+
+JUMPS = ((0.0, 0.0), (0.5, 2e6), (0.7525, 3e6), (0.7525, -2e6), (1.2, 1e6))
+RIGHT = {
+    "one blade": paper("fig03", duration=2.0, samples=201),
+    "a torque that jumps inside an interval": paper("fig03", duration=2.0, samples=201, rotor_torque=JUMPS),
+    "a pitch that is fixed": paper("fig04b", duration=2.0, samples=201),
+    "chaos": paper("fig11", duration=2.0, samples=201),
+    "a stiff bearing": shipped("stiff/bearing-1e8"),
+    "a damped turbine": shipped("stiff/nrel-5mw-damped"),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_run_has_round_off_alone(name: str) -> None:
+    """That of its own numbers, and four units in the last place of a radian for the arithmetic of an interval."""
+    pytest.importorskip("heyoka")
+    defects = defects_of(RIGHT[name], solve(TAYLOR, RIGHT[name], {}).trajectory)
+    assert (defects.sizes <= FLOOR_SAFETY * defects.floor + 4.0 * ULP).all()
+    assert (defects.floor > 0.0).all()
+
+
+def test_without_heyoka_the_defects_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the tolerance of dop853, on a run that has defects of 1e-6."""
+    pytest.importorskip("heyoka")
+    run = solve("lagrange/ode45", FIG11, {}).trajectory
+    with_heyoka = defects_of(FIG11, run)
+    monkeypatch.setattr(defects_module, "is_available", lambda: False)
+    without = defects_of(FIG11, run)
+    np.testing.assert_allclose(without.angles, with_heyoka.angles, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        without.rates / without.rate_units, with_heyoka.rates / without.rate_units, rtol=0, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(("method", "order"), [("exudyn_tree/rk44", 4), ("exudyn_tree/generalized_alpha", 2)])
+def test_half_the_step_divides_the_defects_by_two_to_the_order(method: str, order: int) -> None:
+    """An interval has as many steps as it has error: the order is the global one. ±0.2, as orders are fitted."""
+    medians = [
+        np.median(defects_of(FIG11, solve(method, FIG11, {"step": step}).trajectory).sizes) for step in (5e-3, 2.5e-3)
+    ]
+    assert np.log2(medians[0] / medians[1]) == pytest.approx(order, abs=0.2)
+
+
+# ---- Strong: a wrong term is seen in the intervals where it acts, in proportion
+
+
+def test_a_wrong_torque_is_seen_in_its_intervals_alone() -> None:
+    """For half a second; linear in the torque but for what the motion itself makes of it, 1e-3 within a second."""
+    largest = []
+    for torque in (1e3, 2e3):
+        table = ((0.0, 0.0), (0.3, 0.0), (0.3, torque), (0.8, torque), (0.8, 0.0), (1.0, 0.0))
+        run = solve(DOP853, replace(FIG11, rotor_torque=table), {}).trajectory
+        defects = defects_of(FIG11, run)
+        assert intervals(defects) == list(range(30, 80))
+        largest.append(signed(defects)[30:80])
+    off = np.abs(largest[1] - 2.0 * largest[0]).max(axis=0)
+    assert (off <= 1e-2 * np.abs(largest[1]).max(axis=0)).all()
+
+
+def test_a_wrong_gravity_is_seen_in_every_interval_in_proportion() -> None:
+    """Down to a relative 1e-9, of which the defects are a thousand times above their floor."""
+    pytest.importorskip("heyoka")
+    sizes = []
+    for share in (1e-6, 1e-9):
+        run = solve(TAYLOR, replace(FIG11, gravity=FIG11.gravity * (1.0 + share)), {}).trajectory
+        defects = defects_of(FIG11, run)
+        assert (defects.sizes > 10.0 * defects.floor).all()
+        sizes.append(np.median(defects.sizes) / share)
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-2)
+
+
+# ---- Patterns: what the defects of a wrong row look like
+
+
+def test_one_wrong_row_gives_two_defects_of_which_the_second_undoes_the_first() -> None:
+    run = fig11_run()
+    row, error = 40, 1e-6 * np.array([1.0, -2.0, 3.0, 0.5, 20.0, 10.0, -30.0, 5.0])
+    angles, rates = run.angles.copy(), run.rates.copy()
+    angles[row] += error[:4]
+    rates[row] += error[4:]
+    defects = interval_defects(FIG11, run.time, angles, rates)
+    assert intervals(defects) == [row - 1, row]
+    first, second = signed(defects)[[row - 1, row]]
+    np.testing.assert_allclose(first, -error, rtol=0, atol=1e-10)
+    assert defects.transitions is not None
+    # Beyond the linear part: squares of the error.
+    np.testing.assert_allclose(second, -defects.transitions[row] @ first, rtol=1e-4, atol=1e-9)
+
+
+def test_a_row_dropped_with_its_time_is_a_gap_and_without_it_one_defect_along_the_motion() -> None:
+    run = fig11_run()
+    kept = np.delete(np.arange(101), 40)
+    gap = interval_defects(FIG11, run.time[kept], run.angles[kept], run.rates[kept])
+    assert intervals(gap) == []
+    renumbered = interval_defects(FIG11, run.time[:-1], run.angles[kept], run.rates[kept])
+    assert intervals(renumbered) == [39]
+    defect, motion = signed(renumbered)[39], states(run)[41] - states(run)[40]
+    assert -defect @ motion / np.linalg.norm(defect) / np.linalg.norm(motion) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_kick_of_a_rate_is_one_defect_without_an_angle() -> None:
+    run, row = fig11_run(), 40
+    rates = run.rates[row].copy()
+    rates[2] += 1e-5
+    after = replace(FIG11, duration=0.6, samples=61, initial_angles=tuple(run.angles[row]), initial_rates=tuple(rates))
+    rest = solve(DOP853, after, {}).trajectory
+    kicked = interval_defects(
+        FIG11, run.time, np.vstack([run.angles[:row], rest.angles]), np.vstack([run.rates[:row], rest.rates])
+    )
+    assert intervals(kicked) == [row - 1]
+    assert np.abs(kicked.angles[row - 1]).max() < NOISE
+    np.testing.assert_allclose(kicked.rates[row - 1], [0.0, 0.0, -1e-5, 0.0], rtol=0, atol=1e-10)
+
+
+def test_a_wrong_start_has_no_defect_but_is_in_the_predicted_error() -> None:
+    """The measure is blind to it: the first row is judged apart."""
+    angles = (FIG11.initial_angles[0] + 1e-6, *FIG11.initial_angles[1:])
+    run = solve(DOP853, replace(FIG11, initial_angles=angles), {}).trajectory
+    defects = defects_of(FIG11, run)
+    assert intervals(defects) == []
+    assert defects.predicted is not None
+    np.testing.assert_allclose(defects.predicted, run.angles - fig11_run().angles, rtol=0, atol=1e-9)
+
+
+# ---- The sum of the defects is the error
+
+QUICK = {("fig11", "exudyn_tree/rk67"), ("fig09", "lagrange/ode45")}
+# At its default step the tree's error is next to round-off.
+COARSE: dict[str, dict[str, float]] = {"exudyn_tree/rk67": {"step": 5e-3}}
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(name, method, marks=() if (name, method) in QUICK else pytest.mark.full)
+        for name in ("fig09", "fig11", "fig14a")
+        for method in ("exudyn_tree/rk67", "lagrange/ode45", "exudyn_chain/generalized_alpha")
+    ],
+)
+def test_the_predicted_error_is_the_true_one_within_a_fifth(name: str, method: str) -> None:
+    """Of the largest so far, up to the horizon, between ten times what round-off becomes and 0.1 rad."""
+    exact, scene = reference(f"paper/{name}"), paper(name)
+    rows = horizon_samples(exact)
+    scene = replace(scene, duration=float(exact.time[rows - 1]), samples=rows, outputs=("angles", "rates"))
+    run = solve(method, scene, COARSE.get(method, {})).trajectory
+    defects = defects_of(scene, run)
+    assert defects.predicted is not None
+    true = run.angles - exact.angles[:rows]
+    largest = np.maximum.accumulate(np.abs(true).max(axis=1))
+    floor = defects.floor.max() * running_growth(exact)[:rows]
+    judged = (largest > 10.0 * floor) & (largest < 0.1)
+    assert judged.sum() > 10
+    off = np.abs(defects.predicted - true).max(axis=1)
+    assert (off[judged] <= 0.2 * largest[judged]).all()
+
+
+@pytest.mark.parametrize("name", ["fig03", "fig09"])
+def test_the_transition_matrices_are_those_of_the_variational_equations(name: str) -> None:
+    """Each carries their product on by one interval, to 1e-4 of its size, angles in rad and rates in their units."""
+    pytest.importorskip("heyoka")
+    scene = paper(name, duration=1.0, samples=101, outputs=("angles", "rates"))
+    exact = _variational_matrices(scene)
+    transitions = defects_of(scene, solve(DOP853, scene, {}).trajectory).transitions
+    assert transitions is not None
+    units = np.concatenate([np.ones(len(scene.moving_coordinates)), rate_units(scene)])
+    exact, transitions = (matrices * units / units[:, None] for matrices in (exact, transitions))
+    off = np.abs(transitions @ exact[:-1] - exact[1:]).max(axis=(1, 2))
+    assert (off <= 1e-4 * np.abs(exact[1:]).max(axis=(1, 2))).all()
+
+
+def test_the_growth_along_a_run_is_that_of_the_reference() -> None:
+    """To a twentieth, up to the horizon: both are products of the same matrices."""
+    exact = reference("paper/fig11")
+    rows = horizon_samples(exact)
+    own = interval_defects(paper("fig11"), exact.time[:rows], exact.angles[:rows], exact.rates[:rows]).error_growth
+    assert own is not None
+    np.testing.assert_allclose(own, exact.error_growth[:rows], rtol=0.05)
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_pitches_at_rest_by_symmetry_are_those_that_stay_exactly_zero(name: str) -> None:
+    scene, exact = paper(name), reference(f"paper/{name}")
+    zero = [i for i in scene.moving_coordinates[1:] if not exact.angles[:, i].any() and not exact.rates[:, i].any()]
+    assert list(resting_pitches(scene)) == zero
+
+
+# ---- What cannot be judged
+
+
+SIZES = (1e-9, 3e-9, 2e-9)
+
+
+def test_numbers_of_defects() -> None:
+    metrics = defect_metrics(made_defects(SIZES), None)
+    assert (metrics["defect_max"], metrics["defect_median"], metrics["defect_time"]) == (3e-9, 2e-9, 2.0)
+    assert (metrics["defect_mean"], metrics["angle_error_predicted"]) == pytest.approx((2e-9, 6e-9))
+    assert metrics["defects_not_judged"] == 0
+
+
+@pytest.mark.parametrize(("growth", "left_out"), [(0.9 * MAX_INTERVAL_GROWTH, 0), (1.1 * MAX_INTERVAL_GROWTH, 1)])
+def test_an_interval_of_huge_growth_is_counted_and_not_judged(growth: float, left_out: int) -> None:
+    transitions = np.tile(np.eye(2), (3, 1, 1))
+    transitions[1, 0, 1] = growth
+    metrics = defect_metrics(made_defects(SIZES, transitions=transitions), None)
+    assert metrics["defects_not_judged"] == left_out
+    assert metrics["defect_max"] == (2e-9 if left_out else 3e-9)
+
+
+@pytest.mark.parametrize("growth", [1.0, np.inf])
+def test_an_interval_without_an_end_fails_however_much_grows_there(growth: float) -> None:
+    transitions = np.tile(np.eye(2), (3, 1, 1))
+    transitions[1, 0, 1] = growth
+    metrics = defect_metrics(made_defects((1e-9, np.nan, 2e-9), transitions=transitions), None)
+    assert metrics["defect_max"] == np.inf
+
+
+@pytest.mark.parametrize("rate", [1e200, 1e20, 1e4])
+def test_a_row_that_is_no_motion_is_inaccurate(rate: float) -> None:
+    """Where the closed form has no end, and where it has one somewhere else."""
+    solution = solve(DOP853, FIG11, {})
+    rates = solution.trajectory.rates.copy()
+    rates[40, 2] = rate
+    wrong = replace(solution, trajectory=solution.trajectory.replace(rates=rates))
+    with np.errstate(all="ignore"):
+        judgement = judge(FIG11, wrong, None)
+    assert judgement.status == "inaccurate"
+    assert not judgement.metrics["defect_max"] < 1.0
