@@ -23,6 +23,8 @@ ANGLE_LIMIT = 1e6
 # rad: a pitch that should stay zero has left it when it is past this: ten million times above round-off of a radian,
 # far below what a plot shows.
 _LEFT_ZERO = 1e-9
+# Of a pitch that has left zero: a larger defect in an interval is not of a step or of rounding.
+_MOVED_SHARE = 1e-4
 # rad: between these the departure grows exponentially; below is round-off, above the motion is no longer linear.
 _LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
@@ -76,7 +78,7 @@ def metrics_of(scene: Scene, run: Trajectory, reference: Trajectory | None, defe
         metrics["energy_drift_max"] = float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
         metrics["energy_gain_J"] = float(energy.max())
     if reference is not None and scene.wants("angles"):
-        metrics |= _angle_errors(run, reference)
+        metrics |= _angle_errors(run, reference, defects)
     if defects is not None:
         metrics |= defect_metrics(defects, metrics.get("horizon_s"))
     if scene.wants("angles") and scene.wants("rates"):
@@ -139,7 +141,7 @@ def defect_metrics(defects: Defects, horizon_s: float | None) -> Metrics:
     return {name: value for name, value in metrics.items() if not np.isnan(value)}
 
 
-def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
+def _angle_errors(run: Trajectory, reference: Trajectory, defects: Defects | None) -> Metrics:
     """Errors only where there is a second sample: the first one is given, and equal in every run."""
     error = angle_error(run, reference)
     until = min(horizon_samples(reference), len(error))
@@ -157,10 +159,14 @@ def _angle_errors(run: Trajectory, reference: Trajectory) -> Metrics:
             if linear.sum() >= 10:
                 slope = np.polyfit(run.time[linear], np.log(away[linear]), 1)[0]
                 metrics["zero_pitch_growth_per_s"] = float(slope)
-        # The reference's horizon is that of motions which keep these pitches at zero. A run that has left them grows as
-        # they do, from there on: to the horizon once what it left with has grown as much.
+        # The reference's horizon is that of motions which keep these pitches at zero. What a run has left them by grows
+        # faster, to the horizon once it is as many times larger. That is no excuse where the equations are others: then
+        # these pitches have defects of a share of what they are.
         beyond = np.flatnonzero(away[:until] > _LEFT_ZERO * HORIZON_GROWTH)
-        until = int(beyond[0]) if len(beyond) else until
+        if len(beyond) and defects is not None:
+            moved = np.abs(defects.rates[: beyond[0], zero] / defects.rate_units[zero]).max(axis=1)
+            if (moved <= _LEFT_ZERO + _MOVED_SHARE * away[1 : beyond[0] + 1]).all():
+                until = int(beyond[0])
     metrics["horizon_s"] = float(reference.time[max(until - 1, 0)])
     if until > 1:
         metrics["angle_error_max"] = float(error[:until].max())

@@ -89,12 +89,13 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             cells.append(prefixed(metric(printed, "energy_gain_J"), "J"))
         scene_rows.append(cells)
     agreement_head = (
-        "Method", "Runs", f"Largest angle error up to each horizon (rad), at most {OK_ERROR:g}",
+        "Method", "Runs", "Largest defect (rad)", f"Largest angle error up to each horizon (rad), at most {OK_ERROR:g}",
         "Largest energy drift (relative)", "Longest run",
     )  # fmt: skip
     agreement_rows: list[Row] = []
     for row in agreement(run for scene in scenes.values() for run in run_selection.corrected_runs(scene).values()):
-        cells = [method_cell(row.method), row.runs, bounded_cell(row.angle_error), number(row.energy_drift)]
+        cells = [method_cell(row.method), row.runs, number(row.defect), bounded_cell(row.angle_error)]
+        cells.append(number(row.energy_drift))
         agreement_rows.append([*cells, prefixed(row.longest_s, "s")])
     compared, whole = compared_time(scenes.values())
     notes = []
