@@ -193,7 +193,6 @@ def _mode_line(row: Mapping[str, Any]) -> str:
 
 
 def floquet_sentence(table: FloquetTable) -> str:
-    """At how many speeds the motion under gravity is stable."""
     counts = [int(np.count_nonzero(table.stable == code)) for code in (1, 0, -1)]
     parts = [
         f"{n} {what}" for n, what in zip(counts, ("stable", "unstable", "without a periodic motion"), strict=True) if n

@@ -179,7 +179,6 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def _parser() -> tuple[_Parser, dict[str, _Parser]]:
-    """The parser, and those of the commands by name."""
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",

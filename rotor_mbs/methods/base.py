@@ -188,7 +188,6 @@ class Method:
 
     @property
     def is_installed(self) -> bool:
-        """Whether all packages it needs are there; none is imported."""
         return all(_is_distribution_installed(distribution) for distribution in self.distributions)
 
 

@@ -284,7 +284,6 @@ def is_link(group: Any, name: str) -> bool:
 
 
 def is_group(item: Any) -> bool:
-    """Whether a member of a file holds others, and is no array."""
     return isinstance(item, h5py.Group)
 
 
@@ -317,7 +316,6 @@ def sync_folder(folder: Path) -> None:
 
 
 def is_of_this_program(path: Path) -> bool:
-    """Whether an HDF5 file says that this program wrote it."""
     try:
         with h5py.File(path, "r") as file:
             return bool(plain(file.attrs.get("format")) == FORMAT)

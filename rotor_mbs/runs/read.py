@@ -90,7 +90,6 @@ class StoredRun:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Of the method, all of them."""
         return dict(json.loads(self.known["settings"]))
 
     @property
@@ -127,7 +126,6 @@ class StoredRun:
         return values
 
     def get(self, name: str) -> NDArray[Any] | None:
-        """As `array`; None where the run has none of that name."""
         return self.array(name) if name in self else None
 
 

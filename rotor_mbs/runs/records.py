@@ -83,7 +83,6 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
 
 
 def row_of_point(place: Place, status: str, message: str, values: Mapping[str, object]) -> Rows:
-    """The row of a point; values: by column."""
     row = blank_rows(1, place.row)
     row["status"][0], row["message"][0] = code_of(status), characters(message, row["message"].shape[1])
     for name, value in values.items():

@@ -170,7 +170,6 @@ class StoredSweep:
 
     @property
     def methods(self) -> list[str]:
-        """Their names, by their code."""
         names: list[str] = self.attributes["methods"]
         return names
 

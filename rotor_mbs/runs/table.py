@@ -468,7 +468,6 @@ def as_table(file: Any, group: str) -> Table:
 
 
 def columns_of(group: Any) -> dict[str, Column]:
-    """What the datasets of an open group are, by name."""
     columns = {}
     for name, dataset in group.items():
         if not files.is_group(dataset) and not files.is_dimension_only(dataset):

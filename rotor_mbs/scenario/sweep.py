@@ -321,8 +321,6 @@ def _is_of_start(path: KeyPath) -> bool:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A base scene and how it is varied."""
-
     table: SweepTable  # what the sweep's file says
     base: Scene  # the scene with the sweep's own changes, before any axis
     design: Design

@@ -51,7 +51,6 @@ class RunTask(Task):
     time_limit_s: float
 
     def failed(self, status: str, message: str) -> Rows:
-        """The row of a run that left no samples."""
         asked = self.asked
         run = without_samples(asked.scene, asked.method, asked.settings, status, message)
         limit = self.time_limit_s if status == "timed_out" else np.nan
@@ -166,7 +165,6 @@ def asked_runs(
 
 
 def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list[RunTask]:
-    """What computes these rows of a file."""
     return [
         RunTask(
             label=f"{run.scene.name} {run.method}",
@@ -324,7 +322,6 @@ def perform_run(task: RunTask) -> Rows:
 
 
 def without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:
-    """A run that left nothing but its end."""
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
