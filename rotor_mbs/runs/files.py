@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError, saving
-from rotor_mbs.solution.quantities import Quantity
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
@@ -191,18 +190,18 @@ def new_group(parent: Any, name: str) -> Any:
     return parent
 
 
-def put(group: Any, name: str, values: Any, quantity: Column | Quantity) -> Any:
+def put(group: Any, name: str, values: Any, column: Column) -> Any:
     """A dataset of numbers or texts with unit and long name. The scales of its dimensions must be there already; a
     scale is its own dimension."""
     is_text = len(values) > 0 and isinstance(values[0], str)
     data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
-    return _described(group.create_dataset(name, data=data), group, quantity)
+    return _described(group.create_dataset(name, data=data), group, column)
 
 
-def _described(dataset: Any, group: Any, quantity: Column | Quantity) -> Any:
-    dataset.attrs["units"] = quantity.units
-    dataset.attrs["long_name"] = quantity.long_name
-    for axis, dimension in enumerate(quantity.dimensions):
+def _described(dataset: Any, group: Any, column: Column) -> Any:
+    dataset.attrs["units"] = column.units
+    dataset.attrs["long_name"] = column.long_name
+    for axis, dimension in enumerate(column.dimensions):
         if group[dimension] == dataset:
             dataset.make_scale(dimension)
         else:
@@ -287,9 +286,7 @@ def is_group(item: Any) -> bool:
     return isinstance(item, h5py.Group)
 
 
-def put_empty(
-    group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity, fill: int | None = None
-) -> Any:
+def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: Column, fill: int | None = None) -> Any:
     """A contiguous dataset that has its place in the file now and is written by others; fill: its first value, by
     default what the file system makes of a new file, zeros."""
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -299,7 +296,7 @@ def put_empty(
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
     if fill is not None:
         layout.set_fill_value(np.array(fill, kind))
-    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, quantity)
+    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, column)
     if np.dtype(kind).kind == "S":
         dataset.attrs["_Encoding"] = "utf-8"
     return dataset
