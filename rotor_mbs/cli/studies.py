@@ -72,7 +72,7 @@ def stability(arguments: argparse.Namespace) -> int:
 
 def modes(arguments: argparse.Namespace) -> int:
     """The modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
-    from rotor_mbs.analysis.campbell import mode_rows, modes_summary, read_modes
+    from rotor_mbs.analysis.modes import mode_rows, modes_summary, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
 
     scenes = find_scenes(arguments.scenes)

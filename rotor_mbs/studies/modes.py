@@ -16,17 +16,21 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.campbell import (
+from rotor_mbs.analysis.modes import (
+    GROWTH,
     REST,
     ROTATION,
     FloquetTable,
     LinearModes,
     SceneModes,
     StabilityChart,
+    floquet,
+    isotropic_modes,
+    modes_of,
     read_modes,
     to_records,
+    track,
 )
-from rotor_mbs.analysis.modes import GROWTH, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
