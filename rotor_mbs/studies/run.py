@@ -340,25 +340,20 @@ def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[st
     return able, refused
 
 
-def asked_methods(scenes: Sequence[Scene], names: Sequence[str]) -> dict[str, list[str]]:
-    """`names` for every scene. Raises InputError where one cannot represent a scene."""
-    sorted_out = {scene.name: able_methods(scene, names) for scene in scenes}
-    refused = [line for _, lines in sorted_out.values() for line in lines]
-    if refused:
-        raise InputError(refused)
-    return {name: able for name, (able, _) in sorted_out.items()}
-
-
-def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], list[str]]:
-    """The methods that each scene names itself, or that the rule selects, none where it refuses; and the reasons.
-    Raises InputError where a scene names a method that is unknown or cannot represent it."""
+def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tuple[dict[str, list[str]], list[str]]:
+    """The methods of each scene: `names`, else those that it names itself, else those that the rule selects, none where
+    it refuses; and the reasons. Raises InputError for a name that is unknown or cannot represent its scene."""
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
+    refused: list[str] = []
     for scene in scenes:
-        if scene.methods:
+        named = check_names(names)
+        if scene.methods and not named:
             with at_key(scene.name, scene.text, "methods"):
-                names = check_names(scene.methods)
-            methods |= asked_methods([scene], names)
+                named = check_names(scene.methods)
+        if named:
+            methods[scene.name], lines = able_methods(scene, named)
+            refused += lines
             continue
         try:
             chosen, reason = choose(scene, default_methods())
@@ -368,4 +363,6 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
             continue
         methods[scene.name], left_out = able_methods(scene, chosen)
         reasons += [f"{scene.name}: {reason}: {', '.join(methods[scene.name])}", *left_out]
+    if refused:
+        raise InputError(refused)
     return methods, reasons
