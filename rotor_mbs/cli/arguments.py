@@ -167,8 +167,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """The arguments; `command` is the place of the function to call, "module:function" in `rotor_mbs.cli`. Ends with
-    status 2 on bad usage."""
+    """The arguments; `command` is the place of the function to call, "module:function". Ends with status 2 on bad
+    usage."""
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
         parser.error(f"no command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")

@@ -171,8 +171,8 @@ def read_mapping(
 def find_channels(
     table: DataTable, scene: Scene, entries: Mapping[str, Entry]
 ) -> tuple[dict[Channel, Entry], tuple[str, ...]]:
-    """Where each channel comes from, with its unit, the time first; and a line for each that says so. Raises InputError
-    where there is no time or nothing else."""
+    """Where each channel comes from, with its unit, the time first, and a line for each that says so. Raises
+    InputError."""
     known = channels(scene)
     vectors = Counter(name.rpartition("[")[0] for name in table.columns if name.endswith("]"))
     guessed: dict[str, str] = {}

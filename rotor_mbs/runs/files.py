@@ -93,8 +93,7 @@ def replace_file(path: Path, content: Buffer) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """The name of a file to be written in the block, which then takes the place of `path`, or goes where the block
-    raises. Raises StoreError where it cannot be written."""
+    """The name of a file to be written in the block, which then takes the place of `path`. Raises StoreError."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     with saving(path):
         try:
@@ -191,8 +190,7 @@ def new_group(parent: Any, name: str) -> Any:
 
 
 def put(group: Any, name: str, values: Any, column: Column) -> Any:
-    """A dataset of numbers or texts with unit and long name. The scales of its dimensions must be there already; a
-    scale is its own dimension."""
+    """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own dimension."""
     is_text = len(values) > 0 and isinstance(values[0], str)
     data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
     return _described(group.create_dataset(name, data=data), group, column)
@@ -265,8 +263,7 @@ def dimensions_of(dataset: Any) -> list[str]:
 
 
 def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
-    """A group and every one below it, but for those below a table. Raises StoreError at a link, and at a second name of
-    a group."""
+    """A group and every one below it, but for those below a table. Raises StoreError at a link or a second name."""
     seen = set() if seen is None else seen
     if group in seen:
         raise StoreError(f"{group.file.filename}: {group.name} is another name of a group; allowed: one name of each")
@@ -471,8 +468,7 @@ _held: set[tuple[Path, int]] = set()
 
 @contextmanager
 def writing(output: Path) -> Iterator[None]:
-    """No other process writes `output` in the block; it may be entered again by the same thread. Raises InputError
-    where another process is writing it, StoreError where it cannot be written."""
+    """No other process writes `output` in the block; its thread may enter it again. Raises InputError, StoreError."""
     place = _resolved(output)
     own = place, threading.get_ident()
     if own in _held:

@@ -171,8 +171,7 @@ class StoredSweep:
         return names
 
     def column(self, name: str) -> NDArray[Any]:
-        """A dataset, such as `status` or `angles`; computed ones as they lie in the file, read where they are indexed.
-        Raises StoreError where there is none of that name."""
+        """A dataset; computed ones as they lie in the file, read where they are indexed. Raises StoreError."""
         table = self._table
         if name == "run":
             return table.runs

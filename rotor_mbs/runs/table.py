@@ -204,8 +204,7 @@ class Place:
     row: np.dtype[np.void]
 
     def write(self, first: int, rows: Rows) -> None:
-        """Store the rows from number `first` on, their statuses last; meanwhile they are missing. Raises StoreError
-        where the file cannot be written, or is another one by now."""
+        """Store the rows from number `first` on, their statuses last; meanwhile they are missing. Raises StoreError."""
         columns = rows | {"crc32": checksums(first, rows, self.row)}
         statuses = {name: columns.pop(name) for name in (STATUS_REPEATED, "status") if name in columns}
         with saving(self.path), self.path.open("r+b") as file:

@@ -351,8 +351,8 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """The sweep in the TOML file `path`; a name such as sweeps/fig11-spread means a shipped one. Raises InputError with
-    all errors of the file, a line each."""
+    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. Raises InputError with all errors of the
+    file."""
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped

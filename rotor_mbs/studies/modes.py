@@ -220,8 +220,7 @@ def _linearized(method: Method, point: _Point) -> Linearization:
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
-    """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down. Raises
-    MethodRefusal where heyoka is not installed."""
+    """Multipliers of the periodic motion under gravity at `speeds` > 0, from the fastest down. Raises MethodRefusal."""
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     turns: list[Turn] = []

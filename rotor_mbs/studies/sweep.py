@@ -325,8 +325,7 @@ class SweepPlan:
 def plan_sweep(
     sweep: Sweep, methods: Sequence[str] = (), part: tuple[int, int] = (1, 1), time_limit_s: float = 60.0
 ) -> SweepPlan:
-    """The runs of part k of n by `methods`, else by those of the file. Raises InputError for a method or a setting that
-    is not there, MethodRefusal where a method cannot do them."""
+    """The runs of part k of n by `methods`, else by those of the file. Raises InputError, MethodRefusal."""
     file = shown_path(sweep.path), sweep.text
     chosen = check_names(methods)
     if not methods:
