@@ -285,7 +285,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
 
     own = command(
-        "sweep", "a parameter study into one dataset", "sweep:sweep",
+        "sweep", "a parameter study into one dataset", "studies:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
     own.add_argument("file", type=path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")
