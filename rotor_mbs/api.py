@@ -39,7 +39,7 @@ from rotor_mbs.solution.solution import Solution, need_xarray
 from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.text_table import TextTable
 from rotor_mbs.solution.trajectory import Integration, Trajectory
-from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods, solve_judged
+from rotor_mbs.studies.run import run_scenes, selected_methods, solve_judged
 
 if TYPE_CHECKING:
     from rotor_mbs.report.run_plots import ComparisonPlots, RunPlots
@@ -166,8 +166,7 @@ def run(
     if isinstance(method, str):
         solution, exact = solve_judged(scene, method, settings, compute_reference=reference, time_limit_s=timeout)
         return Run(**vars(solution), reference=exact)
-    named = check_names(tuple(method))
-    chosen, reasons = (asked_methods([scene], named), []) if named else selected_methods([scene])
+    chosen, reasons = selected_methods([scene], tuple(method))
     if not chosen[scene.name]:
         raise MethodRefusal("; ".join(reasons))
     folder = _TemporaryFolder()

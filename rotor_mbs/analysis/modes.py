@@ -1,17 +1,30 @@
-"""Modes of linearized equations: frequencies, damping ratios, shapes in multiblade coordinates; Floquet multipliers.
+"""Modes of linearized equations: frequencies, damping ratios, shapes in multiblade coordinates, Floquet multipliers; of
+a scene over rotor speed, as arrays, as lines for readers, and as records of a results file.
 
 Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd = |Im λ| damped frequency (rad/s),
 ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier.
+
+/modes/<scene>/<model>/rest        equilibrium under gravity, one row of `speed`
+/modes/<scene>/<model>/rotation    steady rotation without gravity: the Campbell diagram
+/modes/<scene>/lagrange/floquet    multipliers of a turn under gravity
+/modes/<scene>/lagrange/chart      the largest of them over speed and bearing stiffness
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor_mbs.errors import InputError, StoreError
+from rotor_mbs.runs.files import Column
+from rotor_mbs.runs.records import Record, read_records
 from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]
@@ -204,3 +217,356 @@ def _assurance(first: Complex, second: Complex) -> Array:
     product = np.abs(first.conj() @ second.T) ** 2
     sizes = np.outer((np.abs(first) ** 2).sum(axis=1), (np.abs(second) ** 2).sum(axis=1))
     return np.asarray(product / np.maximum(sizes, 1e-300))
+
+
+REST, ROTATION = "rest", "rotation"
+CLOSED_FORM = "lagrange"  # the source that others are compared with
+FLOQUET, CHART = f"{CLOSED_FORM}/floquet", f"{CLOSED_FORM}/chart"  # names of records
+# Sources agree where their frequencies differ by no more than this share.
+AGREEMENT = 1e-8
+# Frequencies below this share of the largest are not compared: they are roots of what is left when stiffnesses cancel,
+# and of a rotor that nothing holds that is rounding.
+_SLOW = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearModes(ModeSet):
+    """The modes of one source over speed, the same mode in the same place at every speed.
+
+    names: "collective pitch" where symmetry tells the modes apart, else "mode 2". kind: REST or ROTATION. angles:
+    (speeds, n) rad, steady values of the `coordinates` that move. stiffness, damping: (speeds, n, n), the mass matrix
+    divided out. messages: why there is nothing at a speed, or "".
+    """
+
+    source: str
+    label: str
+    kind: str
+    blades: int
+    speeds: Array
+    coordinates: tuple[str, ...]
+    angles: Array
+    stiffness: Array
+    damping: Array
+    messages: tuple[str, ...] = ()
+
+    @property
+    def multiblade_shapes(self) -> Complex:
+        """(speeds, n, 1 + blades): by speed, mode, and rotor or multiblade coordinate."""
+        whole = np.zeros((len(self.speeds), len(self.coordinates), 1 + self.blades), dtype=complex)
+        columns = [0 if name == "rotor" else int(name.rpartition(" ")[2]) for name in self.coordinates]
+        whole[:, :, columns] = self.shapes
+        return multiblade_shapes(whole)
+
+    @property
+    def whirl(self) -> tuple[Array, Array]:
+        """(speeds, n) rad/s backward and forward whirl of cosine and sine modes; NaN for others."""
+        harmonics = np.full(len(self.names), np.nan)
+        for k, name in enumerate(self.names):
+            if name.startswith(("cosine", "sine")):  # "cosine pitch", "cosine 2 pitch"
+                harmonics[k] = int(name.split()[1]) if name.split()[1].isdigit() else 1
+        return whirl_frequencies(self.damped_frequencies, self.speeds[:, None], harmonics)
+
+
+@dataclass(frozen=True)
+class FloquetTable:
+    """Multipliers (speeds, 2n) of a turn under gravity over speed; largest: modulus of those that are not always 1.
+
+    stable: 1, 0, or -1 where no periodic motion was found. product_error: logarithm of their product less the
+    integrated trace; NaN where rounding hides it. torque: N m on the rotor; mismatch: rad that a turn misses.
+    """
+
+    speeds: Array
+    multipliers: Complex
+    largest: Array
+    stable: NDArray[np.int64]
+    product_error: Array
+    torque: Array
+    mismatch: Array
+    messages: tuple[str, ...] = ()
+
+    @property
+    def growth_rates(self) -> Array:
+        """(speeds,) 1/s."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.log(self.largest) * self.speeds / (2.0 * np.pi))
+
+
+@dataclass(frozen=True)
+class StabilityChart:
+    """(stiffnesses, speeds) largest multipliers; NaN where no periodic motion was found."""
+
+    speeds: Array
+    stiffnesses: Array
+    largest: Array
+
+
+@dataclass(frozen=True)
+class SceneModes:
+    """The modes of a scene: by source, the closed form first; notes: what could not be done, and why."""
+
+    scene: str
+    title: str
+    blades: int
+    gravity: float
+    rest: Mapping[str, LinearModes] = field(default_factory=dict)
+    rotation: Mapping[str, LinearModes] = field(default_factory=dict)
+    floquet: FloquetTable | None = None
+    chart: StabilityChart | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def disagreement(self) -> float:
+        """Largest relative difference between the frequencies of two sources; 0 where there is one source alone."""
+        largest = 0.0
+        for kind in (self.rest, self.rotation):
+            # Modes in the order of their size.
+            sizes = [np.sort(np.abs(source.eigenvalues).max(axis=2), axis=1) for source in kind.values()]
+            for other in sizes[1:]:
+                fast = sizes[0] > _SLOW * np.nanmax(sizes[0], initial=0.0)
+                share = np.abs(other - sizes[0])[fast] / sizes[0][fast]
+                largest = max(largest, float(np.nanmax(share, initial=0.0)))
+        return largest
+
+    @property
+    def agrees(self) -> bool:
+        return self.disagreement <= AGREEMENT
+
+
+def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
+    """A row for each state, speed and mode of the closed form: speeds and frequencies in rad/s, growth in 1/s."""
+    rows: list[dict[str, object]] = []
+    for kind in (modes.rest, modes.rotation):
+        for linear in list(kind.values())[:1]:
+            numbers = {
+                "undamped_frequency": linear.undamped_frequencies,
+                "damped_frequency": linear.damped_frequencies,
+                "damping_ratio": linear.damping_ratios,
+                "growth_rate": linear.growth_rates,
+            }
+            state = "at rest" if linear.kind == REST else "steady rotation without gravity"
+            for i, speed in enumerate(linear.speeds.tolist()):
+                for k, name in enumerate(linear.names):
+                    # None for what JSON has no number for.
+                    shown = {key: float(a[i, k]) if math.isfinite(a[i, k]) else None for key, a in numbers.items()}
+                    rows.append({"state": state, "speed": speed, "mode": name, **shown})
+    return rows
+
+
+def modes_summary(modes: SceneModes) -> list[str]:
+    """Lines for a terminal: modes at rest, at the lowest and the highest speed, agreement, multipliers."""
+    lines = [f"{modes.scene}: {modes.title}"]
+    rows = mode_rows(modes)
+    for kind in (modes.rest, modes.rotation):
+        for linear in list(kind.values())[:1]:
+            own = rows[: len(linear.speeds) * len(linear.names)]
+            rows = rows[len(own) :]
+            for i in sorted({0, len(linear.speeds) - 1}):
+                state = "at rest" if linear.kind == REST else f"at {linear.speeds[i]:.4g} rad/s without gravity"
+                if linear.messages[i]:
+                    lines.append(f"  {state}: {linear.messages[i]}")
+                    continue
+                lines.append(f"  {state}")
+                lines += map(_mode_line, own[i * len(linear.names) : (i + 1) * len(linear.names)])
+    compared = [
+        f"{', '.join(s.label for s in kind.values())}" for kind in (modes.rest, modes.rotation) if len(kind) > 1
+    ]
+    if compared:
+        verdict = "agree" if modes.agrees else "DISAGREE"
+        lines.append(f"  {max(compared, key=len)} {verdict}: frequencies differ by {modes.disagreement:.1e} at most")
+    if modes.floquet is not None:
+        lines.append(f"  {floquet_sentence(modes.floquet)}")
+    return [*lines, *(f"  {note}" for note in modes.notes)]
+
+
+def _mode_line(row: Mapping[str, Any]) -> str:
+    name, undamped, ratio = row["mode"], row["undamped_frequency"], row["damping_ratio"]
+    if undamped is None:
+        return f"    {name:18} grows without oscillating, {row['growth_rate']:.5g} 1/s"
+    shown = f", damping ratio {ratio:.4g}" if ratio is not None and abs(ratio) > 1e-12 else ""
+    damped = f"damped {row['damped_frequency']:.7g}"
+    return f"    {name:18} {undamped:12.7g} rad/s {undamped / (2 * math.pi):12.7g} Hz, {damped}{shown}"
+
+
+def floquet_sentence(table: FloquetTable) -> str:
+    counts = [int(np.count_nonzero(table.stable == code)) for code in (1, 0, -1)]
+    parts = [
+        f"{n} {what}" for n, what in zip(counts, ("stable", "unstable", "without a periodic motion"), strict=True) if n
+    ]
+    return f"turning under gravity, {len(table.speeds)} speeds: {', '.join(parts)}"
+
+
+# Records of a results file
+
+# By name: values, and what they are.
+Datasets: TypeAlias = Mapping[str, tuple[NDArray[Any], Column]]
+_SPEED = Column(("speed",), "rad/s", "rotor speed")
+_LARGEST = "largest modulus of a multiplier, those that are always 1 left out"
+
+
+def _linear_datasets(linear: LinearModes) -> Datasets:
+    mode, shape = partial(Column, ("speed", "mode")), linear.multiblade_shapes
+    component = Column(("component",), "1", "rotor and multiblade coordinate, names in the attribute labels")
+    n, (backward, forward) = np.arange(len(linear.coordinates)), linear.whirl
+    entry, part = partial(Column, ("speed", "equation", "coordinate")), partial(Column, ("speed", "mode", "component"))
+    root, place = partial(Column, ("speed", "mode", "root")), partial(Column, ("speed", "mode", "coordinate"))
+    return {
+        "speed": (linear.speeds, _SPEED),
+        "mode": (n, Column(("mode",), "1", "number of the mode, names in the attribute labels")),
+        "coordinate": (n, Column(("coordinate",), "1", "coordinate that moves, names in the attribute labels")),
+        "component": (np.arange(shape.shape[2]), component),
+        "equation": (n, Column(("equation",), "1", "equation of motion, of the coordinate with the same number")),
+        "root": (np.arange(2), Column(("root",), "1", "both eigenvalues of a mode")),
+        "steady_angle": (linear.angles, Column(("speed", "coordinate"), "rad", "angle at the steady state")),
+        "undamped_frequency": (linear.undamped_frequencies, mode("rad/s", "undamped frequency, in the rotor's frame")),
+        "damped_frequency": (linear.damped_frequencies, mode("rad/s", "damped frequency, in the rotor's frame")),
+        "damping_ratio": (linear.damping_ratios, mode("1", "share of critical damping")),
+        "growth_rate": (linear.growth_rates, mode("1/s", "largest real part of the mode's eigenvalues")),
+        "backward_whirl_frequency": (backward, mode("rad/s", "damped frequency less speed, in the base frame")),
+        "forward_whirl_frequency": (forward, mode("rad/s", "damped frequency plus speed, in the base frame")),
+        "eigenvalue_real": (linear.eigenvalues.real, root("1/s", "eigenvalue, real part")),
+        "eigenvalue_imag": (linear.eigenvalues.imag, root("1/s", "eigenvalue, imaginary part")),
+        "shape_real": (linear.shapes.real, place("1", "mode shape, real part, largest entry 1")),
+        "shape_imag": (linear.shapes.imag, place("1", "mode shape, imaginary part")),
+        "multiblade_shape_real": (shape.real, part("1", "multiblade mode shape, real part")),
+        "multiblade_shape_imag": (shape.imag, part("1", "multiblade mode shape, imaginary part")),
+        "stiffness": (linear.stiffness, entry("1/s^2", "stiffness, mass matrix divided out")),
+        "damping": (linear.damping, entry("1/s", "damping and gyroscopic terms, mass divided out")),
+    }
+
+
+def _floquet_datasets(table: FloquetTable) -> Datasets:
+    at, each = partial(Column, ("speed",)), partial(Column, ("speed", "multiplier"))
+    count = Column(("multiplier",), "1", "number of the multiplier, the largest first")
+    return {
+        "speed": (table.speeds, _SPEED),
+        "multiplier": (np.arange(table.multipliers.shape[1]), count),
+        "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
+        "multiplier_imag": (table.multipliers.imag, each("1", "Floquet multiplier, imaginary part")),
+        "largest_multiplier": (table.largest, at("1", "largest modulus, multipliers that are always 1 left out")),
+        "growth_rate": (table.growth_rates, at("1/s", "its logarithm over the time of a turn")),
+        "stable": (table.stable, at("1", "1 where no multiplier is above 1, 0 where one is, -1 where not known")),
+        "product_error": (
+            table.product_error, at("1", "logarithm of the product of the multipliers less the integrated trace")
+        ),
+        "torque": (table.torque, at("N m", "torque on the rotor that keeps its mean speed")),
+        "mismatch": (table.mismatch, at("rad", "what the periodic motion misses after a turn")),
+    }  # fmt: skip
+
+
+def _chart_datasets(chart: StabilityChart) -> Datasets:
+    stiffness = Column(("bearing_stiffness",), "N m/rad", "stiffness of every pitch bearing")
+    return {
+        "bearing_stiffness": (chart.stiffnesses, stiffness),
+        "speed": (chart.speeds, _SPEED),
+        "largest_multiplier": (chart.largest, Column(("bearing_stiffness", "speed"), "1", _LARGEST)),
+    }
+
+
+def to_records(modes: SceneModes, attributes: Mapping[str, Any]) -> list[Record]:
+    """The records of a results file; attributes: of every one of them, its key among them."""
+    common = {"title": modes.title, "blades": modes.blades, "gravity": modes.gravity, "notes": "\n".join(modes.notes)}
+    common |= attributes
+    linear = [*modes.rest.values(), *modes.rotation.values()]
+    records = [_linear_record(modes.scene, source, common) for source in linear]
+    if modes.floquet is not None:
+        facts = {**common, "messages": list(modes.floquet.messages)}
+        records.append(_record(modes.scene, FLOQUET, facts, _floquet_datasets(modes.floquet)))
+    if modes.chart is not None:
+        records.append(_record(modes.scene, CHART, common, _chart_datasets(modes.chart)))
+    return records
+
+
+def _record(scene: str, name: str, attributes: Mapping[str, Any], datasets: Datasets) -> Record:
+    arrays = {dataset: values for dataset, (values, _) in datasets.items()}
+    return Record("modes", scene, name, attributes, arrays, {dataset: what for dataset, (_, what) in datasets.items()})
+
+
+def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -> Record:
+    attributes = {
+        **common,
+        "label": linear.label,
+        "mode_labels": list(linear.names),
+        "symmetric": "rotor" in linear.names,
+        "coordinate_labels": list(linear.coordinates),
+        "component_labels": ["rotor", *multiblade(linear.blades)[0]],
+        "messages": list(linear.messages),
+    }
+    return _record(scene, f"{linear.source}/{linear.kind}", attributes, _linear_datasets(linear))
+
+
+def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
+    """All sources of one state as an xarray.Dataset with the dimension `solver`; `xarray` is the module."""
+    if not sources:
+        raise InputError("no modes of this state; allowed: a state that was computed")
+    sets = []
+    for linear in sources.values():
+        record = _linear_record("", linear, {})
+        variables = {
+            name: (
+                column.dimensions,
+                record.attributes.get(f"{name}_labels", record.arrays[name]),
+                {"units": column.units, "long_name": column.long_name},
+            )
+            for name, column in record.columns.items()
+        }
+        coordinates = {name: value for name, value in variables.items() if value[0] == (name,)}
+        data = {name: value for name, value in variables.items() if name not in coordinates}
+        sets.append(xarray.Dataset(data, coords=coordinates))
+    return xarray.concat(sets, xarray.Variable("solver", list(sources)), join="override", combine_attrs="override")
+
+
+def read_modes(path: Path) -> dict[str, SceneModes]:
+    """By scene, all modes in a results file. Raises StoreError where the file cannot be read or has none."""
+    by_scene: dict[str, dict[str, Record]] = {}
+    for record in read_records(path, "modes"):
+        by_scene.setdefault(record.scene, {})[record.name] = record
+    if not by_scene:
+        raise StoreError(f"{path}: no modes in it; allowed: a file that rotor-mbs modes has written")
+    return {scene: _from_records(scene, records) for scene, records in by_scene.items()}
+
+
+def _from_records(scene: str, records: Mapping[str, Record]) -> SceneModes:
+    facts = next(iter(records.values())).attributes
+    states: dict[str, dict[str, LinearModes]] = {REST: {}, ROTATION: {}}
+    for name in sorted(records, key=lambda name: name.partition("/")[0] != CLOSED_FORM):
+        source, _, kind = name.partition("/")
+        if kind in states:
+            states[kind][source] = _linear(records[name], source, kind)
+    floquet = chart = None
+    if FLOQUET in records:
+        arrays = records[FLOQUET].arrays
+        floquet = FloquetTable(
+            speeds=arrays["speed"],
+            multipliers=np.asarray(arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]),
+            largest=arrays["largest_multiplier"],
+            stable=arrays["stable"],
+            product_error=arrays["product_error"],
+            torque=arrays["torque"],
+            mismatch=arrays["mismatch"],
+            messages=tuple(map(str, records[FLOQUET].attributes["messages"])),
+        )
+    if CHART in records:
+        arrays = records[CHART].arrays
+        chart = StabilityChart(arrays["speed"], arrays["bearing_stiffness"], arrays["largest_multiplier"])
+    title, blades, gravity = str(facts["title"]), int(facts["blades"]), float(facts["gravity"])
+    notes = tuple(str(facts["notes"]).splitlines())
+    return SceneModes(scene, title, blades, gravity, states[REST], states[ROTATION], floquet, chart, notes)
+
+
+def _linear(record: Record, source: str, kind: str) -> LinearModes:
+    facts, arrays = record.attributes, record.arrays
+    return LinearModes(
+        eigenvalues=np.asarray(arrays["eigenvalue_real"] + 1j * arrays["eigenvalue_imag"]),
+        shapes=np.asarray(arrays["shape_real"] + 1j * arrays["shape_imag"]),
+        names=tuple(map(str, facts["mode_labels"])),
+        source=source,
+        label=str(facts["label"]),
+        kind=kind,
+        blades=int(facts["blades"]),
+        speeds=arrays["speed"],
+        coordinates=tuple(map(str, facts["coordinate_labels"])),
+        angles=arrays["steady_angle"],
+        stiffness=arrays["stiffness"],
+        damping=arrays["damping"],
+        messages=tuple(map(str, facts["messages"])),
+    )

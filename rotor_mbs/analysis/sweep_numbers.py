@@ -95,7 +95,6 @@ class StabilityMap:
 
     @property
     def unstable(self) -> NDArray[np.bool_]:
-        """Where the pitches grew tenfold or more."""
         return np.asarray(self.growth >= GROWN)
 
 

@@ -167,8 +167,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """The arguments; `command` is the place of the function to call, "module:function" in `rotor_mbs.cli`. Ends with
-    status 2 on bad usage."""
+    """The arguments; `command` is the place of the function to call, "module:function". Ends with status 2 on bad
+    usage."""
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
         parser.error(f"no command {argv[0]!r}{nearest(argv[0], commands)}; allowed: {', '.join(commands)}")
@@ -179,7 +179,6 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def _parser() -> tuple[_Parser, dict[str, _Parser]]:
-    """The parser, and those of the commands by name."""
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
@@ -286,7 +285,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
 
     own = command(
-        "sweep", "a parameter study into one dataset", "sweep:sweep",
+        "sweep", "a parameter study into one dataset", "studies:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
     own.add_argument("file", type=path, metavar="SWEEP.toml", help="or a shipped one: sweeps/fig11-spread")

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from rotor_mbs.analysis.run_tables import run_table
 from rotor_mbs.cli import EXIT_BAD_INPUT
 from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_summary, print_table, print_text
-from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.runs.files import is_being_written, replace_file
 from rotor_mbs.runs.pool import local_pool
 from rotor_mbs.runs.read import open_results
@@ -22,7 +21,7 @@ from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.studies.reference import compute_references
 from rotor_mbs.studies.reproduce import made_from, summary_of
 from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
-from rotor_mbs.studies.run import asked_methods, run_scenes, selected_methods
+from rotor_mbs.studies.run import run_scenes, selected_methods
 
 if TYPE_CHECKING:
     from rotor_mbs.studies.run import Outcome
@@ -36,16 +35,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Methods named with -m, or by a scene's file, must represent it; without, a rule selects them."""
     scenes = find_scenes(arguments.scenes)
     print_doubts(scenes)
-    names = check_names(arguments.method or ())
-    if names:
-        methods = asked_methods(scenes, names)
-    else:
-        methods, reasons = selected_methods(scenes)
-        for reason in reasons:
-            print(reason, file=sys.stderr)
-        scenes = [scene for scene in scenes if methods[scene.name]]
-        if not scenes:
-            return EXIT_BAD_INPUT
+    methods, reasons = selected_methods(scenes, arguments.method or ())
+    for reason in reasons:
+        print(reason, file=sys.stderr)
+    scenes = [scene for scene in scenes if methods[scene.name]]
+    if not scenes:
+        return EXIT_BAD_INPUT
     with ProgressLine() as progress:
         report = run_scenes(
             scenes, methods, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,

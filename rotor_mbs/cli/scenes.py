@@ -101,7 +101,6 @@ def _readable(value: object) -> str:
 
 
 def scene_data(scene: Scene) -> dict[str, object]:
-    """Every key of the scene that is set, with its unit."""
     data: dict[str, object] = {}
     for item in scene_fields("label", "run", "start", "rotor"):
         value, unit = getattr(scene, item.name), item.metadata["unit"]
@@ -137,7 +136,6 @@ class SceneModel:
 
 
 def models_of(scene: Scene) -> list[SceneModel]:
-    """Every model, in the order of the catalogue."""
     models: dict[str, SceneModel] = {}
     for method in methods():
         known = models.setdefault(method.model, SceneModel(method.model, []))

@@ -11,15 +11,23 @@ import os
 import sys
 import time
 import webbrowser
+from collections import Counter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from rotor_mbs.cli import show
 from rotor_mbs.cli.arguments import pages_beside
-from rotor_mbs.cli.terminal import ProgressLine, print_doubts, print_not_computed, print_table
+from rotor_mbs.cli.terminal import ProgressLine, SweepProgress, print_doubts, print_not_computed, print_table, span
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.runs import cores
-from rotor_mbs.runs.files import replace_file
 from rotor_mbs.scenario.catalogue import find_scenes, only_scene
+
+if TYPE_CHECKING:
+    from rotor_mbs.runs.pool import TaskPool
+    from rotor_mbs.studies.sweep import SweepPlan, SweepResult
+
+_MANY_RUNS = 1_000_000  # that a sweep does not start without --yes
 
 
 def bench(arguments: argparse.Namespace) -> int:
@@ -72,7 +80,7 @@ def stability(arguments: argparse.Namespace) -> int:
 
 def modes(arguments: argparse.Namespace) -> int:
     """The modes of every scene; 1 where two models disagree on a frequency or a scene could not be computed."""
-    from rotor_mbs.analysis.campbell import mode_rows, modes_summary, read_modes
+    from rotor_mbs.analysis.modes import mode_rows, modes_summary, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
 
     scenes = find_scenes(arguments.scenes)
@@ -97,6 +105,7 @@ def modes(arguments: argparse.Namespace) -> int:
 def check(arguments: argparse.Namespace) -> int:
     """Prints every verdict that fails (with --verbose all), then a count; status 1 where one fails."""
     from rotor_mbs.report.pages import check as formats
+    from rotor_mbs.runs.files import replace_file
     from rotor_mbs.runs.read import is_sweep
     from rotor_mbs.scenario.accuracy_bounds import load_bounds
     from rotor_mbs.studies import check as study
@@ -191,6 +200,76 @@ def animate(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.scene.rpartition("/")[2] + ".webp")
     print(write_animation(arguments.file, arguments.scene, output, arguments.offset))
     return 0
+
+
+def sweep(arguments: argparse.Namespace) -> int:
+    """A parameter study into one dataset; 1 where a run did not succeed, or the disk is full."""
+    from rotor_mbs.runs.cluster import open_task_pool
+
+    with open_task_pool(arguments.engine, arguments.jobs) as pool:  # its workers load their code meanwhile
+        from rotor_mbs.scenario.sweep import load_sweep
+        from rotor_mbs.studies.sweep import plan_sweep, run_sweep
+
+        plan = plan_sweep(load_sweep(arguments.file), arguments.method or (), arguments.part, arguments.timeout)
+        if arguments.dry_run:
+            return _show_estimate(plan, pool, arguments)
+        if plan.runs > _MANY_RUNS and not arguments.yes:
+            raise InputError(f"{arguments.file}: {plan.runs:,} runs; allowed without --yes: at most {_MANY_RUNS:,}")
+        output = arguments.output or Path(f"{plan.sweep.name}.{arguments.format}")
+        try:
+            with SweepProgress(as_json=arguments.json) as progress:
+                result = run_sweep(plan, output, pool, progress, fresh=arguments.fresh)
+        except StoreError as exc:  # the disk, not the input: what is stored stays, the same command continues
+            show(str(exc), sys.stderr)
+            return 1
+        _summarize_sweep(result, as_json=arguments.json)
+        if result.older:
+            show(f"{result.older} runs were computed by other versions; --fresh computes them again", sys.stderr)
+        for line in result.lost:
+            show(f"{line}; not computed, the same command tries again", sys.stderr)
+        if plan.sweep.table.picture and arguments.part == (1, 1):
+            from rotor_mbs.report.pages.sweep import save_picture  # late: matplotlib
+            from rotor_mbs.runs.sweeps import StoredSweep
+
+            line = save_picture(StoredSweep(result.path), output.with_suffix(".svg"))
+            print(line, file=sys.stderr if arguments.json else sys.stdout)
+        if arguments.metadata:
+            from rotor_mbs.studies.sweep_metadata import describe
+
+            names = ", ".join(place.name for place in describe(result.path))
+            print(f"{result.path}: described in {names}", file=sys.stderr if arguments.json else sys.stdout)
+        return 0 if result.is_ok else 1
+
+
+def _summarize_sweep(result: SweepResult, *, as_json: bool) -> None:
+    if as_json:
+        facts = {"runs": result.runs, "made": result.made, "statuses": result.statuses, "files": [str(result.path)]}
+        print(json.dumps({"event": "end", **facts, "seconds": round(result.seconds, 3)}))
+        return
+    by_status = ", ".join(f"{count} {status}" for status, count in Counter(result.statuses).most_common())
+    rate = f", {result.made / result.seconds:.4g} per s" if result.made else ""
+    print(f"{result.path}: {result.runs} runs: {by_status}; {result.made} made in {result.seconds:.1f} s{rate}")
+
+
+def _show_estimate(plan: SweepPlan, pool: TaskPool, arguments: argparse.Namespace) -> int:
+    from rotor_mbs.studies.sweep import estimate_seconds
+
+    size, seconds = plan.runs * plan.table().row_type.itemsize, estimate_seconds(plan, pool)
+    if arguments.json:
+        facts = {"runs": plan.runs, "methods": list(plan.methods), "seconds": seconds, "bytes": size, "files": 1}
+        print(json.dumps(facts))
+        return 0
+    print(f"{plan.runs:,} runs by {', '.join(plan.methods)}: about {span(seconds)} on {arguments.engine}")
+    print(f"{_size(size)} in 1 file")
+    return 0
+
+
+def _size(count: float) -> str:
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if count < 1000.0:
+            return f"{count:.4g} {unit}"
+        count /= 1000.0
+    return f"{count:.4g} TB"
 
 
 def _write_pages(results: Path, folder: Path | None = None) -> None:

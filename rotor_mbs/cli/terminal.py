@@ -185,7 +185,6 @@ class SweepProgress(_RenewedLine):
 
 
 def span(seconds: float) -> str:
-    """A length of time in s, min, h or days."""
     for length, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * length:
             return f"{seconds / length:.1f} {unit}"

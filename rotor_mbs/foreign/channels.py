@@ -11,7 +11,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,11 @@ from rotor_mbs.scenario.keys import Kind, file_key, wrong
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import TableError, read_toml
 
+Array = NDArray[np.float64]
+
 TIME = "time"
+_FEW_DIGITS, _ALL_DIGITS = 9, 17
+_FEWEST = 3  # rows: fewer have no motion to be compared
 # Names without digits, blanks and marks; a name of a rate is one of an angle with a word of _RATE_WORDS behind it.
 _TIME_NAMES = {"time", "t", "times"}
 _ROTOR_NAMES = {"rotor", "rotorangle", "rotorposition", "rot", "azimuth", "rotorazimuth", "azim", "psi", "shaft"}
@@ -136,32 +140,6 @@ _ENTRY = Kind(_read_entry, "a column's name, or a table with `column`")
 _GROUP = Kind(keys.read_text, "the path of a group in the file")
 
 
-@dataclass(frozen=True)
-class Source:
-    """Where a channel comes from, in which unit, and whether nobody said so."""
-
-    channel: Channel
-    entry: Entry
-    unit: str
-    assumed: bool
-
-    @property
-    def factor(self) -> float:
-        return UNITS[self.channel.kind][self.unit.lower()]
-
-    def __str__(self) -> str:
-        """A line of the list of what was read."""
-        shift = f" {self.entry.offset:+g}" if self.entry.offset else ""
-        notes = []
-        if self.assumed:
-            notes.append("unit assumed")
-        if self.entry.wrapped:
-            notes.append("wrapped")
-        sign = "-" if self.entry.sign < 0 else ""
-        line = f"{self.channel.name} = {sign}{self.entry.column!r}{shift} [{self.unit}]"
-        return f"{line} ({', '.join(notes)})" if notes else line
-
-
 def read_mapping(
     columns: str | os.PathLike[str] | Mapping[str, Any] | None, scene: Scene
 ) -> tuple[dict[str, Entry], str]:
@@ -190,8 +168,11 @@ def read_mapping(
     return entries, group
 
 
-def sources(table: DataTable, scene: Scene, entries: Mapping[str, Entry]) -> list[Source]:
-    """Where each channel comes from, the time first. Raises InputError where there is no time or nothing else."""
+def find_channels(
+    table: DataTable, scene: Scene, entries: Mapping[str, Entry]
+) -> tuple[dict[Channel, Entry], tuple[str, ...]]:
+    """Where each channel comes from, with its unit, the time first, and a line for each that says so. Raises
+    InputError."""
     known = channels(scene)
     vectors = Counter(name.rpartition("[")[0] for name in table.columns if name.endswith("]"))
     guessed: dict[str, str] = {}
@@ -205,7 +186,8 @@ def sources(table: DataTable, scene: Scene, entries: Mapping[str, Entry]) -> lis
                 f"`{channel.key}` in a mapping file says which"
             )
         guessed[channel.name] = name
-    channel_sources = []
+    chosen: dict[Channel, Entry] = {}
+    lines = []
     for channel in known:
         if channel.key not in entries and channel.name not in guessed:
             continue
@@ -217,20 +199,21 @@ def sources(table: DataTable, scene: Scene, entries: Mapping[str, Entry]) -> lis
                 f"{table.source}: column {entry.column!r} for {channel.name} is in {unit!r}; allowed: "
                 f"{ALLOWED_UNITS[channel.kind]}"
             )
-        channel_sources.append(Source(channel, entry, unit or channel.unit, assumed=not unit))
+        chosen[channel] = replace(entry, unit=unit or channel.unit)
+        line = f"{channel.name} = {'-' if entry.sign < 0 else ''}{entry.column!r}"
+        if entry.offset:
+            line += f" {entry.offset:+g}"
+        line += f" [{unit or channel.unit}]"
+        notes = [note for note, holds in (("unit assumed", not unit), ("wrapped", entry.wrapped)) if holds]
+        lines.append(f"{line} ({', '.join(notes)})" if notes else line)
     shown = shown_names(list(table.columns))
-    if not channel_sources or channel_sources[0].channel.name != TIME:
+    if known[0] not in chosen:
         raise InputError(f"{table.source}: no column for the time; it has: {shown}; allowed: `time` in a mapping file")
-    if len(channel_sources) == 1:
+    if len(chosen) == 1:
         raise InputError(
             f"{table.source}: no column for an angle or a rate; it has: {shown}; allowed: a mapping file (columns)"
         )
-    return channel_sources
-
-
-Array = NDArray[np.float64]
-_FEW_DIGITS, _ALL_DIGITS = 9, 17
-_FEWEST = 3  # rows: fewer have no motion to be compared
+    return chosen, tuple(lines)
 
 
 @dataclass(frozen=True)
@@ -266,32 +249,32 @@ def load_data(
     """Data from a file or from arrays by name, by a mapping or by guesses. Raises InputError, StoreError."""
     entries, group = read_mapping(columns, scene)
     table = table_of("data", data) if isinstance(data, Mapping) else read_table(data, group, scene.name)
-    channel_sources = sources(table, scene, entries)
-    lengths = {source.entry.column: len(table[source.entry.column].values) for source in channel_sources}
+    chosen, lines = find_channels(table, scene, entries)
+    lengths = {entry.column: len(table[entry.column].values) for entry in chosen.values()}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
         raise InputError(f"{table.source}: columns of different lengths: {shown}; allowed: a row for every time")
     arrays: list[Array] = []
-    for source in channel_sources:
-        values = table[source.entry.column].values
+    for channel, entry in chosen.items():
+        values = table[entry.column].values
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise InputError(
-                f"{table.source}: column {source.entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of "
+                f"{table.source}: column {entry.column!r} is {values[bad[0]]} in row {bad[0] + 1} of "
                 f"{len(values)}; allowed: finite numbers"
             )
-        si_values: Array = source.entry.sign * (values + source.entry.offset) * source.factor
-        arrays.append(np.unwrap(si_values) if source.entry.wrapped else si_values)
+        si_values: Array = entry.sign * (values + entry.offset) * UNITS[channel.kind][entry.unit.lower()]
+        arrays.append(np.unwrap(si_values) if entry.wrapped else si_values)
     _refuse_wrong_times(table.source, arrays[0])
     return ForeignData(
         table.source,
         arrays[0],
         np.stack(arrays[1:], axis=1),
-        tuple(source.channel for source in channel_sources[1:]),
-        tuple(str(source) for source in channel_sources),
+        tuple(chosen)[1:],
+        lines,
         tuple(name for name in table.columns if name not in lengths),
-        tuple(source.entry.wrapped for source in channel_sources[1:]),
-        max(_digits(table[source.entry.column].values) for source in channel_sources[1:]),
+        tuple(entry.wrapped for entry in chosen.values())[1:],
+        max(_digits(table[entry.column].values) for channel, entry in chosen.items() if channel.name != TIME),
     )
 
 

@@ -47,8 +47,7 @@ class Ladder:
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def rungs(self, interval: float) -> dict[float, dict[str, object]]:
-        """All that the method is given at each rung, by the number it is plotted by (step in s, or the tolerance);
-        interval: s, between samples."""
+        """All that the method is given at each rung, by step (s) or tolerance; interval: s, between samples."""
         numbers = [value * interval if self.kind == STEP else value for value in self.values]
         return {number: {**self.choices, **self.fill(number)} for number in numbers}
 
@@ -172,8 +171,7 @@ class Method:
         return self.settings().as_dict()
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
-        """The settings of the next finer rung of its ladder; {} where it is as fine as that goes; interval: s, of
-        samples."""
+        """The settings of the next finer rung of its ladder, {} at its end; interval: s, between samples."""
         for ladder in self.ladders:
             if ladder.variant:
                 continue
@@ -188,7 +186,6 @@ class Method:
 
     @property
     def is_installed(self) -> bool:
-        """Whether all packages it needs are there; none is imported."""
         return all(_is_distribution_installed(distribution) for distribution in self.distributions)
 
 

@@ -69,8 +69,8 @@ def _unknown(name: str) -> str:
 
 
 def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """By method, those of the `given` settings that it has. Raises InputError for a setting that none of them has, and
-    for a value that one of them does not allow."""
+    """By method, those of the `given` settings that it has. Raises InputError for one that none has, or that is not
+    allowed."""
     if len(names) == 1:
         find_method(names[0]).settings.of(names[0], given)
     own = {name: find_method(name).settings.allowed() for name in names}

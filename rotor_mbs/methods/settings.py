@@ -114,5 +114,4 @@ class Settings:
         return ", ".join(texts) or "none"
 
     def as_dict(self) -> dict[str, object]:
-        """Name and value of every setting, as stored with a run."""
         return asdict(self)

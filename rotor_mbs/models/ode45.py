@@ -76,8 +76,7 @@ class Ode45Result:
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:
-        """(len(times), n): the pair's quartic interpolant at any times; raises ValueError for one beyond what was
-        reached."""
+        """(len(times), n): the pair's quartic interpolant; raises ValueError for a time beyond what was reached."""
         if np.any(times < self.time[0]) or np.any(times > self.time[-1]):
             raise ValueError(f"the solution covers [{self.time[0]:g}, {self.time[-1]:g}] only")
         if self.steps == 0:

@@ -12,16 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from rotor_mbs.analysis.campbell import (
+from rotor_mbs.analysis.modes import (
+    GROWTH,
     LinearModes,
     SceneModes,
     floquet_sentence,
     linear_dataset,
     mode_rows,
+    multiblade,
     read_modes,
     to_records,
 )
-from rotor_mbs.analysis.modes import GROWTH, multiblade
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels, curve, growth_map, log_axis, panels

@@ -31,8 +31,7 @@ _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_"
 
 
 def open_task_pool(name: str, workers: int) -> TaskPool:
-    """The engine called `name`; of a local one the number of processes, 0 for this one. Raises InputError where there
-    is no such engine, or it does not answer."""
+    """The engine called `name`; of a local one the number of processes, 0 for this one. Raises InputError."""
     if name == "local":
         for variable, value in _KEEP_MEMORY.items() if workers else ():
             os.environ.setdefault(variable, value)

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError, saving
-from rotor_mbs.solution.quantities import Quantity
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
@@ -94,8 +93,7 @@ def replace_file(path: Path, content: Buffer) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """The name of a file to be written in the block, which then takes the place of `path`, or goes where the block
-    raises. Raises StoreError where it cannot be written."""
+    """The name of a file to be written in the block, which then takes the place of `path`. Raises StoreError."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     with saving(path):
         try:
@@ -191,18 +189,17 @@ def new_group(parent: Any, name: str) -> Any:
     return parent
 
 
-def put(group: Any, name: str, values: Any, quantity: Column | Quantity) -> Any:
-    """A dataset of numbers or texts with unit and long name. The scales of its dimensions must be there already; a
-    scale is its own dimension."""
+def put(group: Any, name: str, values: Any, column: Column) -> Any:
+    """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own dimension."""
     is_text = len(values) > 0 and isinstance(values[0], str)
     data = np.array(list(values), dtype=h5py.string_dtype()) if is_text else np.asarray(values)
-    return _described(group.create_dataset(name, data=data), group, quantity)
+    return _described(group.create_dataset(name, data=data), group, column)
 
 
-def _described(dataset: Any, group: Any, quantity: Column | Quantity) -> Any:
-    dataset.attrs["units"] = quantity.units
-    dataset.attrs["long_name"] = quantity.long_name
-    for axis, dimension in enumerate(quantity.dimensions):
+def _described(dataset: Any, group: Any, column: Column) -> Any:
+    dataset.attrs["units"] = column.units
+    dataset.attrs["long_name"] = column.long_name
+    for axis, dimension in enumerate(column.dimensions):
         if group[dimension] == dataset:
             dataset.make_scale(dimension)
         else:
@@ -266,8 +263,7 @@ def dimensions_of(dataset: Any) -> list[str]:
 
 
 def groups_in(group: Any, seen: set[Any] | None = None) -> Iterator[Any]:
-    """A group and every one below it, but for those below a table. Raises StoreError at a link, and at a second name of
-    a group."""
+    """A group and every one below it, but for those below a table. Raises StoreError at a link or a second name."""
     seen = set() if seen is None else seen
     if group in seen:
         raise StoreError(f"{group.file.filename}: {group.name} is another name of a group; allowed: one name of each")
@@ -284,13 +280,10 @@ def is_link(group: Any, name: str) -> bool:
 
 
 def is_group(item: Any) -> bool:
-    """Whether a member of a file holds others, and is no array."""
     return isinstance(item, h5py.Group)
 
 
-def put_empty(
-    group: Any, name: str, shape: tuple[int, ...], kind: Any, quantity: Column | Quantity, fill: int | None = None
-) -> Any:
+def put_empty(group: Any, name: str, shape: tuple[int, ...], kind: Any, column: Column, fill: int | None = None) -> Any:
     """A contiguous dataset that has its place in the file now and is written by others; fill: its first value, by
     default what the file system makes of a new file, zeros."""
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -300,7 +293,7 @@ def put_empty(
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
     if fill is not None:
         layout.set_fill_value(np.array(fill, kind))
-    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, quantity)
+    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, column)
     if np.dtype(kind).kind == "S":
         dataset.attrs["_Encoding"] = "utf-8"
     return dataset
@@ -317,7 +310,6 @@ def sync_folder(folder: Path) -> None:
 
 
 def is_of_this_program(path: Path) -> bool:
-    """Whether an HDF5 file says that this program wrote it."""
     try:
         with h5py.File(path, "r") as file:
             return bool(plain(file.attrs.get("format")) == FORMAT)
@@ -476,8 +468,7 @@ _held: set[tuple[Path, int]] = set()
 
 @contextmanager
 def writing(output: Path) -> Iterator[None]:
-    """No other process writes `output` in the block; it may be entered again by the same thread. Raises InputError
-    where another process is writing it, StoreError where it cannot be written."""
+    """No other process writes `output` in the block; its thread may enter it again. Raises InputError, StoreError."""
     place = _resolved(output)
     own = place, threading.get_ident()
     if own in _held:

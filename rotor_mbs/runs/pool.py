@@ -50,8 +50,7 @@ class TaskLostError(RotorError):
 
 @dataclass(frozen=True, slots=True)
 class Finished(Generic[T, R]):
-    """The end of a task: `value`, or `failure` ("timed_out", "worker_died", "error") with one line of `message`, and
-    the `error` that the task itself raised."""
+    """The end of a task: `value`, or `failure` ("timed_out", "worker_died", "error") with a line, what it raised."""
 
     task: T
     value: R | None = None
@@ -236,8 +235,7 @@ def _ended(pool: TaskPool, waiting: dict[Future[R], T]) -> Iterator[Finished[T, 
 
 @contextmanager
 def delayed_interrupts() -> Iterator[None]:
-    """Delays Ctrl-C, SIGTERM and SIGHUP to the end of the block, so that other processes are ended all or not at all.
-    No signals arrive in other threads than the main one."""
+    """Delays Ctrl-C, SIGTERM and SIGHUP to the end of the block: other processes are ended all or not at all."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -90,7 +90,6 @@ class StoredRun:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Of the method, all of them."""
         return dict(json.loads(self.known["settings"]))
 
     @property
@@ -99,36 +98,34 @@ class StoredRun:
         return list(self._labels) if "angles" in self or "rates" in self else []
 
     @property
-    def names(self) -> list[str]:
-        """The arrays that it has, scales included."""
-        arrays = [name for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS and name in self]
-        return [*self.scales, *arrays]
-
-    @property
     def samples(self) -> int:
         return int(self._row["samples"])
 
+    @functools.cached_property
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """By name, scales included. One that its method or its scene's outputs do not have is NaN from the first sample
+        on, and left out."""
+        count = self.samples
+        scales = {name: values[:count] if name == "time" else values for name, values in self.scales.items()}
+        own = {name: values[:count] for name, values in self._row.items() if np.ndim(values) and name not in _TEXTS}
+        return scales | {name: values for name, values in own.items() if count == 0 or not np.isnan(values[0]).all()}
+
+    @property
+    def names(self) -> list[str]:
+        """The arrays that it has, scales included."""
+        return list(self._arrays)
+
     def __contains__(self, name: str) -> bool:
-        """An array that its method or its scene's outputs do not have is NaN from the first sample on."""
-        if name in self.scales:
-            return True
-        values = self._row.get(name)
-        if values is None or not np.ndim(values) or name in _TEXTS:
-            return False
-        return self.samples == 0 or not np.isnan(values[0]).all()
+        return name in self._arrays
 
     def array(self, name: str) -> NDArray[Any]:
         """(samples, ...) An array, or a scale. Raises StoreError where the run has none of that name."""
         if name not in self:
             raise StoreError(f"{self._name} has no {name}")
-        if name in self.scales:
-            return self.scales[name][: self.samples] if name == "time" else self.scales[name]
-        values: NDArray[Any] = self._row[name][: self.samples]
-        return values
+        return self._arrays[name]
 
     def get(self, name: str) -> NDArray[Any] | None:
-        """As `array`; None where the run has none of that name."""
-        return self.array(name) if name in self else None
+        return self._arrays.get(name)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,18 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.runs import files
 from rotor_mbs.runs.files import Column
 from rotor_mbs.runs.results import TableFile
-from rotor_mbs.runs.table import COLUMNS, MISSING, Place, Rows, Table, blank_rows, characters, known_columns, text_of
+from rotor_mbs.runs.table import (
+    COLUMNS,
+    MISSING,
+    Place,
+    Rows,
+    Table,
+    blank_rows,
+    characters,
+    columns_of,
+    known_columns,
+    text_of,
+)
 from rotor_mbs.solution.status import STATUSES, code_of
 
 _MESSAGE_LENGTH = 300
@@ -84,7 +95,6 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> Table:
 
 
 def row_of_point(place: Place, status: str, message: str, values: Mapping[str, object]) -> Rows:
-    """The row of a point; values: by column."""
     row = blank_rows(1, place.row)
     row["status"][0], row["message"][0] = code_of(status), characters(message, row["message"].shape[1])
     for name, value in values.items():
@@ -172,14 +182,8 @@ def _group_records(file: Any, kind: str) -> Iterator[Record]:
         if damages:
             raise StoreError(f"{file.filename}: {path}: {', '.join(damages)} changed after they were written")
         parts = path.removeprefix(f"{kind}/").split("/")
-        datasets = {name: item for name, item in group.items() if not files.is_group(item)}
-        arrays = {name: files.values_of(item) for name, item in datasets.items()}
-        columns = {name: _column_of(name, item) for name, item in datasets.items()}
+        columns = columns_of(group)
+        arrays = {name: files.values_of(group[name]) for name in columns}
         scales_first = dict(sorted(columns.items(), key=lambda column: column[1].dimensions != (column[0],)))
         scene, name = "/".join(parts[:-2]), "/".join(parts[-2:])
         yield Record(kind, scene, name, files.attributes_of(group), arrays, scales_first)
-
-
-def _column_of(name: str, dataset: Any) -> Column:
-    dimensions = tuple(dimension or name for dimension in files.dimensions_of(dataset))
-    return Column(dimensions, str(dataset.attrs["units"]), str(dataset.attrs["long_name"]), dataset.dtype.str)

@@ -77,7 +77,6 @@ class Asked:
 
     @property
     def is_shipped(self) -> bool:
-        """Whether it is read from a shipped file and not computed."""
         return self.versions is not None and "frozen_with" in self.versions
 
     @property
@@ -115,7 +114,6 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
 
 
 def runs_table(asked: Sequence[Asked]) -> Table:
-    """The table /runs of these runs."""
     outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
     known = known_columns([run.known for run in asked])
     return Table(RUNS, [run.run for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH)
@@ -161,7 +159,6 @@ def scene_table(runs: Sequence[Asked], arrays: Collection[str] | None = None) ->
 
 
 def results_tables(asked: Sequence[Asked]) -> list[Table]:
-    """The tables of a results file with these runs."""
     asked = sorted(asked, key=lambda run: _order(run.run))
     by_scene: dict[str, list[Asked]] = {}
     for run in asked:
@@ -191,7 +188,6 @@ class TableFile:
 
     @functools.cached_property
     def groups(self) -> list[str]:
-        """The names of its tables."""
         return table.table_groups(self.path)
 
     def place(self, run: str, group: str = RUNS) -> Place:
@@ -215,7 +211,6 @@ class TableFile:
         return replace(place, offsets={**place.offsets, **offsets}, row=np.dtype([*own, *kinds]))
 
     def known(self, group: str, row: int) -> dict[str, Any]:
-        """What the design says of a row."""
         return {name: values[row] for name, values in self.table(group).known.items()}
 
     def take_back_missing(

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs import files
-from rotor_mbs.runs.files import CHARACTERS, Column, writing
+from rotor_mbs.runs.files import Column, writing
 from rotor_mbs.runs.table import (
     COLUMNS,
     MISSING,
@@ -120,7 +120,7 @@ def open_sweep(
                     f"{path}: holds something else than this sweep; allowed: another output file, or remove that one"
                 )
             stored = stored_table(file)
-        place, marked = stored.place(number=int(stored.runs[0]) if len(stored.runs) else 0), stored.statuses()
+        place, marked = stored.place(), stored.statuses()
         statuses = place.stored(marked)
         limit = stored.computed["time_limit_s"]
         limits = np.memmap(path, limit.kind, "r", limit.offset, limit.shape) if len(marked) else np.empty(0)
@@ -152,16 +152,13 @@ class StoredSweep:
             self._table: StoredTable = stored_table(file)
             columns = columns_of(file)
         table = self._table
-        self.columns: dict[str, Column] = {
-            "run": Column(("run",), "1", "run number, from 0"),
-        }
-        self.columns |= {name: column for name, column in columns.items() if name not in (CHARACTERS, "run")}
+        del columns["run"]
+        self.columns = {"run": Column(("run",), "1", "run number, from 0"), **columns}
         self.keys: list[str] = self.attributes["parameter_keys"]
-        first = int(table.runs[0]) if len(table.runs) else 0
         with files.reading(path):
-            marked = table.statuses()
-            statuses = table.place(number=first).stored(marked)
-        self.damaged_runs = first + np.flatnonzero((marked != MISSING) & (statuses == MISSING))
+            place, marked = table.place(), table.statuses()
+            statuses = place.stored(marked)
+        self.damaged_runs = place.first + np.flatnonzero((marked != MISSING) & (statuses == MISSING))
         if len(self.damaged_runs) and not allow_damaged_runs:
             which = ", ".join(map(str, self.damaged_runs[:5])) + (" ..." if len(self.damaged_runs) > 5 else "")
             raise StoreError(
@@ -171,13 +168,11 @@ class StoredSweep:
 
     @property
     def methods(self) -> list[str]:
-        """Their names, by their code."""
         names: list[str] = self.attributes["methods"]
         return names
 
     def column(self, name: str) -> NDArray[Any]:
-        """A dataset, such as `status` or `angles`; computed ones as they lie in the file, read where they are indexed.
-        Raises StoreError where there is none of that name."""
+        """A dataset; computed ones as they lie in the file, read where they are indexed. Raises StoreError."""
         table = self._table
         if name == "run":
             return table.runs

@@ -211,8 +211,7 @@ class Place:
     row: np.dtype[np.void]
 
     def write(self, first: int, rows: Rows) -> None:
-        """Store the rows from number `first` on, their statuses last; meanwhile they are missing. Raises StoreError
-        where the file cannot be written, or is another one by now."""
+        """Store the rows from number `first` on, their statuses last; meanwhile they are missing. Raises StoreError."""
         columns = rows | {"crc32": checksums(first, rows, self.row)}
         statuses = {name: columns.pop(name) for name in (STATUS_REPEATED, "status") if name in columns}
         with saving(self.path), self.path.open("r+b") as file:
@@ -408,12 +407,13 @@ class StoredTable:
         """(rows,) as they stand in the file now."""
         return np.fromfile(self.path, np.int8, len(self.runs), offset=self.computed["status"].offset)
 
-    def place(self, row: int = 0, number: int | None = None) -> Place:
-        """Where the rows from `row` on are; `number` is what the checksum of the first begins with."""
+    def place(self, row: int = 0) -> Place:
+        """Where the rows from `row` on are. Their checksums begin with the run where that is a number, else the row."""
+        number = int(self.runs[row]) if self.runs.dtype.kind == "i" and len(self.runs) else row
         columns = {name: stored for name, stored in self.computed.items() if stored.is_of_runs}
         kinds = np.dtype([(name, stored.kind, stored.shape[1:]) for name, stored in columns.items()])
         offsets = {name: stored.offset + row * kinds[name].itemsize for name, stored in columns.items()}
-        return Place(self.path, self.inode, row if number is None else number, offsets, kinds)
+        return Place(self.path, self.inode, number, offsets, kinds)
 
 
 def stored_table(file: Any, group: str = "") -> StoredTable:
@@ -475,7 +475,6 @@ def as_table(file: Any, group: str) -> Table:
 
 
 def columns_of(group: Any) -> dict[str, Column]:
-    """What the datasets of an open group are, by name."""
     columns = {}
     for name, dataset in group.items():
         if not files.is_group(dataset) and not files.is_dimension_only(dataset):

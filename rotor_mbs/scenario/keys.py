@@ -310,8 +310,7 @@ def declared_keys(cls: Any) -> dict[str, Mapping[str, Any]]:
 def read_keys(
     keys: Mapping[str, Mapping[str, Any]], tables: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[KeyProblem]]:
-    """The values by field, without those that have an error, and everything that is wrong. A table with a single key
-    must have it where the table is there."""
+    """The values by field, without those that have an error, and everything that is wrong."""
     values: dict[str, Any] = {}
     problems: list[KeyProblem] = []
     names: dict[str, list[str]] = {"": []}  # of the keys by table, "" for the top

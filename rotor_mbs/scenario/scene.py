@@ -232,8 +232,7 @@ class Blade:
 
 
 def _key(path: str, *declared: Any, part: Part = "rotor", added: bool = False, **more: Any) -> Any:
-    """As `file_key`, with the part of the scene; an `added` key, younger than stored hashes, does not enter them at its
-    default."""
+    """As `file_key`; an `added` key, younger than stored hashes, does not enter them at its default."""
     return file_key(path, *declared, part=part, added=added, **more)
 
 
@@ -331,8 +330,7 @@ class Scene:
         return self.shaft_damping, *(self.bearing(i)[1] for i in range(len(self.blades)))
 
     def pitch_load(self, blade: int) -> tuple[Table, Table]:
-        """Torque (N m) and rest angle (rad; none without stiffness) over time of the pitch bearing of a blade, from
-        0."""
+        """Torque (N m) and rest angle (rad; none without stiffness) over time of a pitch bearing, counted from 0."""
         torque = self.pitch_torque[blade] if self.pitch_torque else ()
         return torque, self.bearing_rest[blade] if self.bearing_rest and self.bearing(blade)[0] else ()
 

@@ -322,8 +322,6 @@ def _is_of_start(path: KeyPath) -> bool:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A base scene and how it is varied."""
-
     table: SweepTable  # what the sweep's file says
     base: Scene  # the scene with the sweep's own changes, before any axis
     design: Design
@@ -354,8 +352,8 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """The sweep in the TOML file `path`; a name such as sweeps/fig11-spread means a shipped one. Raises InputError with
-    all errors of the file, a line each."""
+    """The sweep in the TOML file `path`; sweeps/NAME means a shipped one. Raises InputError with all errors of the
+    file."""
     shipped = (sweeps_folder().parent / path).with_suffix(".toml")
     if not path.exists() and path.parts[:1] == ("sweeps",) and shipped.is_file():
         path = shipped

@@ -36,8 +36,6 @@ _TOKEN = re.compile(
 
 
 class KeyProblem(NamedTuple):
-    """One error of the tables of a file."""
-
     path: KeyPath  # where it is, in the tables as they were read
     wrong: str  # what is wrong
     allowed: str = ""  # what is allowed; "" for what the key allows

@@ -58,8 +58,7 @@ def export(scene: Scene | str, to: str, output: str | os.PathLike[str]) -> list[
 
 
 def reference_csv(scene: Scene) -> str:
-    """The scene's reference, the shipped one or else a computed one, as comma-separated values, a column per component.
-    Raises StoreError where the reference does not begin."""
+    """The scene's reference, shipped or computed, as comma-separated values. StoreError where it does not begin."""
     is_shipped = shipped_reference(scene_hash(scene)) is not None
     solution = frozen_solution(scene) if is_shipped else solve(REFERENCE, scene, {})
     trajectory = solution.trajectory

@@ -16,17 +16,21 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.analysis.campbell import (
+from rotor_mbs.analysis.modes import (
+    GROWTH,
     REST,
     ROTATION,
     FloquetTable,
     LinearModes,
     SceneModes,
     StabilityChart,
+    floquet,
+    isotropic_modes,
+    modes_of,
     read_modes,
     to_records,
+    track,
 )
-from rotor_mbs.analysis.modes import GROWTH, floquet, isotropic_modes, modes_of, track
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError
 from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import methods
@@ -216,8 +220,7 @@ def _linearized(method: Method, point: _Point) -> Linearization:
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> FloquetTable:
-    """Multipliers of the periodic motion under gravity at each of `speeds` > 0, found from the fastest down. Raises
-    MethodRefusal where heyoka is not installed."""
+    """Multipliers of the periodic motion under gravity at `speeds` > 0, from the fastest down. Raises MethodRefusal."""
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     turns: list[Turn] = []

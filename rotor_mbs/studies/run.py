@@ -51,7 +51,6 @@ class RunTask(Task):
     time_limit_s: float
 
     def failed(self, status: str, message: str) -> Rows:
-        """The row of a run that left no samples."""
         asked = self.asked
         run = without_samples(asked.scene, asked.method, asked.settings, status, message)
         limit = self.time_limit_s if status == "timed_out" else np.nan
@@ -166,7 +165,6 @@ def asked_runs(
 
 
 def run_tasks(file: TableFile, asked: Sequence[Asked], timeout_s: float) -> list[RunTask]:
-    """What computes these rows of a file."""
     return [
         RunTask(
             label=f"{run.scene.name} {run.method}",
@@ -324,7 +322,6 @@ def perform_run(task: RunTask) -> Rows:
 
 
 def without_samples(scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str) -> Solution:
-    """A run that left nothing but its end."""
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
@@ -343,25 +340,20 @@ def able_methods(scene: Scene, names: Iterable[str]) -> tuple[list[str], list[st
     return able, refused
 
 
-def asked_methods(scenes: Sequence[Scene], names: Sequence[str]) -> dict[str, list[str]]:
-    """`names` for every scene. Raises InputError where one cannot represent a scene."""
-    sorted_out = {scene.name: able_methods(scene, names) for scene in scenes}
-    refused = [line for _, lines in sorted_out.values() for line in lines]
-    if refused:
-        raise InputError(refused)
-    return {name: able for name, (able, _) in sorted_out.items()}
-
-
-def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], list[str]]:
-    """The methods that each scene names itself, or that the rule selects, none where it refuses; and the reasons.
-    Raises InputError where a scene names a method that is unknown or cannot represent it."""
+def selected_methods(scenes: Sequence[Scene], names: Sequence[str] = ()) -> tuple[dict[str, list[str]], list[str]]:
+    """The methods of each scene: `names`, else those that it names itself, else those that the rule selects, none where
+    it refuses; and the reasons. Raises InputError for a name that is unknown or cannot represent its scene."""
     methods: dict[str, list[str]] = {}
     reasons: list[str] = []
+    refused: list[str] = []
     for scene in scenes:
-        if scene.methods:
+        named = check_names(names)
+        if scene.methods and not named:
             with at_key(scene.name, scene.text, "methods"):
-                names = check_names(scene.methods)
-            methods |= asked_methods([scene], names)
+                named = check_names(scene.methods)
+        if named:
+            methods[scene.name], lines = able_methods(scene, named)
+            refused += lines
             continue
         try:
             chosen, reason = choose(scene, default_methods())
@@ -371,4 +363,6 @@ def selected_methods(scenes: Sequence[Scene]) -> tuple[dict[str, list[str]], lis
             continue
         methods[scene.name], left_out = able_methods(scene, chosen)
         reasons += [f"{scene.name}: {reason}: {', '.join(methods[scene.name])}", *left_out]
+    if refused:
+        raise InputError(refused)
     return methods, reasons

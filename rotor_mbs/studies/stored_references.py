@@ -29,7 +29,6 @@ _recent: dict[tuple[object, ...], Trajectory] = {}
 
 
 def shipped_files() -> list[Path]:
-    """The files of frozen references."""
     return sorted(reference_folder().glob("*.h5"))
 
 

@@ -63,13 +63,11 @@ class Chunk(Task):
         return [self.part(i, i + 1) for i in range(len(self.values))] if len(self.values) > 1 else []
 
     def part(self, start: int, end: int) -> Chunk:
-        """Some of its runs."""
         values = self.values[start:end]
         kill_after_s = limit_of(len(values), self.time_limit_s)
         return replace(self, start=self.start + start, values=values, kill_after_s=kill_after_s)
 
     def failed(self, status: str, message: str) -> Rows:
-        """Of runs whose process was ended, or that raised."""
         rows = blank_rows(len(self.values), self.place.row)
         put_end(rows, slice(None), status, message)
         rows["time_reached"][:], rows["code"][:] = 0.0, self.code
@@ -117,7 +115,6 @@ def rows_of(chunk: Chunk) -> Rows:
 
 
 def put_end(rows: Rows, runs: int | slice, status: str, message: str) -> None:
-    """How these runs ended."""
     rows["status"][runs], rows["message"][runs] = code_of(status), characters(message, rows["message"].shape[1])
 
 
@@ -256,7 +253,6 @@ class SweepPlan:
         return self.sweep.design.count
 
     def table(self) -> Table:
-        """The table of its runs."""
         return sweep_table(self.sweep, self.methods, range(self.first, self.last))
 
     def chunks(self, place: Place, gaps: Sequence[tuple[int, int]], workers: int = 1) -> Iterator[Chunk]:
@@ -343,8 +339,7 @@ class SweepPlan:
 def plan_sweep(
     sweep: Sweep, methods: Sequence[str] = (), part: tuple[int, int] = (1, 1), time_limit_s: float = 60.0
 ) -> SweepPlan:
-    """The runs of part k of n by `methods`, else by those of the file. Raises InputError for a method or a setting that
-    is not there, MethodRefusal where a method cannot do them."""
+    """The runs of part k of n by `methods`, else by those of the file. Raises InputError, MethodRefusal."""
     file = shown_path(sweep.path), sweep.text
     chosen = check_names(methods)
     if not methods:

@@ -1,4 +1,4 @@
-"""Commands as processes: killed, interrupted, without a reader of their output, on a full disk."""
+"""Commands without a reader of their output, and with a full one."""
 
 from __future__ import annotations
 
@@ -8,22 +8,9 @@ from pathlib import Path
 
 import pytest
 from support.commands import PROGRAM
+from support.sweeps import THREE_RUNS
 
 from rotor_mbs.runs.sweeps import StoredSweep
-
-SWEEP = """title = "two"
-scene = "paper/fig11"
-methods = ["lagrange/dop853"]
-samples = 3
-outputs = ["angles"]
-change = {duration = 0.1}
-[[axis]]
-key = "gravity"
-values = [9.7, 9.8]
-"""
-
-
-# Standard output and standard error
 
 
 @pytest.mark.parametrize(("words", "status"), [(("list",), 0), (("new", "mine.toml"), 1)])
@@ -40,10 +27,7 @@ def test_a_closed_pipe_is_no_success_but_of_a_command_that_only_prints(words: tu
 @pytest.mark.full
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="fills standard output as Linux does")
 def test_full_output_and_closed_errors_lose_no_run(folder: Path) -> None:
-    Path("s.toml").write_text(SWEEP)
+    Path("s.toml").write_text(THREE_RUNS)
     command = [*PROGRAM, "sweep", "s.toml", "-o", "o.h5", "-j", "1"]
     assert subprocess.run(["sh", "-c", 'exec "$@" 2>&- > /dev/full', "sh", *command]).returncode == 1  # no summary
-    assert StoredSweep(folder / "o.h5").column("status").tolist() == [0, 0]
-
-
-# Ends
+    assert StoredSweep(folder / "o.h5").column("status").tolist() == [0, 0, 0]

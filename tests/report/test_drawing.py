@@ -10,7 +10,7 @@ import pytest
 from matplotlib.lines import Line2D
 from support.stored import rotor
 
-from rotor_mbs.analysis.campbell import FloquetTable, SceneModes
+from rotor_mbs.analysis.modes import FloquetTable, SceneModes
 from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report import plots as figures
 from rotor_mbs.report.core import canvas, numbers, svg

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from support.checking import failed, judged, results_file
 from support.commands import rotor_mbs
-from support.sweeps import made_sweep
+from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
@@ -221,23 +221,10 @@ def test_files_that_are_not_ours_are_refused_with_one_line(written: Path, tmp_pa
 
 # Sweeps
 
-SWEEP = """
-title = "three"
-scene = "paper/fig11"
-methods = ["lagrange/dop853"]
-samples = 3
-outputs = ["angles", "rates"]
-[change]
-duration = 0.2
-[[axis]]
-key = "gravity"
-values = [9.7, 9.8, 9.9]
-"""
-
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made_sweep(tmp_path_factory.mktemp("sweep"), SWEEP)
+    return made_sweep(tmp_path_factory.mktemp("sweep"), THREE_RUNS)
 
 
 @pytest.mark.parametrize("column", ["angles", "energy_drift_max", "status", "gravity", "time", "crc32"])

@@ -9,28 +9,17 @@ from pathlib import Path
 
 import pytest
 from support.commands import rotor_mbs
-from support.sweeps import made_sweep
+from support.sweeps import THREE_RUNS, made_sweep
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.runs.files import replace_file, writing
 from rotor_mbs.runs.read import open_results
 
-SWEEP = """
-title = "two starts"
-scene = "paper/fig03"
-methods = ["lagrange/dop853"]
-samples = 3
-change = { duration = 0.1 }
-[[axis]]
-key = "initial.angles[0]"
-values = [0.1, 0.2]
-"""
-
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of a sweep."""
-    return made_sweep(tmp_path_factory.mktemp("sweep"), SWEEP)
+    return made_sweep(tmp_path_factory.mktemp("sweep"), THREE_RUNS)
 
 
 @pytest.fixture

@@ -12,10 +12,8 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import rotor_mbs
-from support.references import reference
 from support.scenes import paper
 
-import rotor_mbs as rm
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.pool import SerialPool
@@ -62,19 +60,6 @@ def flip(path: Path, label: str, column: str) -> None:
 
 
 # What a file has
-
-
-def test_a_run_comes_back_bit_for_bit(results: Path) -> None:
-    solved = rm.run("paper/fig11", "exudyn_tree/rk67")
-    read = rm.open(results)["paper/fig11/exudyn_tree/rk67"]
-    assert solved.quantities.keys() == read.quantities.keys()
-    for name, values in {"time": solved.time, **solved.quantities}.items():
-        np.testing.assert_array_equal(read[name], values, err_msg=name)
-    assert (read.status, read.message, read.settings) == (solved.status, solved.message, solved.settings)
-    assert read.metrics == read.metrics | {name: float(value) for name, value in solved.metrics.items()}
-    exact = rm.open(results)["paper/fig11/reference"].trajectory
-    for name, values in reference("paper/fig11").quantities.items():
-        np.testing.assert_array_equal(exact.quantities[name], values, err_msg=name)
 
 
 def test_only_what_was_asked_for_is_stored(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from support.scenes import general
 
 import rotor_mbs as rm
-from rotor_mbs.analysis.campbell import read_modes, to_records
+from rotor_mbs.analysis.modes import read_modes, to_records
 from rotor_mbs.cli import main
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method

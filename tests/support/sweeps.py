@@ -30,6 +30,19 @@ linear = {start = 0.25, end = 20, count = 4}
 """
 
 
+THREE_RUNS = """title = "three"
+scene = "paper/fig11"
+methods = ["lagrange/dop853"]
+samples = 3
+outputs = ["angles", "rates"]
+[change]
+duration = 0.2
+[[axis]]
+key = "gravity"
+values = [9.7, 9.8, 9.9]
+"""
+
+
 def run_local(
     sweep: Sweep, output: Path, workers: int, methods: Sequence[str] = (), timeout_s: float = 60.0, **options: Any
 ) -> SweepResult:

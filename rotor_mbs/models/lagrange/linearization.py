@@ -109,8 +109,7 @@ def steady_rotation(scene: Scene, speed: float) -> Array:
 
 
 def equilibrium(scene: Scene) -> Array:
-    """(1 + blades,) rad: angles at which the rotor rests under gravity and springs, without a rotor torque, found as by
-    `steady_rotation`."""
+    """(1 + blades,) rad: angles at which the rotor rests without a torque, found as by `steady_rotation`."""
     return _stationary(scene, 0.0, fixed_rotor=scene.gravity == 0.0)
 
 

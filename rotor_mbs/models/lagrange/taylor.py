@@ -87,7 +87,6 @@ def set_parameters(integrator: Any, values: Any) -> None:
 
 
 def is_compact(scene: Scene) -> bool:
-    """Whether code for the scene is to be compiled in loops."""
     return len(scene.blades) > _UNROLLED_BLADES
 
 

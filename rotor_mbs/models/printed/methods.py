@@ -25,8 +25,6 @@ Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
 
 
 class PrintedSolver:
-    """One scene's printed equations under ode45."""
-
     def __init__(
         self,
         scene: Scene,
