@@ -65,9 +65,14 @@ class Defects:
         both = np.hstack([np.abs(self.angles), np.abs(self.rates) / self.rate_units])
         return np.asarray(np.where(np.isfinite(both), both, np.inf).max(axis=1))
 
-    @functools.cached_property
+    @property
     def floor(self) -> Array:
-        """(n - 1,) rad: what the rounding of the run's own numbers may add up to in an interval."""
+        """(n - 1,) rad: the largest of `floors` over the coordinates."""
+        return np.asarray(self.floors.max(axis=1))
+
+    @functools.cached_property
+    def floors(self) -> Array:
+        """(n - 1, m) rad: what the rounding of the run's own numbers may add up to in an interval, of each number."""
         eps = 0.5 * float(np.finfo(float).eps)
         units = self._units
         half = self.states.shape[1] // 2
@@ -82,7 +87,14 @@ class Defects:
         # and the rates by their change
         change = np.abs(np.diff(self.states[:, half:], axis=0)) / np.diff(self.time)[:, None]
         total[:, half:] += eps * np.abs(self.time[1:, None]) * change
-        return np.asarray((total / units).max(axis=1))
+        return np.asarray(total / units)
+
+    @property
+    def channel_sizes(self) -> Array:
+        """(n - 1, m) rad: of the angles, then rates, of the coordinates that move; inf where there is no end."""
+        columns = list(self.moving)
+        both = np.abs(np.hstack([self.angles[:, columns], self.rates[:, columns]])) / self._units
+        return np.asarray(np.where(np.isfinite(both), both, np.inf))
 
     @functools.cached_property
     def growth(self) -> Array:

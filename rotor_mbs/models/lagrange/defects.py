@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.heyoka_adapter import failure, is_available
-from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
+from rotor_mbs.models.lagrange.ode_solvers import Accelerations, OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import load_segments, rate_units, resting_pitches, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
@@ -50,7 +50,7 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rou
     moving = scene.moving_coordinates
     states = np.hstack([angles[:, moving], rates[:, moving]])
     half = len(moving)
-    ends = _ends(scene, time, states)
+    ends = interval_ends(scene, time, states)
     angle_defects, rate_defects = angles[:-1] - angles[1:], rates[:-1] - rates[1:]  # of pitches that are fixed
     angle_defects[:, moving] = ends[:, :half] - states[1:, :half]
     rate_defects[:, moving] = ends[:, half:] - states[1:, half:]
@@ -113,7 +113,7 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
         transitions = _transitions(scene, time, states)
         if transitions is None:
             raise InputError("the rates cannot be found from the angles: the rows are too far apart for this motion")
-        jumps = _ends(scene, time, states) - states[1:]
+        jumps = interval_ends(scene, time, states) - states[1:]
         # Away from the data's own states: row by row matrix @ (at the first row) + offset.
         matrices = [np.broadcast_to(np.eye(2 * half), (len(firsts), 2 * half, 2 * half))]
         offsets = [np.zeros((len(firsts), 2 * half))]
@@ -131,13 +131,35 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> Array:
     return rates
 
 
-def _ends(scene: Scene, time: Array, states: Array) -> Array:
-    """(n - 1, m) where the closed form gets from each state by the time of the next one; NaN where it does not."""
+def interval_ends(
+    scene: Scene,
+    time: Array,
+    states: Array,
+    intervals: Sequence[int] | None = None,
+    equations: Accelerations | None = None,
+) -> Array:
+    """Where the closed form gets from rows of states by the time of the next row.
+
+    Parameters
+    ----------
+    time, states : (n,) s and (n, m) angles, then rates, of the coordinates that move.
+    intervals : the numbers of the rows that are begun at; all n - 1 where left out.
+    equations : in place of the closed form's, as of `reference.motion_at`.
+
+    Returns
+    -------
+    (intervals, m)
+        NaN where it does not get there.
+    """
     segments = load_segments(scene)
-    advance = _advance_by_taylor(scene, states.shape[1]) if is_available() else _advance_by_dop853(scene)
-    ends = np.full((len(states) - 1, states.shape[1]), np.nan)
+    if is_available() and equations is None:
+        advance = _advance_by_taylor(scene, states.shape[1])
+    else:
+        advance = _advance_by_dop853(scene, equations)
+    chosen = range(len(states) - 1) if intervals is None else intervals
+    ends = np.full((len(chosen), states.shape[1]), np.nan)
     place = 0
-    for k in range(len(ends)):
+    for row, k in enumerate(chosen):
         state, reached = states[k], float(time[k])
         while place + 1 < len(segments) and segments[place].end <= reached:
             place += 1
@@ -150,7 +172,7 @@ def _ends(scene: Scene, time: Array, states: Array) -> Array:
             reached, part = end, part + 1
             if reached >= time[k + 1] or not np.isfinite(state).all():
                 break
-        ends[k] = state
+        ends[row] = state
     return ends
 
 
@@ -177,8 +199,9 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
     return advance
 
 
-def _advance_by_dop853(scene: Scene) -> _Advance:
-    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), scipy_integrator("DOP853", 2.3e-14, 1e-16))
+def _advance_by_dop853(scene: Scene, equations: Accelerations | None) -> _Advance:
+    integrator = scipy_integrator("DOP853", 2.3e-14, 1e-16)
+    solver = OdeSolver(replace(scene, outputs=("angles", "rates")), integrator, accelerations=equations)
 
     def advance(segment: Segment, start: float, end: float, values: Array) -> Array:
         part = solver.advance(Segment(start, end, segment.lines), values, np.empty(0))

@@ -1,0 +1,207 @@
+"""What the defects of data look like: a fault at a time, other equations or numbers, or a parameter that is off.
+
+Nothing is run from the start: each explanation is held to the data's own states, interval by interval. It is named
+where it explains the defects to what the rounding of the data leaves, or but for a fiftieth of what they were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotor_mbs.models.lagrange.defects import interval_ends
+from rotor_mbs.models.lagrange.ode_solvers import Accelerations
+from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.trajectory import Array
+
+_LEFT = 0.02  # of the defects' root mean square
+_AT_FLOOR = 3.0  # times the rounding
+_SIGNIFICANT = 8.0  # standard deviations of an estimate
+_PROJECTED = 0.5  # what a projection must leave at most for its parameter to be tried
+_INTERVALS = 120  # that an explanation is tried on first
+_DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
+_ROUNDS = 3
+_PARALLEL = 0.995  # cosine
+_STANDS_OUT = 30.0  # times the median of the defects
+_MAX_FAULTS = 6  # that are named one by one
+
+# The scene with its parameter changed by a share (or rad), or the same scene with other equations.
+Change = Callable[[float], tuple[Scene, Accelerations | None]]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of the scene; unit: "" where its change is a share of it."""
+
+    key: str
+    unit: str
+    change: Change
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault between two rows of the data."""
+
+    start_s: float
+    end_s: float
+    text: str
+
+
+class DefectCauses:
+    """Explanations of the defects of data of a scene, on intervals in which they are judged."""
+
+    def __init__(self, scene: Scene, defects: Defects) -> None:
+        self._scene, self._defects = scene, defects
+        moving = list(defects.moving)
+        self._values = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
+        units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
+        floors = np.maximum(defects.floors, 1e-3 * defects.floors.max(axis=0) + 1e-18) * units
+        self._judged = np.flatnonzero(defects.is_judged & np.isfinite(self._values).all(axis=1))
+        # In these a defect of what rounding makes is 1 at most.
+        self._weights = 1.0 / floors
+        self._normal = np.where(np.isfinite(self._values), self._values * self._weights, 0.0)
+        size = np.abs(self._normal).max(axis=1)
+        spread = np.linspace(0, len(self._judged) - 1, min(_INTERVALS, len(self._judged))).astype(int)
+        largest = self._judged[np.argsort(-size[self._judged])[: _INTERVALS // 2]]
+        self._chosen = np.unique(np.concatenate([self._judged[spread], largest])) if len(self._judged) else self._judged
+
+    @property
+    def is_rounding(self) -> bool:
+        """Whether no defect is larger than what rounding explains."""
+        return not len(self._judged) or float(np.abs(self._normal[self._judged]).max()) <= _AT_FLOOR
+
+    def left(self, scene: Scene, equations: Accelerations | None = None) -> float:
+        """Share of the defects' root mean square that another scene or other equations leave; 0 where all that is left
+        is rounding. First on some intervals, then on all."""
+        if not len(self._judged):
+            return np.inf
+        for intervals in (self._chosen, self._judged):
+            share = self._share(self._residual(scene, equations, intervals), intervals)
+            if share > _LEFT:
+                break
+        return share
+
+    def parameters(self, parameters: Sequence[Parameter]) -> list[tuple[float, str]]:
+        """Of those that explain the defects by themselves: (share that is left, key and change)."""
+        chosen, explained = self._chosen, []
+        if not len(chosen):
+            return []
+        before = self._normal[chosen]
+        total = float(np.linalg.norm(before))
+        for parameter in parameters:
+            slope = self._slope(parameter, 0.0, chosen)
+            size = float((slope**2).sum())
+            if not np.isfinite(size) or size == 0.0:
+                continue
+            estimate = -float((before * slope).sum()) / size
+            residual = before + estimate * slope
+            rest = float(np.linalg.norm(residual))
+            deviation = max(rest / np.sqrt(residual.size), 0.3) / np.sqrt(size)
+            is_hidden = self.is_rounding and abs(estimate) >= _SIGNIFICANT * deviation
+            if not is_hidden and rest > _PROJECTED * total:
+                continue
+            residual, slope_here = before, slope
+            change = estimate
+            for _ in range(_ROUNDS):
+                scene, equations = parameter.change(change)
+                residual = self._residual(scene, equations, chosen)
+                if not np.isfinite(residual).all():
+                    break
+                correction = -float((residual * slope_here).sum()) / size
+                change += correction
+                if abs(correction) <= 1e-9 + 1e-3 * deviation:
+                    break
+            if not np.isfinite(residual).all() or abs(change) < _SIGNIFICANT * deviation:
+                continue
+            scene, equations = parameter.change(change)
+            share = self._share(self._residual(scene, equations, self._judged), self._judged)
+            if share <= _LEFT or is_hidden:
+                amount = f"{change:+.4g} {parameter.unit}" if parameter.unit else f"{100.0 * change:+.4g} %"
+                explained.append((rest / total if is_hidden else share, f"{parameter.key} off by {amount}"))
+        return sorted(explained)
+
+    def faults(self) -> list[Fault]:
+        """What stands out of the other intervals, by its pattern in time; none where most intervals are wrong."""
+        size = np.abs(self._normal).max(axis=1)
+        size[~np.isin(np.arange(len(size)), self._judged)] = 0.0
+        usual = float(np.median(size[self._judged])) if len(self._judged) else 0.0
+        wrong = np.flatnonzero(size > max(_AT_FLOOR, _STANDS_OUT * usual))
+        if not len(wrong) or len(wrong) > 0.6 * len(size):
+            return []
+        groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
+        return [self._fault(group) for group in groups]
+
+    def _fault(self, group: NDArray[np.int64]) -> Fault:
+        """The group's intervals stand out, one after the other."""
+        time, half = self._defects.time, len(self._defects.moving)
+        first, last = int(group[0]), int(group[-1])
+        start, end = float(time[first]), float(time[last + 1])
+        values = self._values[group]
+        along = self._cosine(values[0], self._flow(first))
+        at = f"t = {end:.6g} s"
+        if len(group) == 1:
+            if abs(along) >= _PARALLEL:
+                # The defect is closed form less data: along the motion where the data are behind it.
+                text = "a row repeated, or the clock late by a part of an interval" if along > 0.0 else (
+                    "a row left out and the others renumbered, or the clock early by a part of an interval"
+                )  # fmt: skip
+                return Fault(start, end, f"{text}, at {at}")
+            angles = np.abs(self._normal[first, :half]).max()
+            if angles <= _AT_FLOOR or np.abs(values[0, :half]).max() * 100.0 < np.abs(values[0, half:]).max():
+                return Fault(start, end, f"a jump of rates, or a load of one interval, before {at}")
+            return Fault(start, end, f"the motion goes on from another state after {at}")
+        if len(group) == 2 and self._defects.transitions is not None:
+            carried = self._defects.transitions[first + 1] @ values[0]
+            if self._cosine(values[1], -carried) >= _PARALLEL:
+                row = f"row {first + 2}, t = {time[first + 1]:.6g} s"
+                if abs(along) >= _PARALLEL:
+                    return Fault(start, end, f"a stuck row, or one at a wrong time: {row}")
+                return Fault(start, end, f"a single wrong row: {row}")
+        channel = int(np.abs(self._normal[group]).sum(axis=0)[half:].argmax())
+        label = self._scene.coordinate_labels[self._defects.moving[channel]]
+        signs = np.sign(values[:, half + channel])
+        kind = "a load on the {} that is wrong or missing" if abs(signs.sum()) == len(signs) else "a fault of the {}"
+        return Fault(start, end, f"{kind.format(label)} from t = {start:.6g} to {end:.6g} s")
+
+    def _flow(self, row: int) -> Array:
+        """How the state goes on at a row, per s."""
+        states, time = self._defects.states, self._defects.time
+        half = states.shape[1] // 2
+        ahead = min(row + 2, len(states) - 1)
+        change = (states[ahead, half:] - states[row, half:]) / (time[ahead] - time[row])
+        return np.concatenate([states[row + 1, half:], change])
+
+    def _cosine(self, first: Array, second: Array) -> float:
+        units = self._defects._units
+        a, b = first / units, second / units
+        size = float(np.linalg.norm(a) * np.linalg.norm(b))
+        return float(a @ b) / size if size else 0.0
+
+    def _residual(self, scene: Scene, equations: Accelerations | None, intervals: NDArray[np.int64]) -> Array:
+        """(intervals, m) defects by another scene or other equations, in units of rounding."""
+        states = self._defects.states
+        ends = interval_ends(scene, self._defects.time, states, intervals.tolist(), equations)
+        return np.asarray((ends - states[intervals + 1]) * self._weights[intervals])
+
+    def _slope(self, parameter: Parameter, at: float, intervals: NDArray[np.int64]) -> Array:
+        above, below = (self._residual(*parameter.change(at + step), intervals) for step in (_DIFFERENCE, -_DIFFERENCE))
+        return (above - below) / (2.0 * _DIFFERENCE)
+
+    def _share(self, residual: Array, intervals: NDArray[np.int64]) -> float:
+        if not np.isfinite(residual).all():
+            return np.inf
+        if float(np.abs(residual).max()) <= _AT_FLOOR:
+            return 0.0
+        return float(np.linalg.norm(residual) / (np.linalg.norm(self._normal[intervals]) or 1.0))
+
+
+def fault_lines(faults: Sequence[Fault]) -> Iterator[str]:
+    """Faults in words; of many the first ones, and how many there are."""
+    for fault in faults[:_MAX_FAULTS]:
+        yield fault.text
+    if len(faults) > _MAX_FAULTS:
+        yield f"and {len(faults) - _MAX_FAULTS} more faults until t = {faults[-1].end_s:.6g} s"
