@@ -75,8 +75,8 @@ def test_what_is_shipped_passes_in_short(good: Path, capsys: pytest.CaptureFixtu
     lines = lines_of(capsys, good, "-v", status=0)
     assert lines[-1].endswith(" passed, 0 failed")
     checks = (
-        "integrity", "complete", "status", "times", "start", "agreement", "energy", "impulse", "energies", "tip",
-        "reference", "growth", "uncertainty", "copied", "settings", "steps",
+        "integrity", "complete", "status", "metrics", "times", "start", "defect", "defect median", "error", "energy",
+        "impulse", "energies", "tip", "reference", "growth", "uncertainty", "copied", "settings", "steps",
     )  # fmt: skip
     assert lines[-2] == f"runs judged: 2 {METHOD}, 2 exudyn_tree/rk67"
     assert {line.split(":")[0] for line in lines[:-2]} == {f"pass {name}" for name in checks}
@@ -138,7 +138,7 @@ def test_an_erratum_in_the_closed_form_fails(
     monkeypatch.setattr(closed_form, "accelerations", changed["accelerations"])
     path = results_file(tmp_path / "e.h5", [scene], [METHOD])
     lines = lines_of(capsys, path, status=1)
-    named(lines, f"FAIL agreement: {scene} {METHOD} angles:", "a term")
+    named(lines, f"FAIL error: {scene} {METHOD} angles:", "the horizon")  # the one that does not ask the closed form
     named(lines, f"FAIL energy: {scene} {METHOD} balance:", "a force")
 
 
@@ -146,8 +146,8 @@ def test_an_erratum_in_the_closed_form_fails(
 def test_c_off_by_a_millionth_fails(method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = shipped("paper/fig09")
     path = results_file(tmp_path / "c.h5", [scene.name], [])
-    add_run(path, scene, faulty_run("agreement", scene, method, 1e-6))
-    named(lines_of(capsys, path, status=1), f"FAIL agreement: paper/fig09 {method} angles:", "a parameter")
+    add_run(path, scene, faulty_run("offset", scene, method, 1e-6))
+    named(lines_of(capsys, path, status=1), f"FAIL defect: paper/fig09 {method} largest:", "a parameter")
 
 
 def _differences(scene_name: str) -> dict[str, float]:
@@ -251,9 +251,9 @@ def test_a_changed_byte_is_of_its_run_and_a_changed_layout_of_the_file(
 def test_a_false_success_and_an_edited_status_fail(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A run that is wrong, stored as it was judged, fails by its numbers; called ok, by its status too."""
     scene = shipped("check/general")
-    add_run(copy, scene, faulty_run("agreement", scene, METHOD, 0.5))
+    add_run(copy, scene, faulty_run("offset", scene, METHOD, 0.5))
     lines = lines_of(capsys, copy, status=1)
-    named(lines, f"FAIL agreement: check/general {METHOD} angles")
+    named(lines, f"FAIL defect: check/general {METHOD} largest")
     assert not any("FAIL status" in line for line in lines)
 
     def call_it_ok(row: Rows) -> None:
@@ -345,8 +345,8 @@ def test_every_bound_is_below_what_a_known_fault_gives() -> None:
 
 _KNOWN = [
     *[
-        (name, "check/general", method, share)
-        for name in ("agreement", "energy")
+        (name, scene, method, share)
+        for name, scene in (("defect", "paper/fig11"), ("energy", "check/general"))
         for method, share in (
             ("lagrange/radau", 1e-2),
             ("lagrange/ode45", 1e-2),
@@ -433,7 +433,7 @@ def test_a_bound_below_what_is_seen_fails(good: Path) -> None:
         bound = load_bounds().for_scene(found.where.scene).of(found.name, found.where.method)
         largest[bound] = max(largest.get(bound, 0.0), found.value)
     seen = {bound: value for bound, value in largest.items() if value}
-    assert {"agreement", "energy", "tip", "energies"} <= {bound.check for bound in seen}
+    assert {"defect", "error", "energy", "tip", "energies"} <= {bound.check for bound in seen}
     narrow = Bounds([replace(b, value=0.9 * seen[b]) if b in seen else b for b in load_bounds().entries])
     failures = failed(judged(good, narrow))
     assert {load_bounds().for_scene(one.where.scene).of(one.name, one.where.method) for one in failures} == {*seen}
@@ -570,8 +570,8 @@ def test_a_changed_closed_form_fails_from_the_command_line(tmp_path: Path) -> No
     assert done.returncode == 1, done.stderr
     lines = done.stdout.splitlines()
     method = "lagrange/taylor" if find_method("lagrange/taylor").is_installed else METHOD
-    named([line for line in lines if line.startswith("FAIL")], f"agreement: paper/fig11 {method} angles")
-    assert not any("FAIL agreement" in line and "exudyn" in line for line in lines)
+    named([line for line in lines if line.startswith("FAIL")], f"error: paper/fig11 {method} angles")
+    assert not any("FAIL error" in line and "exudyn" in line for line in lines)
 
 
 @pytest.mark.full

@@ -86,8 +86,13 @@ def with_wrong_start(scene: Scene, share: float) -> Scene:
     return replace(scene, initial_angles=tuple(angle * (1.0 + share) for angle in scene.initial_angles))
 
 
+def with_wrong_gravity(scene: Scene, share: float) -> Scene:
+    return replace(scene, gravity=scene.gravity * (1.0 + share))
+
+
 WRONG = {
-    "agreement": with_wrong_offset,
+    "offset": with_wrong_offset,
+    "defect": with_wrong_gravity,
     "energy": with_wrong_offset,
     "impulse": with_wrong_offset,
     "loads": with_wrong_mass,

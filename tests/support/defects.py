@@ -23,6 +23,7 @@ def made_defects(sizes: Sequence[float], **changes: Any) -> Defects:
         "moving": (0,),
         "resting": (),
         "states": np.zeros((count + 1, 2)),
+        "rounding": np.zeros((count + 1, 2)),
         "start": np.zeros(2),
         "growth_units": np.ones(2),
         "own_loads": Trajectory(nothing[0], nothing, nothing),
