@@ -25,6 +25,7 @@ def made_defects(sizes: Sequence[float], **changes: Any) -> Defects:
         "states": np.zeros((count + 1, 2)),
         "rounding": np.zeros((count + 1, 2)),
         "start": np.zeros(2),
+        "growth_rate": 0.0,
         "growth_units": np.ones(2),
         "own_loads": Trajectory(nothing[0], nothing, nothing),
     }
