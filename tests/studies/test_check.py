@@ -511,7 +511,9 @@ def test_each_stored_number_that_is_edited_is_seen(scene: str, method: str, tmp_
         assert checks._changed_metric(run, metrics, stored.run.trajectory)[1] <= bound
         for name in metrics:
             value = float(run.attributes[name])
-            edited = SimpleNamespace(method=method, attributes={**run.attributes, name: 0.5 * value or 1.0})
+            # The rotor's extremes, which ode45 has between the samples, by more than its angle bends there.
+            value = value + 0.1 if name.startswith("rotor_") else 0.5 * value or 1.0
+            edited = SimpleNamespace(method=method, attributes={**run.attributes, name: value})
             channel, off, hint = checks._changed_metric(edited, metrics, stored.run.trajectory)
             assert (channel, off > bound) == (name, True), hint
 
