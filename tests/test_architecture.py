@@ -116,7 +116,9 @@ ENGINE: Patch = {
     "methods/catalogue.py": {
         '    "rotor_mbs.models.muj': '    "rotor_mbs.models.outside.methods:METHODS": ("outside",),\n'
     },
-    "reference/accuracy.toml": {"": "".join(map(BOUND.format, ("agreement", "tip", "energy", "impulse")))},
+    "reference/accuracy.toml": {
+        "": "".join(map(BOUND.format, ("defect", "error", "metrics", "tip", "energy", "impulse")))
+    },
     "pyproject.toml": {'"rotor_mbs.models.mujoco"]': '"rotor_mbs.models.outside", '},
 }
 
@@ -213,7 +215,7 @@ def test_an_engine_takes_the_files_of_its_row(tmp_path: Path) -> None:
     copy = Copy(tmp_path, "an engine", ENGINE)
     assert "  outside/rk4  " in copy.command("list")
     copy.command("run paper/fig11 -m outside/rk4 -o runs.h5 -j 1")
-    assert "agreement: paper/fig11 outside/rk4" in copy.command("check runs.h5 -v -j 1")
+    assert "defect: paper/fig11 outside/rk4" in copy.command("check runs.h5 -v -j 1")
 
 
 def test_every_row_of_the_table_is_tested_here() -> None:

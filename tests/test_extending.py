@@ -109,7 +109,7 @@ def test_a_run_is_stored_judged_and_checked() -> None:
     assert np.abs(run.angles - other.angles).max() < 1e-9  # order 4: 1e-11 at this step
     assert np.abs(run["tip"] - other["tip"]).max() < 1e-8
     assert "shaft_momentum" not in other.quantities  # nobody asked for it
-    assert "agreement: one outside/rk4" in command("check", "one.h5", "-v")
+    assert "defect: one outside/rk4" in command("check", "one.h5", "-v")
 
 
 def test_a_bound_of_the_package_is_the_one_that_counts() -> None:

@@ -206,12 +206,11 @@ def _changed_metric(run: StoredRun, metrics: Metrics, trajectory: Trajectory) ->
         "defect_drift": floor * DRIFT_ROWS * growth,
         "angle_error_predicted": floor * HORIZON_GROWTH,
     }
-    if not is_corrected(run.method) and len(trajectory.time) > 1:
-        # Over the integrator's own points, which are others than the samples: as much as the rotor does in between.
-        interval = float(np.diff(trajectory.time).max())
-        turned = interval * float(np.abs(trajectory.rates[:, 0]).max())
-        allowances |= {"rotor_angle_min": turned, "rotor_angle_max": turned}
-        allowances["rotor_rate_max"] = float(np.abs(np.diff(trajectory.rates[:, 0])).max())
+    if not is_corrected(run.method):
+        # Over the integrator's own points, four in a step, which are others than the samples: as much as a curve bends.
+        angles, rates = trajectory.angles[:, 0], trajectory.rates[:, 0]
+        bend = {"rotor_angle_min": angles, "rotor_angle_max": angles, "rotor_rate_max": rates}
+        allowances |= {name: float(np.abs(np.diff(values, 2)).max(initial=0.0)) for name, values in bend.items()}
     for name, value in metrics.items():
         if name == "defect_time" and metrics["defect_max"] <= floor:
             continue

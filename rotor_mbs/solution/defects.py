@@ -35,6 +35,7 @@ class Defects:
     moving : the coordinates that move.
     resting : pitches that stay at zero by symmetry: there the error is the state itself.
     own_loads : the loads of the closed form at the run's own states, as samples; without arrays where not asked for.
+    growth_rate : 1/s, in which an error grows e-fold at most, roughly: falling blades, and centrifugal forces.
     growth_units : (m,) in which the error growth of the scene counts angles, then rates.
     states : (n, m) angles, then rates, of the run, in the coordinates that move.
     rounding : (n, m) half a unit in the last place of each of these numbers.
@@ -51,6 +52,7 @@ class Defects:
     states: Array
     rounding: Array
     start: Array
+    growth_rate: float
     growth_units: Array
     own_loads: Trajectory
 
@@ -98,9 +100,11 @@ class Defects:
 
     @functools.cached_property
     def growth(self) -> Array:
-        """(n - 1,) how many times an error may grow over each interval, at most; NaN where that is not known."""
+        """(n - 1,) how many times an error may grow over each interval, at most; by `growth_rate` where the transition
+        matrices are not known."""
         if self.transitions is None:
-            return np.full(len(self.time) - 1, np.nan)
+            with np.errstate(over="ignore"):
+                return np.asarray(np.exp(self.growth_rate * np.diff(self.time)))
         units = self._units
         scaled = self.transitions * units / units[:, None]
         # Between the largest entry and m times it: what is asked is whether it is huge.
@@ -109,8 +113,11 @@ class Defects:
     @property
     def is_judged(self) -> NDArray[np.bool_]:
         """(n - 1,) not where an error grows by more than `MAX_INTERVAL_GROWTH` within the interval; what is not finite
-        is judged in any case, and fails."""
-        return np.asarray(~(self.growth > MAX_INTERVAL_GROWTH) | ~np.isfinite(self.sizes))
+        fails there, too, unless the interval is too long even for the transition matrix."""
+        judged = ~(self.growth > MAX_INTERVAL_GROWTH)
+        if self.transitions is not None:
+            judged |= ~np.isfinite(self.sizes)
+        return np.asarray(judged)
 
     @functools.cached_property
     def predicted(self) -> Array | None:

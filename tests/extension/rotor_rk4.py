@@ -89,5 +89,5 @@ METHOD = Method(
     name="outside/rk4", label="from outside, RK4", settings=Rk4Settings, build=Solver,
     items=items, order=4, fixed_step=True, ladders=(step_ladder(6),), solve_many=solve_many,
     stability_function=stability_polynomial(1.0, 1.0, 1 / 2, 1 / 6, 1 / 24),
-    bounds=(Bound("agreement", "outside/rk4", 1e-6, "order 4"), Bound("energy", "outside/rk4", 1e-6, "order 4")),
+    bounds=(Bound("defect", "outside/rk4", 1e-6, "order 4"), Bound("energy", "outside/rk4", 1e-6, "order 4")),
 )  # fmt: skip

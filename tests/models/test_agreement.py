@@ -20,8 +20,9 @@ from rotor_mbs.solution.solution import Solution
 from rotor_mbs.solution.trajectory import Trajectory
 
 BEST = ("lagrange/taylor", "exudyn_tree/rk67", "mujoco/rk4")
-# Per unit of error growth up to the horizon, and of the energy scale; MuJoCo's at four times its default step.
-BOUND = {"lagrange/taylor": (1e-12, 1e-12), "exudyn_tree/rk67": (1e-12, 1e-12), "mujoco/rk4": (1e-10, 1e-8)}
+# rad up to the horizon, where an error may have grown 1e5-fold, and of the energy scale; MuJoCo's at four times its
+# default step.
+BOUND = {"lagrange/taylor": (1e-10, 1e-12), "exudyn_tree/rk67": (1e-9, 1e-12), "mujoco/rk4": (1e-5, 1e-8)}
 SETTINGS: dict[str, dict[str, float]] = {"mujoco/rk4": {"step": 1e-3}}
 CHAIN = "exudyn_chain/generalized_alpha"
 
@@ -57,7 +58,7 @@ def test_up_to_the_horizon(name: str, method: str) -> None:
     solution, (angle, energy) = run(paper(name), method), BOUND[method]
     assert len(solution.time) == paper(name).samples
     metrics = metrics_of(paper(name), solution.trajectory, reference(name))
-    assert metrics["angle_error_per_growth"] <= angle
+    assert metrics["angle_error_max"] <= angle
     rows = horizon_samples(reference(name)) if method in SETTINGS else None
     assert np.abs(solution.energy_error[:rows]).max() <= energy * metrics["energy_scale_J"]
 

@@ -86,8 +86,15 @@ def with_wrong_start(scene: Scene, share: float) -> Scene:
     return replace(scene, initial_angles=tuple(angle * (1.0 + share) for angle in scene.initial_angles))
 
 
+def with_wrong_gravity(scene: Scene, share: float) -> Scene:
+    return replace(scene, gravity=scene.gravity * (1.0 + share))
+
+
+EVERY_SECOND_SAMPLE = 2.0  # in place of a share of gravity: the others are left out, and the rest renumbered
+
 WRONG = {
-    "agreement": with_wrong_offset,
+    "offset": with_wrong_offset,
+    "defect": with_wrong_gravity,
     "energy": with_wrong_offset,
     "impulse": with_wrong_offset,
     "loads": with_wrong_mass,
@@ -103,6 +110,10 @@ def faulty_run(check_name: str, scene: Scene, method: str, share: float) -> Solu
     if check_name == "gap":
         with _wrong_seat(share):
             return solve(method, scene, {})
+    if check_name == "defect" and share == EVERY_SECOND_SAMPLE:
+        run = solve(method, replace(scene, duration=2.0 * scene.duration), {})
+        run.trajectory.time = 0.5 * run.trajectory.time
+        return run
     run = solve(method, WRONG[check_name](scene, share), {})
     if check_name == "energy":
         motion = run.trajectory

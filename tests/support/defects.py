@@ -19,12 +19,14 @@ def made_defects(sizes: Sequence[float], **changes: Any) -> Defects:
         "angles": np.array(sizes)[:, None],
         "rates": np.zeros((count, 1)),
         "rate_units": np.ones(1),
-        "transitions": np.tile(np.eye(2), (count, 1, 1)),
         "moving": (0,),
         "resting": (),
         "states": np.zeros((count + 1, 2)),
+        "rounding": np.zeros((count + 1, 2)),
         "start": np.zeros(2),
+        "growth_rate": 0.0,
         "growth_units": np.ones(2),
         "own_loads": Trajectory(nothing[0], nothing, nothing),
     }
-    return Defects(**(fields | changes))
+    transitions = changes.pop("transitions", np.tile(np.eye(2), (count, 1, 1)))
+    return Defects(find_transitions=lambda: transitions, **(fields | changes))

@@ -75,6 +75,7 @@ def interval_defects(scene: Scene, time: Array, angles: Array, rates: Array, rou
         states=states,
         rounding=last_digits,
         start=start,
+        growth_rate=_growth_rate(scene, states),
         growth_units=np.concatenate([np.ones(half), rate_units(scene)]),
         own_loads=Trajectory(time, angles, rates, **loads),
     )
@@ -208,6 +209,14 @@ def _advance_by_dop853(scene: Scene, equations: Accelerations | None) -> _Advanc
         return np.full(len(values), np.nan) if part.message else part.end
 
     return advance
+
+
+def _growth_rate(scene: Scene, states: Array) -> float:
+    """1/s: of a blade that is an inverted pendulum, or the rates of the motion; springs and dampers make none grow."""
+    blades = rotor_form(scene).blades
+    falling = [math.sqrt(math.hypot(blade.weight_x, blade.weight_y) / blade.pitch_inertia) for blade in blades]
+    turning = float(np.nanmax(np.median(np.abs(states[:, states.shape[1] // 2 :]), axis=0)))
+    return max([*falling, turning])
 
 
 def _transitions(scene: Scene, time: Array, states: Array) -> Array | None:
