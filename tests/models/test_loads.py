@@ -213,7 +213,7 @@ def load_error(scene: Scene, result: dict[str, np.ndarray], exact) -> float:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.full) if "pitch step" in name else name for name in AGREEING]
+    "name", [pytest.param(name, marks=pytest.mark.nightly) if "pitch step" in name else name for name in AGREEING]
 )
 def test_chain_and_closed_form_agree_at_second_order_and_after_extrapolation(name: str) -> None:
     """Multipliers against Newton and Euler: errors a quarter at half the step; 1e-6 of the largest load extrapolated.
