@@ -27,7 +27,7 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in so
 # Where a method is chosen by its name: the selection rule, the check, the suite's patient method, defaults of the
 # API, and the printed equations, which the analysis of the paper is about.
 CHOSEN = {
-    "methods/selection.py", "studies/check.py", "studies/check_probes.py", "studies/check_status_rules.py",
+    "methods/catalogue.py", "studies/check.py", "studies/check_probes.py", "studies/check_status_rules.py",
     "studies/stability.py", "studies/claims.py", "analysis/run_selection.py", "api.py",
     "scenario/sweep.py", "report/core/looks.py",
 }  # fmt: skip
