@@ -164,12 +164,16 @@ def comparison_page(record: Record) -> dict[str, object]:
     """The content of the page: verdict, pictures, tables."""
     verdict = verdict_of(record)
     legend = [LegendEntry(channel.name, _look(channel)) for channel in _drawn(verdict)]
+    legend.append(line_entry("reference", width=5.0))
     legend.append(line_entry("tolerance", GREY, ":"))
     facts = [
+        ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
         ("Rows", f"{verdict.rows}, until {with_unit(verdict.compared_until, 's', 4)}"),
         ("Judged up to the horizon", with_unit(verdict.horizon_s, "s", 4)),
         ("Tolerance", f"{number(verdict.tolerance)} rad per unit of error growth"),
     ]
+    if verdict.unused:
+        facts.append(("Columns not used", ", ".join(verdict.unused)))
     if verdict.message:
         facts.append(("Reason", verdict.message))
     if verdict.energy_drift is not None:
@@ -236,26 +240,23 @@ def _look(channel: ChannelErrors) -> Look:
 
 
 def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
-    """Angles of the reference as lines, those of the data as marks; errors; errors per unit of growth."""
+    """Angles of the data upon those of the reference; errors; errors per unit of growth."""
     pictures = []
     channels, time = [channel for channel in verdict.channels if channel.unit == "rad"], record.arrays["time"]
     if channels:
         panels = canvas.panels((2.9,), canvas.TIME_AXIS)
         axes = panels.axes[0]
-        every = max(1, len(time) // 40)
         drawn = []
         for channel in channels:
-            look = _look(channel)
             data, reference = _array(record, channel), _array(record, channel, "_reference")
             drawn += [data, reference]
-            canvas.curve(axes, *plots.thin(time, reference), look, 1.5)
-            marks = Look(look.colour, "", "o")
-            canvas.curve(axes, time[::every], data[::every], marks, markersize=3.6, markerfacecolor="none")
+            canvas.curve(axes, *plots.thin(time, reference), Look(GREY, "-", ""), 4.0, alpha=0.4)
+            canvas.curve(axes, *plots.thin(time, data), _look(channel))
         plots.set_range(axes, np.stack(drawn, axis=1))
         axes.set_ylabel(plots.ANGLE_AXIS)
-        pictures.append(picture(panels, "motion", "Angles: reference as lines, data as circles"))
-    caption = "Error against the reference at the times of the data; vertical line: horizon"
+        pictures.append(picture(panels, "motion", "Angles of the data, upon those of the reference"))
+    caption = "Error against the reference; vertical line: horizon"
     pictures.append(picture(error_panels(record), "errors-0", caption))
-    caption = "Error per unit of error growth, up to the horizon to be below the tolerance"
+    caption = "Error per unit of error growth, with the tolerance"
     pictures.append(picture(error_panels(record, per_growth=True), "errors-1", caption))
     return pictures

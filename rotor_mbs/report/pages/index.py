@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import agreement, finding
@@ -13,7 +14,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import Look, label_of, look_of
-from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed, with_unit
+from rotor_mbs.report.core.numbers import SPACE, formula, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables
 from rotor_mbs.report.pages.bench import cost_legend, cost_picture
@@ -68,8 +69,15 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             still = picture(plots.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
     benched = next((scene for scene in context.curves if scene in scenes), "")
     curves = context.curves.get(benched, ())
+    prose = partial(formula, in_prose=True)
     errata_rows = [
-        (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
+        (
+            TableCell(e.id, href=f"errata.html#{e.id}"),
+            ", ".join(e.stands_in),
+            prose(e.printed),
+            prose(e.right),
+            prose(e.reason),
+        )
         for e in context.errata
     ]
     scene_head = (
