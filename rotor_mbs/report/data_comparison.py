@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
-from rotor_mbs.report.core.numbers import number, power, with_unit
+from rotor_mbs.report.core.numbers import number, typeset, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import OpenResults
@@ -97,14 +96,7 @@ class DataComparison:
 
     def table(self) -> TextTable:
         """A row for each channel: errors (rad, rad/s), until when it agrees (s), lag (s), scale, offset."""
-        head = ("channel", "largest error", "per growth", *(f"to {level:g}" for level in LEVELS))
-        rows = []
-        for channel in self.verdict.channels:
-            errors = (f"{channel.error_max:.1e} {channel.unit}", f"{channel.error_per_growth:.1e}")
-            until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in channel.agrees_until)
-            fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
-            rows.append((channel.name, *errors, *until, *fit))
-        return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
+        return channel_table(self.verdict)
 
     def plot(self) -> Panels:
         """The error of each channel per unit of error growth over time, and the tolerance."""
@@ -179,29 +171,30 @@ def comparison_page(record: Record) -> dict[str, object]:
     if verdict.energy_drift is not None:
         facts.append(("Energy balance of the data", f"{number(verdict.energy_drift)} of the energy scale"))
     facts += [("The difference looks like", cause) for cause in verdict.likely]
-    until = (f"agrees to {power(round(math.log10(level)))} until" for level in LEVELS)
-    head = ("Channel", "largest error", "per unit of growth", *until, "constant lag", "scale less 1", "offset")
+    table = channel_table(verdict)
     rows: list[Row] = []
-    for channel in verdict.channels:
+    for channel, (name, error, growth, *others) in zip(verdict.channels, table.rows, strict=True):
         tone = "good" if channel.error_per_growth <= verdict.tolerance else "bad"
-        times = [number(None) if np.isnan(time) else with_unit(time, "s", 3) for time in channel.agrees_until]
-        rows.append([
-            channel.name,
-            with_unit(channel.error_max, channel.unit),
-            TableCell(number(channel.error_per_growth), tone),
-            *times,
-            with_unit(channel.lag_s, "s"),
-            number(channel.scale - 1.0),
-            with_unit(channel.offset, channel.unit),
-        ])  # fmt: skip
+        rows.append([name, error, TableCell(typeset(growth), tone), *others])
     return {
         "verdict": verdict,
         "title": record.attributes["title"],
         "source": Path(verdict.source).name,
         "facts": facts,
         "errors": Section(_pictures(record, verdict), legend),
-        "channels": Section(tables=[PageTable("", head, rows)]),
+        "channels": Section(tables=[PageTable("", table.head, rows)]),
     }
+
+
+def channel_table(verdict: DataVerdict) -> TextTable:
+    head = ("channel", "largest error", "per growth", *(f"to {level:g} until" for level in LEVELS))
+    rows = []
+    for channel in verdict.channels:
+        errors = (f"{channel.error_max:.1e} {channel.unit}", f"{channel.error_per_growth:.1e}")
+        until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in channel.agrees_until)
+        fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
+        rows.append((channel.name, *errors, *until, *fit))
+    return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
 
 
 def verdict_of(record: Record) -> DataVerdict:

@@ -74,7 +74,7 @@ def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> No
     assert sections_of(text) == sections
     headings = re.findall(r"<(h\d)\b", text)
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
-    assert text.count("<figcaption>") == text.count("<figure>") == 1 + 2 + 5 + 1 + 1 + 1
+    assert text.count("<figcaption>") == text.count("<figure>") == 1 + 2 + 2 + 1 + 1 + 1
     assert text.count('role="img"') == text.count("<figure>") + text.count("<canvas")
     opening = text[text.index('<div class="opening">') : text.index('<section id="paper">')]
     assert 'class="viewer"' in opening

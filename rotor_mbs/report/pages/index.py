@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import agreement, finding
 from rotor_mbs.report import plots
@@ -18,6 +20,8 @@ from rotor_mbs.report.core.numbers import SPACE, formula, number, power, prefixe
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables
 from rotor_mbs.report.pages.bench import cost_legend, cost_picture
+from rotor_mbs.report.pages.figures import compared_runs
+from rotor_mbs.report.pages.quantities import VISIBLE, angle_difference, parting
 from rotor_mbs.report.pages.scene import key_picture
 from rotor_mbs.report.pages.scene_tables import (
     ANGLE_BOUND,
@@ -80,21 +84,6 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         )
         for e in context.errata
     ]
-    scene_head = (
-        "Scene", "Figure", "Compared up to the horizon", "As printed, ode45", "Largest error (rad, whole run)",
-        "Energy gain",
-    )  # fmt: skip
-    scene_rows: list[Row] = []
-    for name, scene in scenes.items():
-        cells: list[TableCell | str] = [TableCell(name, href=context.files[name], note=scene.title)]
-        cells += [str(scene.attributes.get("figures", "")), with_unit(horizon(scene), "s", 3)]
-        printed = scene.methods.get(run_selection.PRINTED)
-        if printed is None:
-            cells += ["", "", ""]
-        else:
-            cells += [status_cell(printed), number(metric(printed, "angle_error_whole"))]
-            cells.append(prefixed(metric(printed, "energy_gain_J"), "J"))
-        scene_rows.append(cells)
     agreement_head = (
         "Method", "Runs", f"Largest angle error up to each horizon (rad), at most {ANGLE_BOUND:g}",
         "Largest energy drift (relative)", "Longest run",
@@ -121,7 +110,7 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
         "methods": Section(tables=[PageTable("", agreement_head, agreement_rows)], notes=notes),
         "heat": heat_map(scenes, context.files),
-        "scenes": Section(tables=[PageTable("", scene_head, scene_rows)]),
+        "scenes": Section(tables=[scene_table(scenes, context.files)]),
         "numbers": Section(
             tables=[
                 claim_tables.number_table(claims),
@@ -139,6 +128,41 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
+
+
+def scene_table(scenes: Scenes, files: Mapping[str, str]) -> PageTable:
+    """A row per scene: how far the printed model and Exudyn are from the corrected model."""
+    head = (
+        "Scene", "Figure", "Compared up to the horizon", "As printed, ode45", f"{VISIBLE:g} rad off from (s)",
+        "Largest difference (rad)", "Energy gain", "Largest pitch (rad)", "Corrected model: largest pitch (rad)",
+        "Exudyn: largest difference up to the horizon (rad)",
+    )  # fmt: skip
+    rows: list[Row] = []
+    for name, scene in scenes.items():
+        until = horizon(scene)
+        figures = str(scene.attributes.get("figures", ""))
+        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title), figures]
+        row.append(with_unit(until, "s", 3))
+        runs = compared_runs(scene)
+        corrected = runs.get("corrected")
+        stored = scene.methods.get(run_selection.PRINTED)
+        row.append("" if stored is None else status_cell(stored))
+        if "printed" in runs and corrected is not None:
+            parted, largest = parting(runs["printed"], corrected)
+            row += ["never" if parted is None else number(parted, 3), number(largest)]
+        else:
+            row += ["", ""]
+        row.append("" if stored is None else prefixed(metric(stored, "energy_gain_J"), "J"))
+        for key in ("printed", "corrected"):
+            row.append(number(float(np.abs(runs[key].array("angles")[:, 1:]).max(initial=0.0))) if key in runs else "")
+        if "exudyn" in runs and corrected is not None:
+            gap = angle_difference(runs["exudyn"], corrected)
+            time = corrected.array("time")[: len(gap)]
+            row.append(number(float(gap[time <= (until or np.inf)].max(initial=0.0))))
+        else:
+            row.append("")
+        rows.append(row)
+    return PageTable("", head, rows)
 
 
 def _energy(scenes: Scenes) -> Picture | None:
