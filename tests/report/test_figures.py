@@ -52,7 +52,7 @@ def test_models_are_compared_in_numbers(tmp_path: Path) -> None:
         Made(replace(scene, name="paper/fig12"), "printed/ode45", RIGHT),
     ]
     with open_results(store(tmp_path / "r.h5", runs)) as opened:
-        table = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"))
+        table = scene_table(opened.scenes, dict.fromkeys(opened.scenes, "x.html"), "Model")
     row, same = (dict(zip(table.head, row, strict=True)) for row in table.rows)
     assert row["0.05 rad off from (s)"] == "2.50"
     assert row["Largest difference (rad)"] == "0.20"

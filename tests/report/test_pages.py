@@ -34,11 +34,13 @@ from rotor_mbs.report.pages.errata import matrices
 from rotor_mbs.report.pages.index import heat_map
 from rotor_mbs.report.pages.quantities import parting
 from rotor_mbs.report.pages.scene import range_table
+from rotor_mbs.report.pages.scene_tables import compared_time
 from rotor_mbs.runs import results as results_module
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.solution.quantities import Plot, Quantity
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.check import judge_file
 
 FIG11 = paper("fig11", samples=101)
@@ -199,6 +201,40 @@ def test_one_scene_and_one_method_make_a_report_without_empty_sections(tmp_path:
         words = re.sub(r"<script.*?</script>|<.*?>", "", text.partition("</head>")[2], flags=re.S).lower()
         assert "paper" not in words
         assert "corrected" not in words  # nothing was corrected there
+
+
+def test_nothing_is_called_corrected_of_a_rotor_of_ones_own(tmp_path: Path) -> None:
+    """Also where the paper's equations ran on it."""
+    scene = replace(PLAIN, name="mine", title="Mine", figures=(), text="")
+    runs = [Made(scene, REFERENCE, SWING), Made(scene, TAYLOR, SWING), Made(scene, PRINTED, SWING, gain=1e6)]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
+    for name in ("mine.html", "index.html"):
+        words = re.sub(r"<script.*?</script>|<.*?>", "", text_of(folder, name).partition("</head>")[2], flags=re.S)
+        assert "corrected" not in words.lower(), name
+        assert "as printed" in words, name
+
+
+def test_a_printed_run_is_never_called_ok_and_one_that_ended_is_no_failure(tmp_path: Path) -> None:
+    for status in ("ok", "completed"):
+        if status not in STATUSES:
+            continue
+        runs = [Made(PLAIN, REFERENCE, SWING), Made(PLAIN, PRINTED, SWING, attributes={"status": status})]
+        folder = write_report(store(tmp_path / f"{status}.h5", runs), tmp_path / status).parent
+        page = text_of(folder, "paper-fig11.html")
+        assert rows_of(page.partition('<section id="metrics">')[2])["as printed, ode45"][0] == "completed"
+        assert 'id="failures"' not in page
+
+
+def test_the_index_says_how_much_of_the_time_was_compared(tmp_path: Path) -> None:
+    """Two scenes of 10 s, one compared to its end and one up to 2.5 s."""
+    runs = [Made(replace(FIG11, name=name), method, SWING) for name in ("a", "b") for method in (REFERENCE, TAYLOR)]
+    with open_results(store(tmp_path / "r.h5", runs)) as opened:
+        scenes = opened.scenes.values()
+        assert [compared_time([scene])[1] for scene in scenes] == [10.0, 10.0]
+        for scene in scenes:
+            for run in scene.runs.values():
+                run.attributes.update({"horizon_s": 2.5 if scene.name == "b" else 10.0})
+        assert compared_time(scenes) == (12.5, 20.0)
 
 
 def test_every_page_has_the_same_navigation(report: Path) -> None:

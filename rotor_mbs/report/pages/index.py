@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from rotor_mbs.report.core import canvas
 from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell
 from rotor_mbs.report.core.looks import Look, label_of, look_of
-from rotor_mbs.report.core.numbers import SPACE, formula, number, power, prefixed, with_unit
+from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables
 from rotor_mbs.report.pages.bench import cost_legend, cost_picture
@@ -57,6 +56,7 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
     """The content of the index; what the file has no data for is None or empty. Its last tables are folded."""
     scenes, claims, study = opened.scenes, context.claims, context.study
     shares = None if study is None else study.shares
+    model = "Corrected model" if claims else "Model"  # of a user's own rotor nothing was corrected
     # The scene with a published extreme that is no rounding error; else one with both models; else the first.
     both = [name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1]
     shown = next(iter([*both, *scenes]))
@@ -73,17 +73,6 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             still = picture(plots.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
     benched = next((scene for scene in context.curves if scene in scenes), "")
     curves = context.curves.get(benched, ())
-    prose = partial(formula, in_prose=True)
-    errata_rows = [
-        (
-            TableCell(e.id, href=f"errata.html#{e.id}"),
-            ", ".join(e.stands_in),
-            prose(e.printed),
-            prose(e.right),
-            prose(e.reason),
-        )
-        for e in context.errata
-    ]
     agreement_head = (
         "Method", "Runs", f"Largest angle error up to each horizon (rad), at most {ANGLE_BOUND:g}",
         "Largest energy drift (relative)", "Longest run",
@@ -99,18 +88,17 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             f"Compared with the reference over {number(compared, 3)} of {number(whole, 3)} s of simulated time, "
             f"{100.0 * compared / whole:.0f}{SPACE}%: each scene up to its horizon."
         )
-    head = ("Erratum", "Equation", "Printed", "Correct", "Reason")
     return {
-        "paper": PageTable("", ("Result", "As printed", "Corrected model"), finding(scenes, claims, shares)),
+        "paper": PageTable("", ("Result", "As printed", model), finding(scenes, claims, shares)),
         "scene": shown,
         "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
         "still": still,
         "crest": key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
-        "energy": _energy(scenes),
+        "energy": _energy(scenes, model),
         "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
         "methods": Section(tables=[PageTable("", agreement_head, agreement_rows)], notes=notes),
         "heat": heat_map(scenes, context.files),
-        "scenes": Section(tables=[scene_table(scenes, context.files)]),
+        "scenes": Section(tables=[scene_table(scenes, context.files, model)]),
         "numbers": Section(
             tables=[
                 claim_tables.number_table(claims),
@@ -122,19 +110,16 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             tables=[claim_tables.claim_table(claims, shares)],
             notes=[] if shares is None else [claim_tables.study_note(shares)],
         ),
-        "errata": Section(
-            tables=[PageTable("The errors in the printed equations; all else follows from them", head, errata_rows)]
-        ),
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
     }
 
 
-def scene_table(scenes: Scenes, files: Mapping[str, str]) -> PageTable:
-    """A row per scene: how far the printed model and Exudyn are from the corrected model."""
+def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> PageTable:
+    """A row per scene: how far the printed model and Exudyn are from the corrected one, which is called `model`."""
     head = (
         "Scene", "Figure", "Compared up to the horizon", "As printed, ode45", f"{VISIBLE:g} rad off from (s)",
-        "Largest difference (rad)", "Energy gain", "Largest pitch (rad)", "Corrected model: largest pitch (rad)",
+        "Largest difference (rad)", "Energy gain", "Largest pitch (rad)", f"{model}: largest pitch (rad)",
         "Exudyn: largest difference up to the horizon (rad)",
     )  # fmt: skip
     rows: list[Row] = []
@@ -165,8 +150,8 @@ def scene_table(scenes: Scenes, files: Mapping[str, str]) -> PageTable:
     return PageTable("", head, rows)
 
 
-def _energy(scenes: Scenes) -> Picture | None:
-    """A mark per scene for the printed model's gain, and for each corrected model's drift."""
+def _energy(scenes: Scenes, model: str) -> Picture | None:
+    """A mark per scene for the printed model's gain, and for the drift of each corrected one, called `model`."""
     rows: dict[str, list[tuple[float, Look]]] = {}
     looks: dict[str, Look] = {}
     for name, scene in scenes.items():
@@ -183,7 +168,7 @@ def _energy(scenes: Scenes) -> Picture | None:
                 rows.setdefault(name.removeprefix("paper/"), []).append((value, looks[run.method]))
     if run_selection.PRINTED not in looks:
         return None
-    caption = "Spurious energy gain as printed, and energy drift of the corrected models, in each scene"
+    caption = f"Spurious energy gain as printed, and energy drift of each {model.lower()}, by scene"
     legend = [LegendEntry(label_of(name), look) for name, look in looks.items()]
     return picture(energy_of_scenes(rows), "energy-scenes", caption, legend=legend)
 

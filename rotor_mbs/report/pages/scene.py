@@ -182,8 +182,10 @@ def departure(
             if not place:
                 text = f"{VISIBLE:g} rad apart at {parted:.2g} s"
                 low, high = axes.get_ylim()
-                then = float(np.interp(parted, series[0].time, series[0].values))
-                side, height = ("bottom", low) if then > 0.5 * (low + high) else ("top", high)  # away from the curves
+                # Where the curves leave more room.
+                values = np.concatenate([x.values[(x.time >= parted) & (x.time <= parted + 0.4 * end)] for x in series])
+                is_below = values.min() - low > high - values.max()
+                side, height = ("bottom", low) if is_below else ("top", high)
                 axes.text(parted + 0.01 * end, height, text, color=GREY, ha="left", va=side, fontsize=8.5)
     return panels
 
