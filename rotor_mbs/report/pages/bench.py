@@ -24,7 +24,8 @@ from rotor_mbs.report.core.numbers import NOTHING, number, power, prefixed, with
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import method_cell, versions, words_of
 from rotor_mbs.runs.read import OpenResults, StoredScene
-from rotor_mbs.runs.records import COLUMNS, Record, read_records
+from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.runs.table import COLUMNS
 from rotor_mbs.scenario.catalogue import natural_order
 
 _TARGETS = [f"{power(round(math.log10(target)))} rad" for target in work_precision.TARGETS_RAD]
@@ -244,7 +245,7 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
 
 def _point_table(curves: Sequence[Record]) -> PageTable:
     """A row per point that was run."""
-    columns = {name: COLUMNS["bench"][name] for name in _POINT_COLUMNS}
+    columns = {name: COLUMNS[name] for name in _POINT_COLUMNS}
     units = [f" ({column.units})" if column.units != "1" else "" for column in columns.values()]
     names = [f"{column.long_name}{unit}" for column, unit in zip(columns.values(), units, strict=True)]
     rows: list[Row] = []
