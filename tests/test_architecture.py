@@ -97,7 +97,7 @@ PAGE: Patch = {
     "report/build.py": {
         "from rotor_mbs.report.pages.scene ": "from rotor_mbs.report.pages.names import names_page\n",
         "    names = {file": '    labels[files.NAMES] = "Names"\n',
-        "    return pages\n\n\ndef _run": '    pages[files.NAMES] = render("names", names_page(opened), site)\n',
+        "    made = _made(": '    tasks.append(partial(_page, "names", files.NAMES, site, names_page))\n',
     },
 }
 MASS = "def mass(arguments):\n    print(mass_of(only_scene(arguments.scene)))\n    return 0\n"
