@@ -27,7 +27,7 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in so
 # Where a method is chosen by its name: the selection rule, the check, the suite's patient method, defaults of the
 # API, and the printed equations, which the analysis of the paper is about.
 CHOSEN = {
-    "methods/selection.py", "studies/check.py", "studies/check_probes.py", "studies/check_status_rules.py",
+    "methods/catalogue.py", "studies/check.py", "studies/check_probes.py", "studies/check_status_rules.py",
     "studies/stability.py", "studies/claims.py", "analysis/run_selection.py", "api.py",
     "scenario/sweep.py", "report/core/looks.py",
 }  # fmt: skip
@@ -97,7 +97,7 @@ PAGE: Patch = {
     "report/build.py": {
         "from rotor_mbs.report.pages.scene ": "from rotor_mbs.report.pages.names import names_page\n",
         "    names = {file": '    labels[files.NAMES] = "Names"\n',
-        "    return pages\n\n\ndef _run": '    pages[files.NAMES] = render("names", names_page(opened), site)\n',
+        "    made = _made(": '    tasks.append(partial(_page, "names", files.NAMES, site, names_page))\n',
     },
 }
 MASS = "def mass(arguments):\n    print(mass_of(only_scene(arguments.scene)))\n    return 0\n"

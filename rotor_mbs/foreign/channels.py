@@ -1,5 +1,6 @@
 """The channels that data may have: time, and angle and rate of every coordinate; which column is which, in which unit,
-sign and zero: from a mapping file (see docs/compare.md), or guessed from the names.
+sign and zero: from a mapping file (see docs/compare.md), or guessed from the names. Data of a scene in s, rad, rad/s;
+refused where they cannot be compared.
 
 A channel is sign * (column + offset), the offset in the column's own unit. What a mapping leaves out is not compared;
 the time alone is guessed then. All are guessed where it names a group alone.

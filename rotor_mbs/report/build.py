@@ -24,7 +24,7 @@ from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.bench import bench_pages
 from rotor_mbs.report.pages.check import check_page
 from rotor_mbs.report.pages.errata import errata_page
-from rotor_mbs.report.pages.figures import available, figures_page, walk_figure
+from rotor_mbs.report.pages.figures import available, walk_figure
 from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.scene import scene_page
 from rotor_mbs.report.pages.stability import is_stability_suite, stability_page
@@ -120,8 +120,7 @@ def _pages(opened: OpenResults, jobs: Workers, on_page: OnPage, checked: bool) -
     for part in made[len(figures) :]:
         pages |= part
     if figures:
-        page = figures_page(made[: len(figures)], opened.scenes)
-        pages[files.FIGURES] = render("figures", page, site, files.FIGURES)
+        pages[files.FIGURES] = render("figures", {"figures": made[: len(figures)]}, site, files.FIGURES)
     return pages
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from rotor_mbs.report.core.canvas import Panels
 from rotor_mbs.report.core.elements import LegendEntry, PageTable, Picture, Row, Section, TableCell, line_entry
 from rotor_mbs.report.core.files import write_page
 from rotor_mbs.report.core.looks import GREY, Look, coordinate_look
-from rotor_mbs.report.core.numbers import number, power, with_unit
+from rotor_mbs.report.core.numbers import number, typeset, with_unit
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import OpenResults
@@ -97,14 +96,7 @@ class DataComparison:
 
     def table(self) -> TextTable:
         """A row for each channel: errors (rad, rad/s), until when it agrees (s), lag (s), scale, offset."""
-        head = ("channel", "largest error", "per growth", *(f"to {level:g}" for level in LEVELS))
-        rows = []
-        for channel in self.verdict.channels:
-            errors = (f"{channel.error_max:.1e} {channel.unit}", f"{channel.error_per_growth:.1e}")
-            until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in channel.agrees_until)
-            fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
-            rows.append((channel.name, *errors, *until, *fit))
-        return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
+        return channel_table(self.verdict)
 
     def plot(self) -> Panels:
         """The error of each channel per unit of error growth over time, and the tolerance."""
@@ -164,40 +156,45 @@ def comparison_page(record: Record) -> dict[str, object]:
     """The content of the page: verdict, pictures, tables."""
     verdict = verdict_of(record)
     legend = [LegendEntry(channel.name, _look(channel)) for channel in _drawn(verdict)]
+    legend.append(line_entry("reference", width=5.0))
     legend.append(line_entry("tolerance", GREY, ":"))
     facts = [
+        ("Channels compared", ", ".join(channel.name for channel in verdict.channels)),
         ("Rows", f"{verdict.rows}, until {with_unit(verdict.compared_until, 's', 4)}"),
         ("Judged up to the horizon", with_unit(verdict.horizon_s, "s", 4)),
         ("Tolerance", f"{number(verdict.tolerance)} rad per unit of error growth"),
     ]
+    if verdict.unused:
+        facts.append(("Columns not used", ", ".join(verdict.unused)))
     if verdict.message:
         facts.append(("Reason", verdict.message))
     if verdict.energy_drift is not None:
         facts.append(("Energy balance of the data", f"{number(verdict.energy_drift)} of the energy scale"))
     facts += [("The difference looks like", cause) for cause in verdict.likely]
-    until = (f"agrees to {power(round(math.log10(level)))} until" for level in LEVELS)
-    head = ("Channel", "largest error", "per unit of growth", *until, "constant lag", "scale less 1", "offset")
+    table = channel_table(verdict)
     rows: list[Row] = []
-    for channel in verdict.channels:
+    for channel, (name, error, growth, *others) in zip(verdict.channels, table.rows, strict=True):
         tone = "good" if channel.error_per_growth <= verdict.tolerance else "bad"
-        times = [number(None) if np.isnan(time) else with_unit(time, "s", 3) for time in channel.agrees_until]
-        rows.append([
-            channel.name,
-            with_unit(channel.error_max, channel.unit),
-            TableCell(number(channel.error_per_growth), tone),
-            *times,
-            with_unit(channel.lag_s, "s"),
-            number(channel.scale - 1.0),
-            with_unit(channel.offset, channel.unit),
-        ])  # fmt: skip
+        rows.append([name, error, TableCell(typeset(growth), tone), *others])
     return {
         "verdict": verdict,
         "title": record.attributes["title"],
         "source": Path(verdict.source).name,
         "facts": facts,
         "errors": Section(_pictures(record, verdict), legend),
-        "channels": Section(tables=[PageTable("", head, rows)]),
+        "channels": Section(tables=[PageTable("", table.head, rows)]),
     }
+
+
+def channel_table(verdict: DataVerdict) -> TextTable:
+    head = ("channel", "largest error", "per growth", *(f"to {level:g} until" for level in LEVELS))
+    rows = []
+    for channel in verdict.channels:
+        errors = (f"{channel.error_max:.1e} {channel.unit}", f"{channel.error_per_growth:.1e}")
+        until = ("never" if np.isnan(time) else f"{time:.6g} s" for time in channel.agrees_until)
+        fit = (f"{channel.lag_s:.1e}", f"{channel.scale - 1.0:.1e}", f"{channel.offset:.1e}")
+        rows.append((channel.name, *errors, *until, *fit))
+    return TextTable((*head, "lag (s)", "scale - 1", "offset"), rows)
 
 
 def verdict_of(record: Record) -> DataVerdict:
@@ -236,26 +233,23 @@ def _look(channel: ChannelErrors) -> Look:
 
 
 def _pictures(record: Record, verdict: DataVerdict) -> list[Picture]:
-    """Angles of the reference as lines, those of the data as marks; errors; errors per unit of growth."""
+    """Angles of the data upon those of the reference; errors; errors per unit of growth."""
     pictures = []
     channels, time = [channel for channel in verdict.channels if channel.unit == "rad"], record.arrays["time"]
     if channels:
         panels = canvas.panels((2.9,), canvas.TIME_AXIS)
         axes = panels.axes[0]
-        every = max(1, len(time) // 40)
         drawn = []
         for channel in channels:
-            look = _look(channel)
             data, reference = _array(record, channel), _array(record, channel, "_reference")
             drawn += [data, reference]
-            canvas.curve(axes, *plots.thin(time, reference), look, 1.5)
-            marks = Look(look.colour, "", "o")
-            canvas.curve(axes, time[::every], data[::every], marks, markersize=3.6, markerfacecolor="none")
+            canvas.curve(axes, *plots.thin(time, reference), Look(GREY, "-", ""), 4.0, alpha=0.4)
+            canvas.curve(axes, *plots.thin(time, data), _look(channel))
         plots.set_range(axes, np.stack(drawn, axis=1))
         axes.set_ylabel(plots.ANGLE_AXIS)
-        pictures.append(picture(panels, "motion", "Angles: reference as lines, data as circles"))
-    caption = "Error against the reference at the times of the data; vertical line: horizon"
+        pictures.append(picture(panels, "motion", "Angles of the data, upon those of the reference"))
+    caption = "Error against the reference; vertical line: horizon"
     pictures.append(picture(error_panels(record), "errors-0", caption))
-    caption = "Error per unit of error growth, up to the horizon to be below the tolerance"
+    caption = "Error per unit of error growth, with the tolerance"
     pictures.append(picture(error_panels(record, per_growth=True), "errors-1", caption))
     return pictures

@@ -229,7 +229,7 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
         state = f"{modes.scene}, {number(float(rotation.speeds[last]), 4)} rad/s"
         fastest = Section(tables=_tables(rotation, last, state))
         if last > 0:
-            caption = "Damped frequencies in the rotor's frame, and multiples of the rotor speed (1P, 2P, ...)"
+            caption = "Damped frequencies in the rotor's frame; 1P, 2P: multiples of the rotor speed"
             pictures.append(picture(plots(), f"{name}-campbell", caption))
             legend += [LegendEntry(label, mode_look(k)) for k, label in enumerate(rotation.names)]
             if max(np.nanmax(np.abs(rotation.damping_ratios), initial=0.0), np.nanmax(rotation.growth_rates)) > 1e-9:
@@ -240,10 +240,9 @@ def _scene_part(modes: SceneModes, name: str) -> dict[str, object]:
     table = modes.floquet
     if table is not None:
         if len(table.speeds) > 1 and np.isfinite(table.largest).any():
-            caption = (
-                "Floquet multipliers of a turn under gravity: each as a dot, the largest as a line; above 1 it grows"
-            )
-            turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption))
+            caption = "Floquet multipliers of a turn under gravity; above 1 a motion grows"
+            entries = [LegendEntry("each", Look(BLUE, "", "o")), LegendEntry("largest", Look(VERMILLION, "-", ""))]
+            turning.append(picture(plots.multipliers(), f"{name}-multipliers", caption, legend=entries))
         if modes.chart is not None:
             caption = "Stability chart: growth over a turn under gravity; a line bounds what is stable"
             turning.append(picture(plots.chart(), f"{name}-chart", caption))

@@ -106,7 +106,9 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None, *
             look = replace(curve.look, line="")
             canvas.curve(axes, time[above], sizes[above], look, markerfacecolor=curve.look.colour)
         known += sizes[np.isfinite(sizes)].tolist()
-    canvas.log_axis(axes, max(min([*known, 1.0] if known else [LOWEST]), LOWEST), max(known, default=1e-9))
+    # A little below, so that a curve at a power of ten does not lie on the axis.
+    lowest = 0.7 * max(min([*known, 1.0] if known else [LOWEST]), LOWEST)
+    canvas.log_axis(axes, lowest, max(known, default=1e-9))
     axes.set_ylabel(label)
     if series:
         mark_time(axes, float(series[0].time[-1]), horizon)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import os
-import pkgutil
 import re
 import socket
 import threading
@@ -15,6 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
 from contextlib import ExitStack, suppress
+from importlib import import_module
 from typing import Any
 
 from rotor_mbs.errors import InputError, StoreError, one_line
@@ -42,7 +42,9 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
 
 
 def _load() -> None:
-    pkgutil.resolve_name("rotor_mbs.studies.sweep:prepare")()  # by its name: only the workers import it
+    """What the runs of a sweep compute with, the fast path's engine too, where it is installed."""
+    import_module("rotor_mbs.studies.sweep")  # by its name: only the workers import it
+    import_module("rotor_mbs.models.lagrange.heyoka_adapter").is_available()
 
 
 def _open_cluster(address: str) -> Cluster:

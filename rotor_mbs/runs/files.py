@@ -1,4 +1,5 @@
-"""The only file that knows h5py: atomic files that HDF5 1.10, netCDF-4 readers, MATLAB and Octave can open."""
+"""The only file that knows h5py: atomic files that HDF5 1.10, netCDF-4 readers, MATLAB and Octave can open; digests of
+what they hold, by which a changed bit is found and located; the lock under which an output is written."""
 
 from __future__ import annotations
 
@@ -365,6 +366,9 @@ def _array_places(file: Any) -> dict[str, list[str]]:
     return places
 
 
+# Digests: the attribute `digests` of a group is a JSON object, SHA-256 by the name of each dataset, over values and
+# attributes, and by "attributes" over the group's own. Of columns that are filled later it covers the attributes alone.
+
 ATTRIBUTES = "attributes"
 _COMPUTED = "attributes of "
 
@@ -461,6 +465,8 @@ def computed_in(digests: Mapping[str, str]) -> list[str]:
     """The datasets whose attributes alone are covered."""
     return [name.removeprefix(_COMPUTED) for name in digests if name.startswith(_COMPUTED)]
 
+
+# The lock: a file beside an output that no other process may write, which goes afterwards.
 
 # Outputs that this process is writing, by thread: a study takes the lock, and so does what it calls.
 _held: set[tuple[Path, int]] = set()

@@ -623,6 +623,8 @@ def new_scene_text() -> str:
     return "\n".join(parts)
 
 
+# Numbers that are allowed and yet look like a slip: degrees for radians, millimetres for metres, tonnes.
+
 TURN = 2.0 * math.pi
 MAX_RATE = 100.0  # rad/s: a thousand revolutions per minute
 MAX_DISTANCE, MIN_DISTANCE = (

@@ -61,7 +61,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class Design:
-    """All rows of a sweep: axes, how they are combined ("grid" or "zip"), and the seed of every draw."""
+    """All rows of a sweep: axes, how they are combined, and the seed of every draw. In a "grid" the last axis is the
+    fastest, and all random axes together are one digit, the draw; "zip" takes all axes together. Every row follows from
+    its number alone, so that any part of a sweep can be computed on any computer."""
 
     axes: tuple[Axis, ...]
     combine: str

@@ -14,6 +14,7 @@ from rotor_mbs.errors import OF_THE_MACHINE, InputError, MethodRefusal, RotorErr
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     check_names,
+    choose,
     default_methods,
     find_method,
     is_corrected,
@@ -21,7 +22,6 @@ from rotor_mbs.methods.catalogue import (
     method_names,
     settings_for,
 )
-from rotor_mbs.methods.selection import choose
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.runs.files import writing

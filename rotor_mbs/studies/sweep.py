@@ -19,7 +19,6 @@ from rotor_mbs.methods.base import Method
 from rotor_mbs.methods.catalogue import check_names, find_method, is_corrected, settings_for
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
-from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.runs.files import KEYWORDS
 from rotor_mbs.runs.pool import TaskPool
@@ -78,11 +77,6 @@ class Chunk(Task):
 def limit_of(runs: int, time_limit_s: float) -> float:
     """When the worker of so many runs is ended: a method may compute them one after the other."""
     return time_limit_s * runs + _GRACE_S
-
-
-def prepare() -> None:
-    """Loads, with this module, the fast path's engine where it is installed."""
-    is_available()
 
 
 def perform(chunk: Chunk) -> Rows:

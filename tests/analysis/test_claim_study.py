@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from rotor_mbs.analysis.claim_study import ClaimShare, ClaimShares, claim_study
-from rotor_mbs.analysis.published import published
+from rotor_mbs.analysis.claims import STATISTICS
+from rotor_mbs.analysis.published import Published, conditions, published
+from rotor_mbs.scenario.catalogue import find_scenes
 
 PRINTED, CLOSED_FORM = "printed/ode45", "lagrange/taylor"
 
@@ -77,3 +79,31 @@ def test_all_numbers_come_out_under_the_papers_tolerances_and_for_12_s_alone() -
     count = sum(12.0 in reproducing for reproducing in durations)
     assert f"for {count} of {len(durations)} ways of writing that row" in findings
     assert not any(duration in reproducing for duration in (8.0, 9.0, 10.0, 11.0, 13.0) for reproducing in durations)
+
+
+# reference/published.toml
+
+
+def test_the_four_published_numbers() -> None:
+    numbers = {(one.of.scene, one.of.statistic): one.value for one in published() if one.is_number}
+    assert numbers == {
+        ("paper/fig11", "max"): 2.7315,
+        ("paper/fig05", "min"): 0.5127,
+        ("paper/fig05", "max"): 0.5273,
+        ("paper/fig05", "max_abs"): 0.0458,
+    }
+
+
+def test_ids_are_unique() -> None:
+    assert len({one.id for one in published()}) == len(published())
+
+
+@pytest.mark.parametrize("one", published(), ids=lambda one: one.id)
+def test_what_is_measured_exists(one: Published) -> None:
+    # A number that is rounding error is said to be so in the conditions, by its figure.
+    assert not one.rounding or "likelier reading" in conditions()[f"fig{int(one.figure):02d}"]
+    for asked in [one.of, *(side for test in one.tests for side in (test.of, test.than))]:
+        if asked is not None:
+            assert len(find_scenes([asked.scene])) == 1
+            assert asked.coordinate in range(4)
+            assert asked.statistic in STATISTICS

@@ -12,8 +12,7 @@ from support.scenes import PAPER, paper
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.cli import main
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.methods.catalogue import is_corrected, methods
-from rotor_mbs.methods.selection import choose, singular_reason
+from rotor_mbs.methods.catalogue import choose, is_corrected, methods, singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene

@@ -214,7 +214,7 @@ def load_error(scene: Scene, result: dict[str, np.ndarray], exact) -> float:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.full) if "pitch step" in name else name for name in AGREEING]
+    "name", [pytest.param(name, marks=pytest.mark.nightly) if "pitch step" in name else name for name in AGREEING]
 )
 def test_chain_and_closed_form_agree_at_second_order_and_by_extrapolation(name: str) -> None:
     """Multipliers against Newton and Euler: errors a quarter at half the step (ratios seen: 3.94 to 4.01); by

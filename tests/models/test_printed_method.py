@@ -10,7 +10,7 @@ import pytest
 from support.make_claims import written_as
 from support.rotors import PAPER, make_scene, pendulum
 
-from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.ode45 import ode45
 from rotor_mbs.models.printed.derivation import DerivedRotor, Errata
@@ -67,12 +67,6 @@ def test_figure_11_crest():
 def test_figure_5_numbers():
     angle, rate = rotor(run(FIG05))
     assert (round(angle.min(), 4), round(angle.max(), 4), round(np.abs(rate).max(), 4)) == FIG05_NUMBERS
-
-
-def test_all_published_numbers_come_out_under_one_set_of_conditions():
-    angle, _ = rotor(run(replace(FIG11, duration=FIG05.duration)))
-    assert (FIG11.gravity, FIG05.gravity, FIG05.duration) == (9.8, 9.8, 12.0)
-    assert round(angle.max(), 4) == 2.7315
 
 
 @pytest.mark.parametrize(("row", "numbers"), [("factor_outside", (0.5236, 0.5236, 0.0)), ("mass_first", FIG05_NUMBERS)])
@@ -265,12 +259,6 @@ def test_refusals_are_one_sentence(given, word):
         run(given)
     assert "\n" not in str(refusal.value)
     assert str(refusal.value).startswith("printed/ode45")
-
-
-@pytest.mark.parametrize("value", [0.0, -1e-6, math.nan, math.inf])
-def test_tolerances_must_be_positive(value):
-    with pytest.raises(InputError, match="relative_tolerance"):
-        run(FIG11, relative_tolerance=value)
 
 
 def test_single_errata_take_any_number_of_blades():

@@ -133,17 +133,6 @@ def test_a_published_value_stands_in_the_plot_at_its_height() -> None:
     assert [line.get_xdata()[0] for line in axes.get_lines()[-2:]] == [6.0, 1.5]
 
 
-def test_offsets_over_azimuth_do_not_draw_the_way_back_over_the_top() -> None:
-    angles = np.stack([TIME, 0.0 * TIME], axis=1)  # 1.6 turns
-    tip = np.stack([np.sin(TIME), 0.05 * np.cos(3.0 * TIME), np.cos(TIME)], axis=1)[:, None, :]
-    (axes,) = scene_page.offsets_over_azimuth(angles, tip, [0.0]).axes
-    x, y = axes.get_lines()[0].get_xydata().T
-    assert np.nanmax(np.abs(np.diff(x))[np.isfinite(np.diff(y))]) < 10.0
-    np.testing.assert_allclose(np.nanmax(y), 50.0, rtol=1e-2)
-    assert (axes.get_ylabel(), "°" in axes.get_xlabel()) == ("tip out of plane (mm)", True)
-    assert axes.get_lines()[0].get_color() == coordinate_look(1).colour
-
-
 def test_every_scene_has_its_energy_at_its_place() -> None:
     rows = {"fig03": [(1e-4, PRINTED), (1e-15, CORRECTED)], "fig11": [(0.15, PRINTED)]}
     (axes,) = energy_of_scenes(rows).axes

@@ -34,11 +34,13 @@ from rotor_mbs.report.pages.errata import matrices
 from rotor_mbs.report.pages.index import heat_map
 from rotor_mbs.report.pages.quantities import parting
 from rotor_mbs.report.pages.scene import range_table
+from rotor_mbs.report.pages.scene_tables import compared_time
 from rotor_mbs.runs import results as results_module
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import load_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.solution.quantities import Plot, Quantity
+from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.studies.check import judge_file
 
 FIG11 = paper("fig11", samples=101)
@@ -74,7 +76,7 @@ def test_a_full_page_has_every_section_and_headings_in_order(report: Path) -> No
     assert sections_of(text) == sections
     headings = re.findall(r"<(h\d)\b", text)
     assert headings == ["h1"] + ["h2"] * (len(headings) - 1)
-    assert text.count("<figcaption>") == text.count("<figure>") == 1 + 2 + 5 + 1 + 1 + 1
+    assert text.count("<figcaption>") == text.count("<figure>") == 1 + 2 + 2 + 1 + 1 + 1
     assert text.count('role="img"') == text.count("<figure>") + text.count("<canvas")
     opening = text[text.index('<div class="opening">') : text.index('<section id="paper">')]
     assert 'class="viewer"' in opening
@@ -201,6 +203,40 @@ def test_one_scene_and_one_method_make_a_report_without_empty_sections(tmp_path:
         assert "corrected" not in words  # nothing was corrected there
 
 
+def test_nothing_is_called_corrected_of_a_rotor_of_ones_own(tmp_path: Path) -> None:
+    """Also where the paper's equations ran on it."""
+    scene = replace(PLAIN, name="mine", title="Mine", figures=(), text="")
+    runs = [Made(scene, REFERENCE, SWING), Made(scene, TAYLOR, SWING), Made(scene, PRINTED, SWING, gain=1e6)]
+    folder = write_report(store(tmp_path / "r.h5", runs), tmp_path / "out").parent
+    for name in ("mine.html", "index.html"):
+        words = re.sub(r"<script.*?</script>|<.*?>", "", text_of(folder, name).partition("</head>")[2], flags=re.S)
+        assert "corrected" not in words.lower(), name
+        assert "as printed" in words, name
+
+
+def test_a_printed_run_is_never_called_ok_and_one_that_ended_is_no_failure(tmp_path: Path) -> None:
+    for status in ("ok", "completed"):
+        if status not in STATUSES:
+            continue
+        runs = [Made(PLAIN, REFERENCE, SWING), Made(PLAIN, PRINTED, SWING, attributes={"status": status})]
+        folder = write_report(store(tmp_path / f"{status}.h5", runs), tmp_path / status).parent
+        page = text_of(folder, "paper-fig11.html")
+        assert rows_of(page.partition('<section id="metrics">')[2])["as printed, ode45"][0] == "completed"
+        assert 'id="failures"' not in page
+
+
+def test_the_index_says_how_much_of_the_time_was_compared(tmp_path: Path) -> None:
+    """Two scenes of 10 s, one compared to its end and one up to 2.5 s."""
+    runs = [Made(replace(FIG11, name=name), method, SWING) for name in ("a", "b") for method in (REFERENCE, TAYLOR)]
+    with open_results(store(tmp_path / "r.h5", runs)) as opened:
+        scenes = opened.scenes.values()
+        assert [compared_time([scene])[1] for scene in scenes] == [10.0, 10.0]
+        for scene in scenes:
+            for run in scene.runs.values():
+                run.attributes.update({"horizon_s": 2.5 if scene.name == "b" else 10.0})
+        assert compared_time(scenes) == (12.5, 20.0)
+
+
 def test_every_page_has_the_same_navigation(report: Path) -> None:
     wanted = ["index.html", "figures.html", "errata.html"]
     for path in report.glob("*.html"):
@@ -286,17 +322,19 @@ def test_formulas_are_typeset_and_the_faulty_entry_of_a_matrix_is_marked_and_cor
     shown = matrices(entries, ("(8)", "(25)"))
     ((equation, (((formula, _), (text, _), _),)),) = shown
     assert equation == "(8)"
-    assert formula == (
-        '<mrow><msup><mi>c</mi><mn>2</mn></msup><mspace width="0.2em"/><mi>m</mi><mspace width="0.2em"/>'
-        "<msup><msub><mi>c</mi><mn>3</mn></msub><mn>2</mn></msup></mrow>"
-    )
-    assert text == "<mtext>what &lt;is&gt; this?</mtext>"
+    assert formula == "<i>c</i>² <i>m</i> <i>c</i><sub>3</sub>²"
+    assert text == "what &lt;is&gt; this?"
     others = {"differing": Section(), "effects": Section(), "agreeing": PageTable("", (), ())}
     page = render("errata", {"errata": [(errata()[0], shown)], **others})
-    assert (page.count("<mtd"), page.count('<mtd class="fault">')) == (3, 1)
-    fault = page[page.index('class="fault"') :]
-    assert fault.index('class="printed"') < fault.index('class="right"')
-    assert "<mn>0</mn>" in fault
+    matrix = page[page.index('<figure class="matrix">') : page.index("</figure>")]
+    assert (matrix.count("<td"), matrix.count('<td class="fault">')) == (3, 1)
+    assert "<del><i>c</i> <i>c</i><sub>3</sub></del> <ins>0</ins>" in matrix
+
+
+def test_formulas_in_prose_leave_words_and_ranges_alone() -> None:
+    text = "a 3 in (42)-(46), -c2 c3 of U33,3 <b>"
+    wanted = "a 3 in (42)-(46), −<i>c</i><sub>2</sub> <i>c</i><sub>3</sub> of <i>U</i><sub>33,3</sub> &lt;b&gt;"
+    assert numbers.formula(text, in_prose=True) == wanted
 
 
 # Stored quantities

@@ -62,7 +62,11 @@ def test_no_other_study_takes_the_place_of_runs(command: list[str], copy: Path, 
     assert copy.read_bytes() == before
 
 
-@pytest.mark.parametrize("command", [["reference", "paper/fig03"], ["reproduce"], ["run", "paper/fig03"]])
+@pytest.mark.parametrize(
+    "command",
+    [["reference", "paper/fig03"], ["reproduce"], ["run", "paper/fig03"], ["sweep", "sweeps/fig11-spread"]],
+    ids=lambda command: command[0],
+)
 def test_no_command_writes_what_another_process_is_writing(command: list[str], tmp_path: Path) -> None:
     """The lock of a process that has begun with an output which is not there yet."""
     output = tmp_path / "results.h5"

@@ -100,6 +100,22 @@ def test_a_process_killed_while_it_waits_is_replaced() -> None:
         assert pool.submit(_pid, None, _LONG_S).result() != pid
 
 
+def _large(size: int) -> bytes:
+    return bytes(size)
+
+
+@pytest.mark.full
+def test_a_process_killed_while_it_sends_a_result_does_not_stop_the_pool() -> None:
+    with WorkerPool(1) as pool:
+        for _ in range(5):
+            pid = pool.submit(_pid, None, _LONG_S).result()
+            large = pool.submit(_large, 1 << 28, _LONG_S)
+            time.sleep(0.1)
+            os.kill(pid, signal.SIGKILL)
+            assert large.exception() is None or isinstance(large.exception(), TaskLostError)
+        assert pool.submit(_pid, None, _LONG_S).exception() is None
+
+
 class _Unusual(Exception):
     """Is pickled, but not made of what it was pickled to."""
 

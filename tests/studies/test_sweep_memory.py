@@ -1,6 +1,6 @@
 """Sweeps in bounded memory: what a worker grows by, and what a parent of 100,000 runs takes.
 
-python -m pytest -m full -s tests/studies/test_sweep_memory.py
+python -m pytest -m nightly -s tests/studies/test_sweep_memory.py
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rotor_mbs.scenario.sweep import load_sweep
 from rotor_mbs.studies.sweep import perform, plan_sweep
 
 pytestmark = [
-    pytest.mark.full,
+    pytest.mark.nightly,
     pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read in /proc"),
 ]
 

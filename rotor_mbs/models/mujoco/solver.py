@@ -1,5 +1,5 @@
 """The rotor in the engine: runs it from sample to sample, then reads energies and tips off the engine's bodies; and the
-model linearized, by quotients of the engine's accelerations. Loads the engine."""
+model linearized, by quotients of the engine's accelerations. The one place that imports MuJoCo."""
 
 from __future__ import annotations
 

@@ -1,6 +1,10 @@
 """The paper's own way from its matrices to the equations of motion, (24)-(38), for any number of blades, with each of
 the errata left in or corrected. E3 stands in (53)-(55) alone: (30), for one blade, is printed with the square of the
-pitch rate. The coefficient of that term is zero once E2 is corrected."""
+pitch rate. The coefficient of that term is zero once E2 is corrected.
+
+First the transformation matrix (3) and its derivatives as printed, from sines and cosines of q2, q3 (numbers, arrays or
+symbols) and the lengths c, d; the constants d1, d2 of (2), (3) are zero.
+"""
 
 from __future__ import annotations
 

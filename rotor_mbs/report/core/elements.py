@@ -13,7 +13,7 @@ from rotor_mbs.report.core.looks import GREY, Look
 from rotor_mbs.report.core.numbers import NOTHING
 
 # A number as pages show it, also a range of two, with a unit of two words at most.
-_NUMBER = re.compile(r"−?\d[\d.]*(×?10)?[⁻⁰¹²³⁴-⁹]*( (to|of) −?\d[\d.]*)?(\s[^\s\d]\S*){0,2}")
+_NUMBER = re.compile(r"[−-]?\d[\d.]*(e[+-]\d+)?(×?10)?[⁻⁰¹²³⁴-⁹]*( (to|of) −?\d[\d.]*)?(\s[^\s\d]\S*){0,2}")
 
 DASHES = {"--": "6 3", "-.": "7 2 2 2", ":": "2 2"}
 # Paths of markers around a point, in relative steps: several can stand in one path.

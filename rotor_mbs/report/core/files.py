@@ -129,6 +129,7 @@ def _environment() -> jinja2.Environment:
         number=numbers.number,
         with_unit=numbers.with_unit,
         typeset=numbers.typeset,
+        formula=numbers.formula,
         breakable=_breakable,
         ink=lambda colour: class_of(colour) or class_of(GREY),
     )

@@ -1,9 +1,11 @@
-"""Numbers as text: few digits, powers of ten, SI prefixes, a true minus sign."""
+"""Numbers and formulas as text: few digits, powers of ten, SI prefixes, a true minus sign."""
 
 from __future__ import annotations
 
 import math
 import re
+
+from markupsafe import Markup, escape
 
 NOTHING = "–"  # a number that does not exist
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -13,6 +15,10 @@ _PREFIXES = (
 )  # fmt: skip
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(\d+(?:\.\d+)?)e([+-]?\d+)\b")
+# A symbol with its index: c, q̇2, U33,3. In prose those with an index alone: "a" may be a word there.
+_SYMBOL = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)?(?![A-Za-z])")
+_SYMBOL_IN_PROSE = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)(?![A-Za-z])")
+_SIGN = re.compile(r"(?<![\w)])-(?=\S)|(?<= )-(?= )")
 
 
 def power(exponent: int) -> str:
@@ -81,8 +87,18 @@ def typeset(text: str) -> str:
         mantissa, exponent = computed.groups()
         return power(int(exponent)) if mantissa == "1" else number(float(computed[0]), len(mantissa.replace(".", "")))
 
-    return _COMPUTED.sub(shortest, text)
+    return text if isinstance(text, Markup) else _COMPUTED.sub(shortest, text)
 
 
 def minus(text: str) -> str:
     return text.replace("-", "−")
+
+
+def formula(text: str, *, in_prose: bool = False) -> Markup:
+    """The text with symbols in italics and their indices as subscripts."""
+    symbol = _SYMBOL_IN_PROSE if in_prose else _SYMBOL
+
+    def typeset(match: re.Match[str]) -> str:
+        return f"<i>{match[1]}</i><sub>{match[2]}</sub>" if match[2] else f"<i>{match[1]}</i>"
+
+    return Markup(symbol.sub(typeset, _SIGN.sub("−", str(escape(text)))))

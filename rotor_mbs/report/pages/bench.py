@@ -25,9 +25,14 @@ from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages.scene_tables import method_cell, versions, words_of
 from rotor_mbs.runs.read import OpenResults, StoredScene
 from rotor_mbs.runs.records import Record, read_records
+from rotor_mbs.runs.table import COLUMNS
 from rotor_mbs.scenario.catalogue import natural_order
 
 _TARGETS = [f"{power(round(math.log10(target)))} rad" for target in work_precision.TARGETS_RAD]
+_POINT_COLUMNS = (
+    "angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max", "run_time_s", "run_time_q1_s",
+    "run_time_q3_s", "run_time_min_s", "setup_time_s", "setup_again_time_s", "output_time_s", "repeats", "steps",
+)  # fmt: skip
 _FRONT_COLOUR = "#c8c8c8"
 _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
 _FAILED_LEFT, _FAILED, _FAILED_RIGHT = 3.0, 20.0, 120.0  # rad: the band of failed runs on the axis of errors
@@ -240,30 +245,17 @@ def reach_table(curves: Sequence[Record]) -> PageTable:
 
 def _point_table(curves: Sequence[Record]) -> PageTable:
     """A row per point that was run."""
-    head = (
-        "method", "setting", "angle error (rad)", "at the end (rad)", "tip error (m)", "energy drift", "median",
-        "quartiles", "shortest", "set-up", "again", "read-out", "repeats", "steps", "status",
-    )  # fmt: skip
+    columns = {name: COLUMNS[name] for name in _POINT_COLUMNS}
+    units = [f" ({column.units})" if column.units != "1" else "" for column in columns.values()]
+    names = [f"{column.long_name}{unit}" for column, unit in zip(columns.values(), units, strict=True)]
     rows: list[Row] = []
     for curve in curves:
         for i, status in enumerate(curve.statuses):
-            if status == "left_out":
-                continue
-            values = {name: _finite(array[i]) for name, array in curve.arrays.items()}
-            seconds = {name: prefixed(value, "s") for name, value in values.items()}
-            row = [method_cell(curve.name), _setting(curve, i)]
-            for name in ("angle_error_max", "angle_error_end", "tip_error_max", "energy_drift_max"):
-                row.append(number(values[name]))
-            row.append(seconds["run_time_s"])
-            if curve.arrays["repeats"][i] > 1:
-                row += [f"{seconds['run_time_q1_s']} to {seconds['run_time_q3_s']}", seconds["run_time_min_s"]]
-            else:
-                row += ["", ""]
-            row += [seconds[name] for name in ("setup_time_s", "setup_again_time_s", "output_time_s")]
-            row += [str(curve.arrays[name][i]) for name in ("repeats", "steps")]
-            row.append(TableCell(words_of(status), tone="" if status == "ok" else "bad"))
-            rows.append(row)
-    return PageTable("Every setting measured.", head, rows)
+            if status != "left_out":
+                values = [number(_finite(curve.arrays[name][i]), 3) for name in columns]
+                outcome = TableCell(words_of(status), tone="" if status == "ok" else "bad")
+                rows.append([method_cell(curve.name), _setting(curve, i), *values, outcome])
+    return PageTable("Every setting measured.", ("method", "setting", *names, "status"), rows)
 
 
 def failure_table(curves: Sequence[Record], stored: StoredScene | None = None) -> PageTable:

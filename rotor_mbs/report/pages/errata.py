@@ -10,19 +10,14 @@ from markupsafe import Markup
 from rotor_mbs.analysis.published import CheckedEntry, checked_entries
 from rotor_mbs.methods.catalogue import errata_methods
 from rotor_mbs.report.core.elements import PageTable, Row, Section, TableCell
-from rotor_mbs.report.core.numbers import number, prefixed
+from rotor_mbs.report.core.numbers import formula, number, prefixed
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.scene_tables import metric, status_text
 from rotor_mbs.runs.read import OpenResults
 from rotor_mbs.solution.status import GOOD
 
-_TOKEN = re.compile(
-    r"(?:(?P<trig>[cs])(?P<index>[2-5](?:,[2-5])?)|q̇(?P<rate_index>\d)|(?P<name>[A-Za-zα-ω]))(?P<square>[²³]?)"
-    r"|(?P<number>\d+(?:/\d+)?)|(?P<sign>[-+=()])|(?P<space>\s+)"
-)
-_POWERS = {"²": "2", "³": "3"}
 _PLACE = re.compile(r"row (\d) column (\d)")
-Cell = tuple[Markup, Markup | None]  # an entry as printed, in MathML; the correct one where it is faulty
+Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one where it is faulty
 
 
 def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
@@ -34,7 +29,14 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
         f"{len(differing)} of {len(entries)} printed entries differ from what follows from (3)",
         ("Equation", "Entry", "Printed", "Correct", "Relative difference", "Explained by"),
         [
-            (e.equation, e.entry, e.printed, e.right, number(e.difference), e.explained_by or "nothing")
+            (
+                e.equation,
+                e.entry,
+                formula(e.printed),
+                formula(e.right),
+                number(e.difference),
+                e.explained_by or "nothing",
+            )
             for e in differing
         ],
     )
@@ -57,7 +59,7 @@ def errata_page(context: Context, opened: OpenResults) -> dict[str, object]:
         if any(run is not None for run in runs):
             effects.append(row)
     effects_table = PageTable("", effects_head, effects)
-    agreeing_rows = [(e.equation, e.entry, e.printed, number(e.difference)) for e in agreeing]
+    agreeing_rows = [(e.equation, e.entry, formula(e.printed), number(e.difference)) for e in agreeing]
     return {
         "errata": [(erratum, matrices(entries, erratum.stands_in)) for erratum in context.errata],
         "differing": Section(tables=[differing_table]),
@@ -83,33 +85,8 @@ def matrices(entries: Sequence[CheckedEntry], equations: Sequence[str]) -> list[
                 cells: list[Cell] = []
                 for column in columns:
                     checked = places.get((row, column))
-                    printed = Markup() if checked is None else _mathml(checked.printed)
-                    cells.append((printed, None if checked is None or checked.agrees else _mathml(checked.right)))
+                    printed = Markup() if checked is None else formula(checked.printed)
+                    cells.append((printed, None if checked is None or checked.agrees else formula(checked.right)))
                 matrix.append(cells)
             shown.append((equation, matrix))
     return shown
-
-
-def _mathml(text: str) -> Markup:
-    """MathML of a formula; a text where a part of it is not understood."""
-    parts, at = [], 0
-    while at < len(text):
-        token = _TOKEN.match(text, at)
-        if token is None:
-            return Markup("<mtext>{}</mtext>").format(text)
-        at = token.end()
-        if token["number"]:
-            parts.append(f"<mn>{token['number']}</mn>")
-        elif token["sign"]:
-            parts.append(f"<mo>{token['sign'].replace('-', '−')}</mo>")
-        elif token["space"]:
-            parts.append('<mspace width="0.2em"/>')
-        else:
-            base = f"<mi>{token['name']}</mi>"
-            if token["trig"]:
-                base = f"<msub><mi>{token['trig']}</mi><mn>{token['index']}</mn></msub>"
-            elif token["rate_index"]:
-                base = f"<msub><mover><mi>q</mi><mo>˙</mo></mover><mn>{token['rate_index']}</mn></msub>"
-            square = _POWERS.get(token["square"])
-            parts.append(f"<msup>{base}<mn>{square}</mn></msup>" if square else base)
-    return Markup("<mrow>" + "".join(parts) + "</mrow>")

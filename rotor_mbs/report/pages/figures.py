@@ -17,13 +17,11 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import look_up
 from rotor_mbs.report import plots
 from rotor_mbs.report.core import canvas, svg
-from rotor_mbs.report.core.elements import LegendEntry, PageTable, Row, Section
+from rotor_mbs.report.core.elements import LegendEntry
 from rotor_mbs.report.core.looks import COLOURS, Look, coordinate_look, label_of, with_capital
 from rotor_mbs.report.core.numbers import minus, number, prefixed, with_unit
 from rotor_mbs.report.pages import Context
 from rotor_mbs.report.pages.claim_tables import number_table
-from rotor_mbs.report.pages.quantities import VISIBLE, angle_difference, parting
-from rotor_mbs.report.pages.scene_tables import horizon, metric
 from rotor_mbs.runs.files import replace_file
 from rotor_mbs.runs.read import OpenResults, StoredRun, StoredScene, open_results
 
@@ -187,12 +185,6 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
     return panels
 
 
-def figures_page(figures: Sequence[Mapping[str, object]], scenes: Mapping[str, StoredScene]) -> dict[str, object]:
-    """The content of the page that goes through the figures, from that of each (`walk_figure`)."""
-    shown = {name: scenes[name] for figure in available(scenes) for _, name in figure.panels}
-    return {"figures": figures, "models": Section(tables=[model_table(shown)])}
-
-
 def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> dict[str, object]:
     """The part of the page about one figure."""
     scenes = opened.scenes
@@ -227,44 +219,6 @@ def walk_figure(figure: PaperFigure, context: Context, opened: OpenResults) -> d
         "panels": panels,
         "numbers": number_table([claim for claim in context.claims if claim.published.figure == figure.number]),
     }
-
-
-def model_table(scenes: Mapping[str, StoredScene]) -> PageTable:
-    """How far the printed model and Exudyn are from the corrected model, a row per scene."""
-    head = (
-        "Scene", f"As printed: {VISIBLE:g} rad off from (s)", "largest difference (rad)", "largest pitch (rad)",
-        "largest energy gain", "ends at (s)", "Corrected: largest pitch (rad)", "Exudyn: difference (rad)", "up to (s)",
-        "turned by the end (rad): as printed", "corrected", "Exudyn",
-    )  # fmt: skip
-    rows: list[Row] = []
-    for name, scene in scenes.items():
-        runs = compared_runs(scene)
-        printed, corrected, exudyn = (runs.get(key) for key in HEADINGS)
-        row = [name, *[""] * (len(head) - 1)]
-        if printed is not None and corrected is not None:
-            parted, largest = parting(printed, corrected)
-            row[1:3] = "never" if parted is None else number(parted, 3), number(largest)
-        if printed is not None:
-            row[3] = _largest_pitch(printed)
-            row[4] = prefixed(metric(printed, "energy_gain_J"), "J")
-            row[5] = number(float(printed.array("time")[-1]), 3)
-        if corrected is not None:
-            row[6] = _largest_pitch(corrected)
-        if exudyn is not None and corrected is not None:
-            gap, time = angle_difference(exudyn, corrected), exudyn.array("time")
-            known = horizon(scene)
-            until = float(time[-1]) if known is None else min(known, float(time[-1]))
-            row[7:9] = number(float(gap[time[: len(gap)] <= until].max(initial=0.0))), number(until, 3)
-        for place, run in zip((9, 10, 11), (printed, corrected, exudyn), strict=True):
-            if run is not None:
-                rotor = run.array("angles")[:, 0]
-                row[place] = number(float(rotor[-1] - rotor[0]), 3)
-        rows.append(row)
-    return PageTable("", head, rows)
-
-
-def _largest_pitch(run: StoredRun) -> str:
-    return number(float(np.abs(run.array("angles")[:, 1:]).max(initial=0.0)))
 
 
 def _conditions(stored: StoredScene, *, with_torque: bool = True) -> str:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from rotor_mbs.analysis import run_selection
 from rotor_mbs.analysis.claims import agreement, finding
 from rotor_mbs.analysis.judgement import OK_ERROR
@@ -19,6 +21,8 @@ from rotor_mbs.report.core.numbers import SPACE, number, power, prefixed, with_u
 from rotor_mbs.report.core.svg import picture
 from rotor_mbs.report.pages import Context, claim_tables, quantities
 from rotor_mbs.report.pages.bench import cost_legend, cost_picture
+from rotor_mbs.report.pages.figures import compared_runs
+from rotor_mbs.report.pages.quantities import VISIBLE, angle_difference, parting
 from rotor_mbs.report.pages.scene import key_picture
 from rotor_mbs.report.pages.scene_tables import (
     bounded_cell,
@@ -53,6 +57,7 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
     """The content of the index; what the file has no data for is None or empty. Its last tables are folded."""
     scenes, claims, study = opened.scenes, context.claims, context.study
     shares = None if study is None else study.shares
+    model = "Corrected model" if claims else "Model"  # of a user's own rotor nothing was corrected
     # The scene with a published extreme that is no rounding error; else one with both models; else the first.
     both = [name for name, scene in scenes.items() if len(run_selection.sides(scene)) > 1]
     shown = next(iter([*both, *scenes]))
@@ -69,25 +74,6 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             still = picture(plots.paths(run.array("tip")), "still", f"{shown}: paths of the tips")
     benched = next((scene for scene in context.curves if scene in scenes), "")
     curves = context.curves.get(benched, ())
-    errata_rows = [
-        (TableCell(e.id, href=f"errata.html#{e.id}"), ", ".join(e.stands_in), e.printed, e.right, e.reason)
-        for e in context.errata
-    ]
-    scene_head = (
-        "Scene", "Figure", "Compared up to the horizon", "As printed, ode45", "Largest error (rad, whole run)",
-        "Energy gain",
-    )  # fmt: skip
-    scene_rows: list[Row] = []
-    for name, scene in scenes.items():
-        cells: list[TableCell | str] = [TableCell(name, href=context.files[name], note=scene.title)]
-        cells += [str(scene.attributes.get("figures", "")), with_unit(horizon(scene), "s", 3)]
-        printed = scene.methods.get(run_selection.PRINTED)
-        if printed is None:
-            cells += ["", "", ""]
-        else:
-            cells += [status_cell(printed), number(metric(printed, "angle_error_whole"))]
-            cells.append(prefixed(metric(printed, "energy_gain_J"), "J"))
-        scene_rows.append(cells)
     agreement_head = (
         "Method", "Runs", "Largest defect (rad)", f"Largest angle error up to each horizon (rad), at most {OK_ERROR:g}",
         "Largest energy drift (relative)", "Longest run",
@@ -104,19 +90,18 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
             f"Compared with the reference over {number(compared, 3)} of {number(whole, 3)} s of simulated time, "
             f"{100.0 * compared / whole:.0f}{SPACE}%: each scene up to its horizon."
         )
-    head = ("Erratum", "Equation", "Printed", "Correct", "Reason")
     return {
-        "paper": PageTable("", ("Result", "As printed", "Corrected model"), finding(scenes, claims, shares)),
+        "paper": PageTable("", ("Result", "As printed", model), finding(scenes, claims, shares)),
         "scene": shown,
         "viewer": viewer(scenes[shown], {label_of(run.method): run for run in sides}),
         "still": still,
         "crest": key_picture(sides, own_claims, horizon(scenes[shown]), "crest"),
         "defects": _defects(scenes, shown),
-        "energy": _energy(scenes),
+        "energy": _energy(scenes, model),
         "cost": cost_picture(curves, f"Error against run time of all methods, {benched}", cost_legend(curves)),
         "methods": Section(tables=[PageTable("", agreement_head, agreement_rows)], notes=notes),
         "heat": heat_map(scenes, context.files),
-        "scenes": Section(tables=[PageTable("", scene_head, scene_rows)]),
+        "scenes": Section(tables=[scene_table(scenes, context.files, model)]),
         "numbers": Section(
             tables=[
                 claim_tables.number_table(claims),
@@ -127,9 +112,6 @@ def index_page(context: Context, opened: OpenResults) -> dict[str, object]:
         "claims": Section(
             tables=[claim_tables.claim_table(claims, shares)],
             notes=[] if shares is None else [claim_tables.study_note(shares)],
-        ),
-        "errata": Section(
-            tables=[PageTable("The errors in the printed equations; all else follows from them", head, errata_rows)]
         ),
         "versions": versions(opened.attributes),
         "is_paper": bool(claims),
@@ -152,8 +134,43 @@ def _defects(scenes: Scenes, name: str) -> Picture | None:
     )  # fmt: skip
 
 
-def _energy(scenes: Scenes) -> Picture | None:
-    """A mark per scene for the printed model's gain, and for each corrected model's drift."""
+def scene_table(scenes: Scenes, files: Mapping[str, str], model: str) -> PageTable:
+    """A row per scene: how far the printed model and Exudyn are from the corrected one, which is called `model`."""
+    head = (
+        "Scene", "Figure", "Compared up to the horizon", "As printed, ode45", f"{VISIBLE:g} rad off from (s)",
+        "Largest difference (rad)", "Energy gain", "Largest pitch (rad)", f"{model}: largest pitch (rad)",
+        "Exudyn: largest difference up to the horizon (rad)",
+    )  # fmt: skip
+    rows: list[Row] = []
+    for name, scene in scenes.items():
+        until = horizon(scene)
+        figures = str(scene.attributes.get("figures", ""))
+        row: list[TableCell | str] = [TableCell(name, href=files[name], note=scene.title), figures]
+        row.append(with_unit(until, "s", 3))
+        runs = compared_runs(scene)
+        corrected = runs.get("corrected")
+        stored = scene.methods.get(run_selection.PRINTED)
+        row.append("" if stored is None else status_cell(stored))
+        if "printed" in runs and corrected is not None:
+            parted, largest = parting(runs["printed"], corrected)
+            row += ["never" if parted is None else number(parted, 3), number(largest)]
+        else:
+            row += ["", ""]
+        row.append("" if stored is None else prefixed(metric(stored, "energy_gain_J"), "J"))
+        for key in ("printed", "corrected"):
+            row.append(number(float(np.abs(runs[key].array("angles")[:, 1:]).max(initial=0.0))) if key in runs else "")
+        if "exudyn" in runs and corrected is not None:
+            gap = angle_difference(runs["exudyn"], corrected)
+            time = corrected.array("time")[: len(gap)]
+            row.append(number(float(gap[time <= (until or np.inf)].max(initial=0.0))))
+        else:
+            row.append("")
+        rows.append(row)
+    return PageTable("", head, rows)
+
+
+def _energy(scenes: Scenes, model: str) -> Picture | None:
+    """A mark per scene for the printed model's gain, and for the drift of each corrected one, called `model`."""
     rows: dict[str, list[tuple[float, Look]]] = {}
     looks: dict[str, Look] = {}
     for name, scene in scenes.items():
@@ -170,7 +187,7 @@ def _energy(scenes: Scenes) -> Picture | None:
                 rows.setdefault(name.removeprefix("paper/"), []).append((value, looks[run.method]))
     if run_selection.PRINTED not in looks:
         return None
-    caption = "Spurious energy gain as printed, and energy drift of the corrected models, in each scene"
+    caption = f"Spurious energy gain as printed, and energy drift of each {model.lower()}, by scene"
     legend = [LegendEntry(label_of(name), look) for name, look in looks.items()]
     return picture(energy_of_scenes(rows), "energy-scenes", caption, legend=legend)
 

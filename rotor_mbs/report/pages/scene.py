@@ -76,7 +76,7 @@ def scene_page(name: str, context: Context, opened: OpenResults) -> dict[str, ob
         "claims": Section(tables=[table for table in tables if table.rows], notes=notes),
         "viewer": viewer(scene, {label_of(run.method): run for run in runs}),
         "key": key_picture(runs, claims, horizon),
-        "paths": _tips_section(parsed, runs, horizon),
+        "paths": _tips_section(runs),
         "motion": _motion_section(runs, horizon),
         "difference": _difference_section(scene, sides, drawn, horizon),
         "defects": _defect_section(parsed, drawn),
@@ -184,8 +184,10 @@ def departure(
             if not place:
                 text = f"{VISIBLE:g} rad apart at {parted:.2g} s"
                 low, high = axes.get_ylim()
-                then = float(np.interp(parted, series[0].time, series[0].values))
-                side, height = ("bottom", low) if then > 0.5 * (low + high) else ("top", high)  # away from the curves
+                # Where the curves leave more room.
+                values = np.concatenate([x.values[(x.time >= parted) & (x.time <= parted + 0.4 * end)] for x in series])
+                is_below = values.min() - low > high - values.max()
+                side, height = ("bottom", low) if is_below else ("top", high)
                 axes.text(parted + 0.01 * end, height, text, color=GREY, ha="left", va=side, fontsize=8.5)
     return panels
 
@@ -250,8 +252,8 @@ def range_table(runs: Sequence[StoredRun]) -> PageTable:
     return PageTable("Extremes", head, rows)
 
 
-def _tips_section(scene: Scene | None, sides: Sequence[StoredRun], horizon: float | None) -> Section:
-    """Paths in space as the paper draws them; offset over azimuth; distance of printed from corrected tips."""
+def _tips_section(sides: Sequence[StoredRun]) -> Section:
+    """Paths in space as the paper draws them; how far the tips go, and the printed ones from the corrected ones."""
     runs = [run for run in sides if "tip" in run]
     if not runs:
         return Section()
@@ -259,21 +261,6 @@ def _tips_section(scene: Scene | None, sides: Sequence[StoredRun], horizon: floa
         picture(plots.paths(run.array("tip")), f"paths-{i}", with_capital(label_of(run.method)))
         for i, run in enumerate(runs)
     ]
-    out_of_plane = [float(np.abs(run.array("tip")[:, :, 1]).max()) for run in runs]
-    if scene is not None and max(out_of_plane) > 1e-9:
-        for i, run in enumerate(run for run in runs if "angles" in run):
-            panels = offsets_over_azimuth(run.array("angles"), run.array("tip"), scene.phases)
-            caption = f"{with_capital(label_of(run.method))}: tips out of the plane of rotation"
-            pictures.append(picture(panels, f"offset-{i}", caption))
-    if len(runs) > 1:
-        first, second = runs
-        count = min(len(first.array("time")), len(second.array("time")))
-        time = first.array("time")[:count]
-        gaps = np.linalg.norm(first.array("tip")[:count] - second.array("tip")[:count], axis=2)
-        series = [Series(time, np.maximum(gap, 1e-6), coordinate_look(1 + i)) for i, gap in enumerate(gaps.T)]
-        caption = f"Distance of each printed tip from the corrected one: up to {prefixed(float(gaps.max()), 'm')}"
-        panels = plots.errors(series, "printed − corrected (m)", horizon)
-        pictures.append(picture(panels, "tip-difference", caption))
     blades = range(1, 1 + runs[0].array("tip").shape[1])
     lines = [LegendEntry(f"blade {i}", coordinate_look(i)) for i in blades]
     ends = [line_entry("blade at the start", line="--"), line_entry("at the end"), line_entry("shaft", width=4)]
@@ -281,25 +268,17 @@ def _tips_section(scene: Scene | None, sides: Sequence[StoredRun], horizon: floa
     rows = [[str(i)] for i in blades]
     for run in runs:
         tip = run.array("tip")
-        head += [f"{with_capital(label_of(run.method))}: length of path", "off the plane"]
+        head += [f"{with_capital(label_of(run.method))}: length of path", "farthest out of plane"]
         lengths = np.linalg.norm(np.diff(tip, axis=0), axis=2).sum(axis=0)
         for row, length, off in zip(rows, lengths, np.abs(tip[:, :, 1]).max(axis=0), strict=True):
             row += [prefixed(length, "m"), prefixed(off, "m")]
+    if len(runs) > 1:
+        first, second = (run.array("tip") for run in runs)
+        count = min(len(first), len(second))
+        head.append("largest distance of both")
+        for row, gap in zip(rows, np.linalg.norm(first[:count] - second[:count], axis=2).max(axis=0), strict=True):
+            row.append(prefixed(float(gap), "m"))
     return Section(pictures, [*lines, *ends], [PageTable("Paths of the tips", head, rows)])
-
-
-def offsets_over_azimuth(angles: Array, tip: Array, phases: Sequence[float]) -> Panels:
-    """How far each tip (n, blades, 3) m is out of the plane of rotation, in mm, over where its blade points."""
-    panels = canvas.panels((2.3,), "azimuth of the blade (°), 0 above the hub")
-    axes = panels.axes[0]
-    for blade, phase in enumerate(phases):
-        azimuth = np.degrees(np.remainder(angles[:, 0] + phase, 2.0 * np.pi))
-        offset = 1e3 * tip[:, blade, 1]
-        gap = np.abs(np.diff(azimuth, prepend=azimuth[:1])) > 180.0
-        canvas.curve(axes, azimuth, np.where(gap, np.nan, offset), coordinate_look(blade + 1), 0.9)
-    axes.set(xlim=(0.0, 360.0), ylabel="tip out of plane (mm)")
-    canvas.ticks(axes.xaxis, {angle: str(angle) for angle in range(0, 361, 60)})
-    return panels
 
 
 def _difference_section(scene: StoredScene, sides: Runs, drawn: Runs, horizon: float | None) -> Section:
